@@ -1,4 +1,6 @@
-"""Versions of everything that `pip install '.[test]'` brings, as installed in this environment: `python .ci/constraints.py > constraints.txt`."""
+"""Versions of everything that `pip install '.[test]'` brings, as installed in this environment:
+`python .ci/constraints.py > constraints.txt`.
+"""
 
 import re
 import tomllib
@@ -13,7 +15,7 @@ def normal(name: str) -> str:
 
 
 def needed(requirements: Iterable[str], extras: frozenset[str], found: dict[str, str]) -> None:
-    """Adds the distributions of these requirements and what they require, where that is installed."""
+    """Adds the distributions of these requirements and what they require, where installed."""
     for text in requirements:
         requirement, _, marker = text.partition(";")
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)", marker)
@@ -29,13 +31,16 @@ def needed(requirements: Iterable[str], extras: frozenset[str], found: dict[str,
         needed(of.requires or (), frozenset(asked[1].split(",")) if asked else frozenset(), found)
 
 
-project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+]
 versions: dict[str, str] = {}
 needed([*project["dependencies"], *project["optional-dependencies"]["test"]], frozenset(), versions)
 for own in ("symgen", "setuptools", "pip"):
     versions.pop(own, None)
 print(
-    f"# Versions that the checks last passed with, Python {python_version()}: pip install -c constraints.txt '.[test]'. By .ci/constraints.py."
+    f"# Versions that the checks last passed with, Python {python_version()}: pip install -c "
+    "constraints.txt '.[test]'. By .ci/constraints.py."
 )
 for package in sorted(versions):
     print(f"{package}=={versions[package]}")

@@ -1,7 +1,8 @@
-"""The installed package, in a folder that holds nothing, with the core dependencies alone: every module is imported, every verb runs, and what needs
+"""The installed package, in a folder that holds nothing, with the core dependencies alone: every
+module is imported, every verb runs, and what needs
 an extra says which in one line.
 
-    python smoke.py [--extras]        --extras: optional libraries may be there, their lines are not asked for
+    python smoke.py [--extras]      optional libraries may be there, their lines are not asked for
 """
 
 import importlib
@@ -19,7 +20,20 @@ import symgen
 
 SYMGEN = str(Path(sys.executable).with_name("symgen"))
 EXTRAS = (  # extra, a command that needs it
-    ("scale", ["cestac", "planar_2r", "run.csv", "--scheduler", "tcp://127.0.0.1:9", "--delta", "1e-3", "--runs", "2"]),
+    (
+        "scale",
+        [
+            "cestac",
+            "planar_2r",
+            "run.csv",
+            "--scheduler",
+            "tcp://127.0.0.1:9",
+            "--delta",
+            "1e-3",
+            "--runs",
+            "2",
+        ],
+    ),
     ("tables", ["identify", "planar_2r", "run.parquet"]),
     ("tables", ["identify", "planar_2r", "run.mat"]),
     ("bags", ["identify", "planar_2r", "run.bag"]),
@@ -32,15 +46,21 @@ controller:
   rate: 1000
   reference:
     limits: ignore
-    motion: {parts: [{family: fourier, period: 1.0, harmonics: 2, p: [[0.0, 0.01, -0.01, 0.002, 0.003]]}]}
+    motion:
+      parts: [{family: fourier, period: 1.0, harmonics: 2, p: [[0.0, 0.01, -0.01, 0.002, 0.003]]}]
 """
 
 
 def command(*arguments: str, code: int = 0) -> str:
     """What `symgen ARGUMENTS` prints; it must end with `code` and without a traceback."""
-    done = subprocess.run([SYMGEN, *arguments], capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        [SYMGEN, *arguments], capture_output=True, text=True, timeout=300, check=False
+    )
     if done.returncode != code or "Traceback" in done.stderr:
-        sys.exit(f"symgen {' '.join(arguments)}: code {done.returncode}, expected {code}\n{done.stdout}{done.stderr}")
+        sys.exit(
+            f"symgen {' '.join(arguments)}: code {done.returncode}, expected "
+            f"{code}\n{done.stdout}{done.stderr}"
+        )
     return done.stdout + done.stderr
 
 
@@ -52,7 +72,11 @@ def main() -> None:
             sys.exit(f"{package.__name__} is that of this folder, not the installed one")
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
-    foreign = {path.parts[0] for path in distribution("symgen").files or ()} - {"symgen", "runtime", ".."}
+    foreign = {path.parts[0] for path in distribution("symgen").files or ()} - {
+        "symgen",
+        "runtime",
+        "..",
+    }
     if not all(name.startswith("symgen-") and name.endswith(".dist-info") for name in foreign):
         sys.exit(f"the package installs {sorted(foreign)}")
 
@@ -61,7 +85,13 @@ def main() -> None:
     table = np.column_stack([t, q, 5 * np.cos(2 * t), np.sin(5 * t)])
     np.savetxt("run.csv", table, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
     Path("run.parquet").write_bytes(b"PAR1" + bytes(16) + b"PAR1")
-    Path("run.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + b"\x89HDF\r\n\x1a\n" + bytes(64))
+    Path("run.mat").write_bytes(
+        b"MATLAB 7.3 MAT-file".ljust(124)
+        + b"\x00\x02IM"
+        + bytes(384)
+        + b"\x89HDF\r\n\x1a\n"
+        + bytes(64)
+    )
     Path("arm.xml").write_text("<mujoco/>", encoding="utf-8")
     Path("loop.yaml").write_text(LOOP, encoding="utf-8")
     Path("run.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(64))
@@ -71,8 +101,7 @@ def main() -> None:
     command("check", "arm.yaml")
     command("show", "arm.yaml", "--html")
     command("show", "arm.yaml", "--model", "inertia_matrix", "--format", "sympy")
-    command("convert", "tx40", "tx40.par")
-    command("convert", "tx40.par", "again.yaml")
+    command("convert", "tx40", "again.yaml")
     command("generate", "arm.yaml", "planar_2r", "-o", "models", "--target", "numpy,casadi,c,xp")
     command("identify", "models/planar_2r.py", "run.csv", "-o", "found", "--friction")
     json.loads(Path("found/estimate.json").read_text(encoding="utf-8"))
@@ -81,7 +110,6 @@ def main() -> None:
     command("cestac", "planar_2r", "run.csv", "-o", "steps", "--delta", "1e-6", "--runs", "5")
     command("report", "planar_2r", "run.csv", "-o", "report", "--help")
     command("simulate", "emps", "loop.yaml", "-o", "loop")
-    command("snippet", "emps", "-o", "use")
     command("datasets")
     command("schema")
     if "--extras" not in sys.argv:

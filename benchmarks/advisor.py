@@ -1,14 +1,20 @@
-"""Resolution advisor against sampling: the steps it predicts for 1 % and 5 %, and what both ways cost.
+"""Resolution advisor against sampling: the steps it predicts for 1 % and 5 %, and what both ways
+cost.
 
     python benchmarks/advisor.py [emps tx40 haptic]          needs the records: set SYMGEN_DATA, or be on line
     python benchmarks/advisor.py --real [emps tx40 haptic]   real encoders, read as positions and as counts, in place of the chapter's law
 
-Steps: CESTAC at steps in the ratio 1.3, RUNS runs each, all encoders alike; where |change of the mean| first reaches a limit between two of them, on
-logarithmic axes. The interval is that of |change| +- the half width of Student's. Predicted over sampled should be within 15 %.
+Steps: CESTAC at steps in the ratio 1.3, RUNS runs each, all encoders alike; where |change of the
+mean| first reaches a limit between two of them, on
+logarithmic axes. The interval is that of |change| +- the half width of Student's. Predicted over
+sampled should be within 15 %.
 
-Cost: CPU time of one advice without runs (every choice of encoders, both limits, the curve) over that of the sampling it stands for: for every choice of
-encoders, LEVELS steps (to bracket two limits within 15 %) of five runs, as the chapter has it; or of as many as bring the Student interval of every
-parameter that matters below 30 % of the limit at the step where it reaches it, since the advice gives those steps too. One core, BLAS on one thread, medians of interleaved rounds.
+Cost: CPU time of one advice without runs (every choice of encoders, both limits, the curve) over
+that of the sampling it stands for: for every choice of
+encoders, LEVELS steps (to bracket two limits within 15 %) of five runs, as the chapter has it; or
+of as many as bring the Student interval of every
+parameter that matters below 30 % of the limit at the step where it reaches it, since the advice
+gives those steps too. One core, BLAS on one thread, medians of interleaved rounds.
 """
 
 import sys
@@ -29,20 +35,24 @@ from scipy.special import stdtrit  # noqa: E402
 import symgen  # noqa: E402
 from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.estimators.linear import assemble  # noqa: E402
-from runtime.estimators.methods import linear_system  # noqa: E402
+from runtime.estimators.method import linear_system  # noqa: E402
 from runtime.model.generated import drives_of  # noqa: E402
-from runtime.observation.observation import observe  # noqa: E402
-from runtime.observation.position_errors import perturbation  # noqa: E402
 from runtime.records.datasets import dataset_study  # noqa: E402
 from runtime.records.reading import read_records  # noqa: E402
 from runtime.resolution.advice import crossing  # noqa: E402
 from runtime.resolution.advisor import LIMITS, advise, sampled_level  # noqa: E402
 from runtime.resolution.cestac import cestac  # noqa: E402
-from runtime.resolution.perturbed import Task, prepared  # noqa: E402
+from runtime.resolution.perturbed import Task, prepared_record  # noqa: E402
 from runtime.resolution.readers import RealEncoders  # noqa: E402
+from runtime.rows.observe import observe  # noqa: E402
+from runtime.rows.position_errors import perturbation  # noqa: E402
+from runtime.rows.prepared import prepared  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
-from symgen.demo.counts import MAIN  # noqa: E402
-from symgen.demo.haptic_motion import DURATION, haptic_record, haptic_study  # noqa: E402
+from symgen.demo.tx40_tables import MAIN  # noqa: E402
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
+
+from haptic_motion import DURATION, prepare  # noqa: E402
 
 RUNS = {"emps": 100, "tx40": 60, "haptic": 30}
 LEVELS = 8
@@ -55,11 +65,9 @@ HAPTIC_SHARE = 4  # of the motion of the haptic device, where real encoders are 
 def opened(name, model, folder, share=1):
     """Study, without median filter ahead of the rounding, and record."""
     if name == "haptic":
-        content, settings = haptic_record(model, DURATION / share)
-        (folder / settings.files[0]).write_bytes(content)
-        study = replace(haptic_study(5), record=(settings,))
-    else:
-        study = study_from_mapping(dataset_study(name))
+        haptic = prepare(model, DURATION / share)
+        return haptic.study, haptic.record
+    study = study_from_mapping(dataset_study(name))
     return study, read_records(study.record, model, folder=folder)[0]
 
 
@@ -69,25 +77,43 @@ def steps_table(name, model, study, record, names):
     first = advice.encoders[0]
     part = perturbation(model, record, study, names)
     system = linear_system(part.observation, replace(study.estimate, columns="all"))
-    task = Task((prepared(model, record, study),), model, tuple(names), replace(study.estimate, columns="all"), study.cestac, (), None, {})
+    task = Task(
+        (prepared_record(prepared(model, record, study), study),),
+        model,
+        tuple(names),
+        replace(study.estimate, columns="all"),
+        study.cestac,
+        (),
+        None,
+        {},
+    )
     level = partial(sampled_level, task, (part,), assemble(system, system.solve(), model=model))
     low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
     grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)
     points = [level(range(record.n), delta, RUNS[name]) for delta in grid]
     e, half = np.array([np.abs(p.change) for p in points]), np.array([p.half_width for p in points])
-    print(f"\n{name}: {RUNS[name]} runs at {len(grid)} steps; predicted / sampled step, and the sampled interval over the sampled step")
+    print(
+        f"\n{name}: {RUNS[name]} runs at {len(grid)} steps; predicted / sampled step, and the "
+        "sampled interval over the sampled step"
+    )
     within = compared = 0
     for percent in LIMITS:
         predicted = first.reached(percent)
         for i in (names.index(n) for n in advice.deciding):
             sampled = crossing(grid, e[:, i], percent)
-            least, most = crossing(grid, e[:, i] + half[:, i], percent), crossing(grid, np.clip(e[:, i] - half[:, i], 0, None), percent)
+            least, most = (
+                crossing(grid, e[:, i] + half[:, i], percent),
+                crossing(grid, np.clip(e[:, i] - half[:, i], 0, None), percent),
+            )
             if not np.isfinite([predicted[i], sampled]).all():
                 continue
             compared, within = compared + 1, within + (abs(predicted[i] / sampled - 1) <= 0.15)
-            mark = " <- advised" if names[i] == first.limits[LIMITS.index(percent)].parameter else ""
+            mark = (
+                " <- advised" if names[i] == first.limits[LIMITS.index(percent)].parameter else ""
+            )
             print(
-                f"  {percent:g} %  {names[i]:8s} {predicted[i]:.3e} {sampled:.3e}  {predicted[i] / sampled:.3f}  [{least / sampled:.2f}, {most / sampled:.2f}]{mark}"
+                f"  {percent:g} %  {names[i]:8s} {predicted[i]:.3e} {sampled:.3e}  "
+                f"{predicted[i] / sampled:.3f}  [{least / sampled:.2f}, {most / sampled:.2f}]{mark}"
             )
     print(f"  within 15 %: {within} of {compared}")
     return advice, level
@@ -111,11 +137,13 @@ def cost(name, model, study, record, names, advice, level):
     }
     one, all_of_it = median(sampling), median(predicting)
     print(
-        f"{name}: prediction {1e3 * all_of_it:.0f} ms ({1e3 * min(predicting):.0f} to {1e3 * max(predicting):.0f}), one CESTAC run {1e3 * one:.1f} ms"
+        f"{name}: prediction {1e3 * all_of_it:.0f} ms ({1e3 * min(predicting):.0f} to "
+        f"{1e3 * max(predicting):.0f}), one CESTAC run {1e3 * one:.1f} ms"
     )
     for label, count in runs.items():
         print(
-            f"  {label}, {len(whole.encoders)} choices of encoders, {count:.0f} runs: sampling costs {count * one / all_of_it:.0f} times the prediction"
+            f"  {label}, {len(whole.encoders)} choices of encoders, {count:.0f} runs: sampling "
+            f"costs {count * one / all_of_it:.0f} times the prediction"
         )
 
 
@@ -123,45 +151,82 @@ def needed_runs(whole, model, record, names, level):
     """Runs at one step, summed over choices of encoders and limits."""
     total = 0
     for encoder in whole.encoders:
-        chosen = range(record.n) if encoder.label == "all" else (model.JOINTS.index(int(encoder.label)),)
+        chosen = (
+            range(record.n) if encoder.label == "all" else (model.JOINTS.index(int(encoder.label)),)
+        )
         for limit in encoder.limits:
             needed = 5
             if np.isfinite(limit.delta):
                 point = level(chosen, limit.delta, 10)
                 reached = encoder.reached(limit.percent)
-                for i in (names.index(n) for n in whole.deciding if np.isfinite(reached[names.index(n)])):
-                    spread = point.half_width[i] * np.sqrt(10) / stdtrit(9, 0.975) * reached[i] / limit.delta
+                for i in (
+                    names.index(n) for n in whole.deciding if np.isfinite(reached[names.index(n)])
+                ):
+                    spread = (
+                        point.half_width[i]
+                        * np.sqrt(10)
+                        / stdtrit(9, 0.975)
+                        * reached[i]
+                        / limit.delta
+                    )
                     needed = max(needed, np.ceil((1.96 * spread / (0.3 * limit.percent)) ** 2))
             total += needed
     return total
 
 
 def real_table(name, model, study, record, names):
-    """Steps predicted by the quadrature over the phase, and steps at which runs of random phase cross the limits, by reader and parameter."""
+    """Steps predicted by the quadrature over the phase, and steps at which runs of random phase
+    cross the limits, by reader and parameter.
+    """
     law = replace(study, cestac=replace(study.cestac, rounding="phase", delta=()))
     start = time.process_time()
     advice = advise(model, record, law, columns=names, encoders=("all",), confirm=False)
-    print(f"\n{name}: predicted in {time.process_time() - start:.0f} s of CPU; sampled by {REAL_RUNS[name]} runs", flush=True)
+    print(
+        (
+            f"\n{name}: predicted in {time.process_time() - start:.0f} s of CPU; sampled by "
+            f"{REAL_RUNS[name]} runs"
+        ),
+        flush=True,
+    )
     for reader in advice.real:
-        own = law if reader.reader == "lowpass" else replace(law, signals=replace(law.signals, reader="counts"))
-        real = RealEncoders(model, [record], own, names, drives_of(model), {}, reader.reader)
+        own = (
+            law
+            if reader.reader == "lowpass"
+            else replace(law, signals=replace(law.signals, reader="counts"))
+        )
+        real = RealEncoders(
+            model, [prepared(model, record, own)], own, names, drives_of(model), {}, reader.reader
+        )
         first, ratios = reader.encoders[0], []
         for limit in first.limits:
             if not np.isfinite(limit.delta):
                 print(
-                    f"  {reader.reader:8} {limit.percent:g} %: {'none' if np.isnan(limit.delta) else 'every step'} ({limit.parameter}), {first.delta[0]:.3g} to {first.delta[-1]:.3g}"
+                    f"  {reader.reader:8} {limit.percent:g} %: "
+                    f"{'none' if np.isnan(limit.delta) else 'every step'} ({limit.parameter}), "
+                    f"{first.delta[0]:.3g} to {first.delta[-1]:.3g}"
                 )
                 continue
             near = first.delta[np.abs(np.log(first.delta / limit.delta)) < 2 * np.log(RATIO)]
-            grid = near if len(near) > 5 else limit.delta * RATIO ** np.arange(-2, 3.0)  # where steps lock, those of the curve
+            grid = (
+                near if len(near) > 5 else limit.delta * RATIO ** np.arange(-2, 3.0)
+            )  # where steps lock, those of the curve
             points = [real.sampled(range(record.n), delta, REAL_RUNS[name]) for delta in grid]
             e, half = np.abs([p.change for p in points]), np.array([p.half_width for p in points])
-            steps = {n: crossing(grid, e[:, names.index(n)], limit.percent) for n in advice.deciding}
+            steps = {
+                n: crossing(grid, e[:, names.index(n)], limit.percent) for n in advice.deciding
+            }
             reached = first.reached(limit.percent)
-            ratios += [reached[names.index(n)] / s for n, s in steps.items() if np.isfinite([reached[names.index(n)], s]).all()]
+            ratios += [
+                reached[names.index(n)] / s
+                for n, s in steps.items()
+                if np.isfinite([reached[names.index(n)], s]).all()
+            ]
             sampled = min((s for s in steps.values() if np.isfinite(s)), default=np.nan)
             which = min(steps, key=lambda n: steps[n] if np.isfinite(steps[n]) else np.inf)
-            i, nearest = names.index(limit.parameter), int(np.argmin(np.abs(np.log(grid / limit.delta))))
+            i, nearest = (
+                names.index(limit.parameter),
+                int(np.argmin(np.abs(np.log(grid / limit.delta)))),
+            )
             least, most = (
                 crossing(grid, e[:, i] + half[:, i], limit.percent),
                 crossing(grid, np.clip(e[:, i] - half[:, i], 0, None), limit.percent),
@@ -171,7 +236,8 @@ def real_table(name, model, study, record, names):
                   f"[{limit.delta / most:.2f}, {limit.delta / least:.2f}], runs near the predicted step {e[nearest, i]:.2f} +- {half[nearest, i]:.2f} %", flush=True)  # fmt: skip
         print(*reader.notes, sep="\n")
         print(
-            f"  {reader.reader:8} by parameter: {sum(abs(r - 1) <= 0.2 for r in ratios)} of {len(ratios)} predicted steps within 20 % of the sampled ones"
+            f"  {reader.reader:8} by parameter: {sum(abs(r - 1) <= 0.2 for r in ratios)} of "
+            f"{len(ratios)} predicted steps within 20 % of the sampled ones"
         )
 
 

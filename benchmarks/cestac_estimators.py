@@ -1,12 +1,18 @@
-"""Every estimator against Delta on simulated records of known truth: the encoder inside the loop, and recorded positions alone rounded.
+"""Every estimator against Delta on simulated records of known truth: the encoder inside the loop,
+and recorded positions alone rounded.
 
     python benchmarks/cestac_estimators.py [--runs 5] [--cloe 2] [-o docs]
 
-Everything goes through the verb: `symgen cestac ROBOT study.yaml --json`, with `cestac: {place: loop, rounding: phase}`, or `place: record` on a record
-that `symgen simulate` makes with an exact encoder. Robots, gains, noise, steps and determined parameters are those of benchmarks/estimators.py.
-Answers are kept in cestac_estimators_runs/; the same command goes on from there. Written: cestac_estimators.png, and a table on the screen. Above: the
-estimates of the runs against the truth, noise and disturbance of each run included. Below: %e (21) as the verb prints it, mean of the runs against those
-of the same seeds with an exact encoder (against the record, where recorded positions alone are rounded). Both: rms over the determined parameters.
+Everything goes through the verb: `symgen cestac ROBOT study.yaml --json`, with `cestac: {place:
+loop, rounding: phase}`, or `place: record` on a record
+that `symgen simulate` makes with an exact encoder. Robots, gains, noise, steps and determined
+parameters are those of benchmarks/estimators.py.
+Answers are kept in cestac_estimators_runs/; the same command goes on from there. Written:
+cestac_estimators.png, and a table on the screen. Above: the
+estimates of the runs against the truth, noise and disturbance of each run included. Below: %e (21)
+as the verb prints it, mean of the runs against those
+of the same seeds with an exact encoder (against the record, where recorded positions alone are
+rounded). Both: rms over the determined parameters.
 """
 
 from __future__ import annotations
@@ -33,7 +39,12 @@ RECORDED = ("ols", "iv", "didim")  # also with recorded positions alone rounded
 
 def verb(*arguments: object) -> str:
     """What the verb prints; exit code 1 only says that the estimate is biased."""
-    done = subprocess.run([Path(sys.executable).with_name("symgen"), *map(str, arguments)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [Path(sys.executable).with_name("symgen"), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if done.returncode > 1:
         raise SystemExit(done.stderr)
     return done.stdout
@@ -44,13 +55,21 @@ def study_of(robot: str, method: str, place: str, runs: int) -> dict[str, Any]:
     b = bench(robot)
     signs = np.sign(np.random.default_rng(1).uniform(-1, 1, len(b.truth)))
     start = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + AWAY * signs)).tolist(), strict=True))
-    options: dict[str, Any] = {"around": AROUND[robot]} if place == "loop" or method in ("iv", "didim", "cloe") else {}
+    options: dict[str, Any] = (
+        {"around": AROUND[robot]} if place == "loop" or method in ("iv", "didim", "cloe") else {}
+    )
     if method in ("iv", "didim"):
         options |= {"start": start, "gains": "one"}
     if method == "cloe":
         options |= {"start": "values"}
     mapping = to_mapping(b.study)
-    cestac = {"columns": "all", "runs": runs, "rounding": "phase", "place": place, "delta": STEPS[robot]}
+    cestac = {
+        "columns": "all",
+        "runs": runs,
+        "rounding": "phase",
+        "place": place,
+        "delta": STEPS[robot],
+    }
     return {**mapping, "estimate": {"method": method, "options": options}, "cestac": cestac}
 
 
@@ -76,13 +95,22 @@ def simulated(folder: Path, robot: str) -> dict[str, Any]:
         b = bench(robot)
         file.write_text(b.simulator.run(b.truth, b.reference, seed=0).to_csv())
     n = len(bench(robot).model.JOINTS)
-    columns = {"t": "t", **{kind: [f"{kind}{j + 1}" for j in range(n)] for kind in ("q", "tau")}, "qr": [f"qr{j + 1}" for j in range(n)]}
+    columns = {
+        "t": "t",
+        **{kind: [f"{kind}{j + 1}" for j in range(n)] for kind in ("q", "tau")},
+        "qr": [f"qr{j + 1}" for j in range(n)],
+    }
     return {"record": [{"files": [file.name], "columns": columns}]}
 
 
 def errors(found: dict[str, Any], truth: Array, kept: list[int]) -> list[float]:
-    """Errors of the estimates in % of the truth, root mean square over runs and determined parameters, of every step."""
-    return [float(100 * np.sqrt(np.nanmean((_X(level)[:, kept] / truth[kept] - 1) ** 2))) for level in found["levels"]]
+    """Errors of the estimates in % of the truth, root mean square over runs and determined
+    parameters, of every step.
+    """
+    return [
+        float(100 * np.sqrt(np.nanmean((_X(level)[:, kept] / truth[kept] - 1) ** 2)))
+        for level in found["levels"]
+    ]
 
 
 def printed(found: dict[str, Any], kept: list[int]) -> list[float]:
@@ -95,7 +123,9 @@ def _X(level: dict[str, Any]) -> Array:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--cloe", type=int, default=2, help="runs of output error, on the EMPS")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
@@ -111,11 +141,18 @@ def main() -> None:
             for place, style in (("loop", "-"), ("record", "--")):
                 if place == "record" and method not in RECORDED:
                     continue
-                found = answer(folder, robot, method, place, given.cloe if method == "cloe" else given.runs)
+                found = answer(
+                    folder, robot, method, place, given.cloe if method == "cloe" else given.runs
+                )
                 label = method.upper() + (", recorded positions alone" if place == "record" else "")
-                for axes, what, e in ((above, "truth", errors(found, truth, kept)), (below, "%e", printed(found, kept))):
+                for axes, what, e in (
+                    (above, "truth", errors(found, truth, kept)),
+                    (below, "%e", printed(found, kept)),
+                ):
                     lines.append((robot, method, place, what, *(f"{x:.2f}" for x in e)))
-                    axes.loglog(STEPS[robot], e, style, marker="o", ms=3, lw=1.2, color=f"C{k}", label=label)
+                    axes.loglog(
+                        STEPS[robot], e, style, marker="o", ms=3, lw=1.2, color=f"C{k}", label=label
+                    )
                     print(*lines[-1], flush=True)
         above.set(ylabel="error against the truth, %", title=f"{robot}, encoder inside the loop")
         below.set(xlabel=f"Delta, {UNIT[robot]}, joint side", ylabel="%e of the verb")

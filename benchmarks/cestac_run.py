@@ -1,13 +1,19 @@
-"""One run of a resolution study: the plain pipeline, the NumPy path and the fused C path, and C on two workers against one.
+"""One run of a resolution study: the plain pipeline, the NumPy path and the fused C path, and C on
+two workers against one.
 
     python benchmarks/cestac_run.py [--rounds 7] [--runs 2000]
 
-A run perturbs every sample of the position (two-point, 2 pi/5000), filters, evaluates W, decimates by 40 and solves Y = W X. Plain: low-pass by
-scipy, the dense W of the emitted NumPy module, scipy.signal.decimate column by column, numpy.linalg.lstsq; Y is decimated once for all three. TX40,
-on its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000 samples with 60 columns.
+A run perturbs every sample of the position (two-point, 2 pi/5000), filters, evaluates W, decimates
+by 40 and solves Y = W X. Plain: low-pass by
+scipy, the dense W of the emitted NumPy module, scipy.signal.decimate column by column,
+numpy.linalg.lstsq; Y is decimated once for all three. TX40,
+on its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000
+samples with 60 columns.
 
-One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every round, ratios per round as median [range]. X of the
-three is compared before timing. Workers: processes, the one that asks among them, wall time of a whole study with its start, with the load of the
+One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every
+round, ratios per round as median [range]. X of the
+three is compared before timing. Workers: processes, the one that asks among them, wall time of a
+whole study with its start, with the load of the
 machine. Goals: NumPy 10, C 60 times faster than plain; two workers 1.6 times faster than one.
 """
 
@@ -40,18 +46,19 @@ from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
-from runtime.observation.filters import filtered_states
-from runtime.observation.observation import observe
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.cestac import cestac, levels_of
-from runtime.resolution.perturbed import Task, perturbed_position, prepared
+from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
 from runtime.resolution.rounding import packed_bits, stream
-from runtime.resolution.run import NumpyWorkspace
+from runtime.resolution.run import one_run
+from runtime.rows.observe import observe
+from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
+from runtime.signals.filters import filtered_states
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 
@@ -64,7 +71,7 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
     return Task(
-        (prepared(model, record, study),),
+        (prepared_record(prepared(model, record, study), study),),
         model,
         names,
         replace(study.estimate, columns="all"),
@@ -84,25 +91,44 @@ def plain_run(task: Task, key: tuple[int, int]) -> Array:
     W = task.model.observation_matrix(states.q, states.qd, states.qdd)
     numbers = [task.model.BASE_PARAMETERS.index(name) for name in task.names]
     W_j = [W[j * len(states) : (j + 1) * len(states), numbers] for j in range(n)]
-    W_fd = [np.column_stack([scipy.signal.decimate(w, chosen.factor, zero_phase=True) for w in rows.T]) for rows in W_j]
+    W_fd = [
+        np.column_stack([scipy.signal.decimate(w, chosen.factor, zero_phase=True) for w in rows.T])
+        for rows in W_j
+    ]
     mask = chosen.mask
-    return np.linalg.lstsq(np.vstack([w[m] for w, m in zip(W_fd, mask, strict=True)]), part.torque[mask], rcond=None)[0]
+    return np.linalg.lstsq(
+        np.vstack([w[m] for w, m in zip(W_fd, mask, strict=True)]), part.torque[mask], rcond=None
+    )[0]
 
 
-def measure(title: str, module: GeneratedModel, record: Record, study: Study, names: tuple[str, ...], rounds: int) -> None:
-    task, in_c = task_of(module, record, study, names), task_of(compiled_model(module), record, study, names)
+def measure(
+    title: str,
+    module: GeneratedModel,
+    record: Record,
+    study: Study,
+    names: tuple[str, ...],
+    rounds: int,
+) -> None:
+    task, in_c = (
+        task_of(module, record, study, names),
+        task_of(compiled_model(module), record, study, names),
+    )
     part = task.records[0]
-    numpy, compiled = NumpyWorkspace(task, module), CompiledWorkspace(in_c, in_c.model)
+    compiled = CompiledWorkspace(in_c, in_c.model)
     N, K = part.selection.samples.stop - part.selection.samples.start, len(part.selection.kept)
     print(f"\n{title}: {len(record.q)} samples, {N} of them used, {K} kept, {len(names)} columns")
     X = plain_run(task, KEY)
-    for label, found in (("NumPy", numpy.fit(task.levels[0], KEY).X), ("C", compiled.fit(task.levels[0], KEY).X)):
+    for label, found in (
+        ("NumPy", one_run(task, KEY).X),
+        ("C", compiled.fit(task.levels[0], KEY).X),
+    ):
         print(
-            f"    {label:6} largest difference from plain {np.abs(np.array(found) - X).max() / np.abs(X).max():.1e} of the largest parameter"
+            f"    {label:6} largest difference from plain "
+            f"{np.abs(np.array(found) - X).max() / np.abs(X).max():.1e} of the largest parameter"
         )
     contenders: dict[str, Callable[[], object]] = {
         "plain": lambda: plain_run(task, KEY),
-        "NumPy": lambda: numpy.fit(task.levels[0], KEY),
+        "NumPy": lambda: one_run(task, KEY),
         "C": lambda: compiled.fit(task.levels[0], KEY),
         **stages(in_c, compiled),
     }
@@ -123,7 +149,9 @@ def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object
 
     def draw_and_filter() -> kernels.FilteredStates:
         up = packed_bits(part.q.size, stream(task.settings.seed, *KEY))
-        return kernels.FilteredStates(measured, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta)
+        return kernels.FilteredStates(
+            measured, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta
+        )
 
     return {
         "  C: draw, filters": draw_and_filter,
@@ -133,7 +161,9 @@ def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object
 
 
 def workers(model: GeneratedModel, record: Record, study: Study, runs: int, rounds: int) -> None:
-    """Wall time of a study of `runs` runs on one and two processes, its start and that of the second process included."""
+    """Wall time of a study of `runs` runs on one and two processes, its start and that of the
+    second process included.
+    """
     settings = replace(study.cestac, delta=study.cestac.delta[:1], runs=runs, columns="all")
 
     def wall(count: int) -> float:
@@ -147,31 +177,54 @@ def workers(model: GeneratedModel, record: Record, study: Study, runs: int, roun
         per_round.append(taken[1] / taken[2])
         for count, seconds in taken.items():
             spent[count].append(seconds)
-    shown = ", ".join(f"{count} worker{'s' * (count > 1)} {statistics.median(row):.2f} s" for count, row in spent.items())
-    print(f"\n{runs} runs in C, 60 columns, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} (this study included): {shown}")
-    print(f"    1 / 2 {statistics.median(per_round):6.2f}  [{min(per_round):.2f}, {max(per_round):.2f}]   goal 1.6")
+    shown = ", ".join(
+        f"{count} worker{'s' * (count > 1)} {statistics.median(row):.2f} s"
+        for count, row in spent.items()
+    )
+    print(
+        f"\n{runs} runs in C, 60 columns, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} "
+        f"(this study included): {shown}"
+    )
+    print(
+        f"    1 / 2 {statistics.median(per_round):6.2f}  [{min(per_round):.2f}, "
+        f"{max(per_round):.2f}]   goal 1.6"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--runs", type=int, default=2000)
     settings = parser.parse_args()
     warnings.simplefilter("error", FallbackWarning)
     load, cores = os.getloadavg(), os.sched_getaffinity(0)
     os.sched_setaffinity(0, {max(cores)})
-    versions = f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
+    versions = (
+        f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
+    )
     print(f"{processor()}, {compiler()[1].partition(chr(10))[0]}, {versions}, load {load[0]:.1f}")
     print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
     with TemporaryDirectory() as folder:
-        for file, text in generate_files(load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT).items():
+        for file, text in generate_files(
+            load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT
+        ).items():
             Path(folder, file).write_text(text, encoding="utf-8")
-        model = load_model(ROBOT, folder=Path(folder))
+        model = load_model(ROBOT, folder=Path(folder), trust=True)
         study = study_from_mapping(dataset_study(ROBOT))
-        study = replace(study, cestac=replace(study.cestac, delta=(2 * np.pi / 5000,), rounding="two-point", side="joint"))
+        study = replace(
+            study,
+            cestac=replace(
+                study.cestac, delta=(2 * np.pi / 5000,), rounding="two-point", side="joint"
+            ),
+        )
         record = read_records(study.record, model)[0]
         names = essential_of(observe(model, record, study), study.essential, study.estimate).names
-        every, whole = tuple(model.BASE_PARAMETERS), replace(study, rows=replace(study.rows, window=(None, None)))
+        every, whole = (
+            tuple(model.BASE_PARAMETERS),
+            replace(study, rows=replace(study.rows, window=(None, None))),
+        )
         measure("TX40 in motion, essential columns", model, record, study, names, settings.rounds)
         measure("TX40 in motion, all columns", model, record, study, every, settings.rounds)
         measure("TX40, all samples, all columns", model, record, whole, every, settings.rounds)

@@ -1,11 +1,16 @@
-"""A resolution study on a Dask cluster of two workers, on two processes, and in one: wall time, and the bits.
+"""A resolution study on a Dask cluster of two workers, on two processes, and in one: wall time, and
+the bits.
 
     python benchmarks/cluster.py [--runs 2000] [--rounds 3] [--target c]
 
-TX40 record in motion, its essential columns, two-point rounding, 2 pi/5000; `runs` runs in all. In each round every way is taken once, in
-rotated order: this process alone; `--workers 2`, the start of the other one included; a LocalCluster of two worker processes of one thread each that
-is already up, one of them killed halfway in the last round. Every X and residual norm is compared bit by bit with those of the first study. Wall time, so
-look at the load: with other work on two cores no ratio above one can be expected. Goals: cluster 1.5, two workers 1.6 times faster than one.
+TX40 record in motion, its essential columns, two-point rounding, 2 pi/5000; `runs` runs in all. In
+each round every way is taken once, in
+rotated order: this process alone; `--workers 2`, the start of the other one included; a
+LocalCluster of two worker processes of one thread each that
+is already up, one of them killed halfway in the last round. Every X and residual norm is compared
+bit by bit with those of the first study. Wall time, so
+look at the load: with other work on two cores no ratio above one can be expected. Goals: cluster
+1.5, two workers 1.6 times faster than one.
 """
 
 # ruff: noqa: E402 (the number of BLAS threads is set before numpy is loaded)
@@ -45,11 +50,15 @@ from symgen.emit.generate import generate_files
 ROBOT, DELTA = "tx40", 2 * np.pi / 5000
 
 
-def prepared(folder: Path, runs: int, target: str) -> tuple[GeneratedModel, Record, Study, tuple[str, ...]]:
+def prepared(
+    folder: Path, runs: int, target: str
+) -> tuple[GeneratedModel, Record, Study, tuple[str, ...]]:
     """Model, record, study and the names of the columns."""
-    for file, text in generate_files(load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT).items():
+    for file, text in generate_files(
+        load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT
+    ).items():
         Path(folder, file).write_text(text, encoding="utf-8")
-    model = load_model(ROBOT, folder=folder)
+    model = load_model(ROBOT, folder=folder, trust=True)
     study = study_from_mapping(dataset_study(ROBOT))
     record = read_records(study.record, model)[0]
     names = essential_of(observe(model, record, study), study.essential, study.estimate).names
@@ -60,7 +69,8 @@ def prepared(folder: Path, runs: int, target: str) -> tuple[GeneratedModel, Reco
 def same_bits(a: Cestac, b: Cestac) -> bool:
     """Whether all runs of two studies agree."""
     return all(
-        np.array_equal(x.runs.X, y.runs.X) and np.array_equal(x.runs.residual_norm, y.runs.residual_norm)
+        np.array_equal(x.runs.X, y.runs.X)
+        and np.array_equal(x.runs.residual_norm, y.runs.residual_norm)
         for x, y in zip(a.levels, b.levels, strict=True)
     )
 
@@ -78,16 +88,25 @@ def kill_halfway(cluster: distributed.LocalCluster) -> Callable[[int, int], None
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--target", choices=("c", "numpy"), default="c")
     settings = parser.parse_args()
-    print(f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, distributed {distributed.__version__}")
+    print(
+        f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, distributed "
+        f"{distributed.__version__}"
+    )
     with (
         TemporaryDirectory() as folder,
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            host="127.0.0.1",
         ) as cluster,
     ):
         model, record, study, names = prepared(Path(folder), settings.runs, settings.target)
@@ -97,7 +116,9 @@ def main() -> None:
             return cestac(model, record, study, columns=names, **how)
 
         few = replace(study, cestac=replace(study.cestac, runs=8))
-        cestac(model, record, few, columns=names, scheduler=address)  # workers import and compile once
+        cestac(
+            model, record, few, columns=names, scheduler=address
+        )  # workers import and compile once
         ways: dict[str, Callable[[], Cestac]] = {
             "one process": way,
             "2 workers": lambda: way(workers=2),
@@ -114,15 +135,22 @@ def main() -> None:
                 if not same_bits(found, first):
                     raise SystemExit(f"{name}: other bits than the first study")
             print(
-                f"    round {k + 1}, load {os.getloadavg()[0]:.1f}: " + ", ".join(f"{name} {row[-1]:.1f} s" for name, row in spent.items())
+                f"    round {k + 1}, load {os.getloadavg()[0]:.1f}: "
+                + ", ".join(f"{name} {row[-1]:.1f} s" for name, row in spent.items())
             )
         start = time.perf_counter()
         with_kill = way(scheduler=address, progress=kill_halfway(cluster))
         seconds = time.perf_counter() - start
         if not same_bits(with_kill, first):
             raise SystemExit("one worker killed: other bits")
-    print(f"{settings.runs} runs, target {settings.target}, {len(names)} columns; all of them agree in every bit")
-    for name, above, goal in (("cluster of 2", "one process", 1.5), ("2 workers", "one process", 1.6)):
+    print(
+        f"{settings.runs} runs, target {settings.target}, {len(names)} columns; all of them agree "
+        "in every bit"
+    )
+    for name, above, goal in (
+        ("cluster of 2", "one process", 1.5),
+        ("2 workers", "one process", 1.6),
+    ):
         ratios = [a / b for a, b in zip(spent[above], spent[name], strict=True)]
         shown = f"{statistics.median(ratios):5.2f}  [{min(ratios):.2f}, {max(ratios):.2f}]"
         print(f"    {above + ' / ' + name:28} {shown}   goal {goal}")

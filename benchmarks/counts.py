@@ -1,10 +1,14 @@
-"""Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other rates, uneven lines; a haptic device.
+"""Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other
+rates, uneven lines; a haptic device.
 
     python benchmarks/counts.py [steps rates lines time haptic kr300] [--seeds 20]
 
-Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every joint and seed, torques stay as recorded. Errors are
-those of the main parameters against the estimate from the record itself. Estimates are kept in counts_runs.jsonl as they come; the same command
-goes on from there. The record comes from `symgen datasets`. `haptic`: change of its essential parameters by CESTAC of law phase, encoders at the motors.
+Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every
+joint and seed, torques stay as recorded. Errors are
+those of the main parameters against the estimate from the record itself. Estimates are kept in
+counts_runs.jsonl as they come; the same command
+goes on from there. The record comes from `symgen datasets`. `haptic`: change of its essential
+parameters by CESTAC of law phase, encoders at the motors.
 `kr300`: what the detector says of two records of degrees, A.mat and B.mat in SYMGEN_DATA/kr300.
 """
 
@@ -14,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -31,38 +36,60 @@ from scipy.io import loadmat
 import symgen
 from runtime import InputError, load_model
 from runtime.estimators.essential import essential_of
-from runtime.estimators.methods import estimate_of
-from runtime.observation.counts import read_counts
-from runtime.observation.encoder_lattice import lattice
-from runtime.observation.filters import filtered_states
-from runtime.observation.observation import decimated_torque, observation_from_states, observe
-from runtime.observation.rows import select_rows
-from runtime.observation.states import certain_rows, observed_states
+from runtime.loop.methods import estimate_of
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.resolution.readers import READERS
+from runtime.rows.observe import observe
+from runtime.rows.prepared import decimated_torque, observation_from_states
+from runtime.rows.selection import certain_rows, select_rows
 from runtime.settings.study import Study, study_from_mapping
+from runtime.signals.counts.lattice import lattice
+from runtime.signals.counts.reading import read_counts
+from runtime.signals.filters import filtered_states
+from runtime.signals.states import observed_states
 from runtime.table import aligned
-from symgen.demo.counts import MAIN
-from symgen.demo.haptic_motion import haptic_record, haptic_study
-from symgen.demo.simulated_record import read_simulated
+from symgen.demo.tx40_tables import MAIN
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
+
+import haptic_motion
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 STEPS = (5000, 2000, 1000, 500, 250, 100)  # counts per turn of the joint
 RATES = (5000, 1000, 500, 250)
-LINE_MODES: Mapping[str, Literal["detected", "estimated"]] = {"counts": "detected", "estimated": "estimated"}
-PROTOTYPE = {5000: 1.4, 2000: 1.7, 1000: 3.3, 500: 4.7, 250: 7.3, 100: 9.3}  # rms %, mean of three phases, of the design note
+LINE_MODES: Mapping[str, Literal["detected", "estimated"]] = {
+    "counts": "detected",
+    "estimated": "estimated",
+}
+PROTOTYPE = {
+    5000: 1.4,
+    2000: 1.7,
+    1000: 3.3,
+    500: 4.7,
+    250: 7.3,
+    100: 9.3,
+}  # rms %, mean of three phases, of the design note
 HAPTIC_STEPS = (0.03, 0.06, 0.12, 0.25, 0.5)  # rad at the motors
-LINES = {"quadrature 0.1": (0.1, "quadrature"), "random 0.1": (0.1, "random"), "random 0.03": (0.03, "random")}
+LINES = {
+    "quadrature 0.1": (0.1, "quadrature"),
+    "random 0.1": (0.1, "random"),
+    "random 0.03": (0.03, "random"),
+}
 
 
 @cache
 def measured() -> tuple[Any, Study, Record, tuple[str, ...], Array]:
-    """Model, settings, record, the essential columns with the main parameters, and the main parameters from the record itself."""
-    model, study = load_model("tx40", folder=GENERATED), study_from_mapping(dataset_study("tx40"))
+    """Model, settings, record, the essential columns with the main parameters, and the main
+    parameters from the record itself.
+    """
+    model, study = (
+        load_model("tx40", folder=GENERATED, trust=True),
+        study_from_mapping(dataset_study("tx40")),
+    )
     record = read_records(study.record, model)[0]
     full = observe(model, record, study)
     essential = essential_of(full, study.essential, study.estimate).names
@@ -72,7 +99,9 @@ def measured() -> tuple[Any, Study, Record, tuple[str, ...], Array]:
 
 
 def quantised(q: Array, step: float, seed: int, lines: str = "") -> Array:
-    """Positions of an encoder of that step with a random phase of every joint; its lines even, or displaced by a pattern that repeats."""
+    """Positions of an encoder of that step with a random phase of every joint; its lines even, or
+    displaced by a pattern that repeats.
+    """
     rng = np.random.default_rng([seed, 7])
     phase = rng.random(q.shape[1]) * step
     if not lines:
@@ -83,20 +112,32 @@ def quantised(q: Array, step: float, seed: int, lines: str = "") -> Array:
         cell = (q[:, j] - phase[j]) / step
         first, last = int(np.floor(cell.min())) - 2, int(np.ceil(cell.max())) + 2
         number = np.arange(first, last)
-        shift = rng.standard_normal(4)[number % 4] if kind == "quadrature" else rng.standard_normal(len(number))
-        shift = size * shift if kind == "random" else size * (shift - shift.mean()) / np.std(shift[:4])
+        shift = (
+            rng.standard_normal(4)[number % 4]
+            if kind == "quadrature"
+            else rng.standard_normal(len(number))
+        )
+        shift = (
+            size * shift if kind == "random" else size * (shift - shift.mean()) / np.std(shift[:4])
+        )
         edges = np.sort(number + 0.5 + shift)  # between count number and number + 1
         counts[:, j] = first + np.searchsorted(edges, cell[:], side="right")
     return counts * step + phase
 
 
 def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, Any]:
-    """Main parameters and their stated deviations of the record with other positions; for counts, those of the record itself on the same rows too."""
+    """Main parameters and their stated deviations of the record with other positions; for counts,
+    those of the record itself on the same rows too.
+    """
     model, study, _, names, _ = measured()
     by_counts = reader != "lowpass"
-    signals = study.signals if not by_counts else replace(study.signals, reader="counts", step=step, lines=LINE_MODES[reader])
+    signals = (
+        study.signals
+        if not by_counts
+        else replace(study.signals, reader="counts", step=step, lines=LINE_MODES[reader])
+    )
     begun = time.process_time()
-    states = observed_states(model, q, record.rate, signals)
+    states = observed_states(q, record.rate, signals)
     spent = time.process_time() - begun
     keep = certain_rows(model, states).T
     selection = select_rows(record, states.qd, signals, study.rows, keep=keep)
@@ -106,8 +147,13 @@ def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, A
     if by_counts:
         several[f"{reader}_alike"] = filtered_states(record.q, record.rate, study.signals)
     for label, x in several.items():
-        e = estimate_of(observation_from_states(model, x, torque, selection, columns=names), study.estimate)
-        row |= {label: [e[name] for name in MAIN], f"{label}_sigma": e.sigma_corrected[[e.names.index(name) for name in MAIN]].tolist()}
+        e = estimate_of(
+            observation_from_states(model, x, torque, selection, columns=names), study.estimate
+        )
+        row |= {
+            label: [e[name] for name in MAIN],
+            f"{label}_sigma": e.sigma_corrected[[e.names.index(name) for name in MAIN]].tolist(),
+        }
     return row
 
 
@@ -123,9 +169,15 @@ def wanted(part: str, seeds: int) -> Iterator[dict[str, Any]]:
         if part == "steps":
             yield from ({"per_turn": k, "rate": 5000, "lines": "", "seed": seed} for k in STEPS)
         if part == "rates":
-            yield from ({"per_turn": k, "rate": rate, "lines": "", "seed": seed} for rate in RATES[1:] for k in (5000, 1000, 250))
+            yield from (
+                {"per_turn": k, "rate": rate, "lines": "", "seed": seed}
+                for rate in RATES[1:]
+                for k in (5000, 1000, 250)
+            )
         if part == "lines":
-            yield from ({"per_turn": 1000, "rate": 5000, "lines": lines, "seed": seed} for lines in LINES)
+            yield from (
+                {"per_turn": 1000, "rate": 5000, "lines": lines, "seed": seed} for lines in LINES
+            )
 
 
 def run(key: Mapping[str, Any]) -> dict[str, Any]:
@@ -139,7 +191,9 @@ def run(key: Mapping[str, Any]) -> dict[str, Any]:
     return row
 
 
-def computed(file: Path, keys: Sequence[dict[str, Any]], make: Callable[[dict[str, Any]], dict[str, Any]]) -> list[dict[str, Any]]:
+def computed(
+    file: Path, keys: Sequence[dict[str, Any]], make: Callable[[dict[str, Any]], dict[str, Any]]
+) -> list[dict[str, Any]]:
     """Rows of the keys, those in the file not computed again."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     names = ("per_turn", "rate", "lines", "seed")
@@ -154,7 +208,9 @@ def computed(file: Path, keys: Sequence[dict[str, Any]], make: Callable[[dict[st
 
 
 def percent(rows: Sequence[Mapping[str, Any]], reader: str, against: str = "") -> Array:
-    """%e of the main parameters, shape (runs, 19), against the record itself, or against the record itself on the same rows."""
+    """%e of the main parameters, shape (runs, 19), against the record itself, or against the record
+    itself on the same rows.
+    """
     reference = np.array([r[against] for r in rows]) if against else measured()[4]
     return 100 * (np.array([r[reader] for r in rows]) - reference) / np.abs(reference)
 
@@ -173,7 +229,11 @@ def line(e: Array) -> tuple[str, ...]:
 
 HEAD = (
     "runs",
-    *(f"{label}{column}" for label in ("low-pass ", "counts ", "same rows ") for column in ("rms %", "range", "largest", "mean worst")),
+    *(
+        f"{label}{column}"
+        for label in ("low-pass ", "counts ", "same rows ")
+        for column in ("rms %", "range", "largest", "mean worst")
+    ),
 )
 
 
@@ -184,16 +244,32 @@ def table(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
         groups.setdefault(tuple(r[name] for name in names), []).append(r)
     lines: list[Sequence[str]] = [(*names, *HEAD)]
     for key, group in groups.items():
-        errors = (percent(group, "lowpass"), percent(group, "counts"), percent(group, "counts", "counts_alike"))
+        errors = (
+            percent(group, "lowpass"),
+            percent(group, "counts"),
+            percent(group, "counts", "counts_alike"),
+        )
         lines.append((*map(str, key), str(len(group)), *(text for e in errors for text in line(e))))
         if "estimated" in group[0]:
-            errors = (percent(group, "lowpass"), percent(group, "estimated"), percent(group, "estimated", "estimated_alike"))
-            lines.append((f"{key[0]}, estimated", str(len(group)), *(text for e in errors for text in line(e))))
+            errors = (
+                percent(group, "lowpass"),
+                percent(group, "estimated"),
+                percent(group, "estimated", "estimated_alike"),
+            )
+            lines.append(
+                (
+                    f"{key[0]}, estimated",
+                    str(len(group)),
+                    *(text for e in errors for text in line(e)),
+                )
+            )
     return aligned(lines)
 
 
 def times() -> str:
-    """Time of the reader alone, s of one core, best of three; 45,000 samples of six joints, and longer records made of copies."""
+    """Time of the reader alone, s of one core, best of three; 45,000 samples of six joints, and
+    longer records made of copies.
+    """
     _, _, record, _, _ = measured()
     lines: list[Sequence[str]] = [("step 2 pi/", "samples", "s")]
     for k in STEPS:
@@ -216,23 +292,41 @@ def times() -> str:
 def haptic(runs: int) -> str:
     """%e (21) of the essential parameters of the haptic device, rms and largest, by both readers."""
     model = symgen.model("haptic")
-    record = read_simulated(model, haptic_study(runs), haptic_record(model), "").record
-    lines: list[Sequence[str]] = [("step, rad", "positions: rms %", "largest", "counts: rms %", "largest")]
+    prepared = haptic_motion.prepare(model, runs=runs)
+    study, record = prepared.study, prepared.record
+    lines: list[Sequence[str]] = [
+        ("step, rad", "positions: rms %", "largest", "counts: rms %", "largest")
+    ]
     found = []
-    study = haptic_study(runs)
     names = essential_of(observe(model, record, study), study.essential, study.estimate).names
     study = replace(study, cestac=replace(study.cestac, rounding="phase", delta=HAPTIC_STEPS))
     for reader in READERS:
-        found.append(cestac(model, record, replace(study, signals=replace(study.signals, reader=reader)), columns=names))
+        found.append(
+            cestac(
+                model,
+                record,
+                replace(study, signals=replace(study.signals, reader=reader)),
+                columns=names,
+            )
+        )
     for levels in zip(*(f.levels for f in found), strict=True):
         lines.append(
-            (f"{levels[0].level.delta:g}", *(f"{x:.2f}" for level in levels for x in (np.sqrt(np.mean(level.e**2)), level.e.max())))
+            (
+                f"{levels[0].level.delta:g}",
+                *(
+                    f"{x:.2f}"
+                    for level in levels
+                    for x in (np.sqrt(np.mean(level.e**2)), level.e.max())
+                ),
+            )
         )
     return aligned(lines)
 
 
 def degrees(folder: Path) -> str:
-    """Smallest step of every axis that moves, and the distance from its lattice that the detector refuses."""
+    """Smallest step of every axis that moves, and the distance from its lattice that the detector
+    refuses.
+    """
     lines = [("record", "encoder", "axis", "what is said")]
     for file, field in product(("A.mat", "B.mat"), ("act_pos_mot_deg", "act_pos_se_deg")):
         record = loadmat(folder / file, squeeze_me=True, struct_as_record=False)["rec"]
@@ -248,7 +342,9 @@ def degrees(folder: Path) -> str:
 
 def main() -> None:
     """Compute what is missing, write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("parts", nargs="*", default=["steps", "rates", "lines", "time"])
     parser.add_argument("--seeds", type=int, default=20)
     given = parser.parse_args()
@@ -264,14 +360,26 @@ def main() -> None:
             print(degrees(Path(os.environ["SYMGEN_DATA"], "kr300")))
             continue
         rows = computed(file, list(wanted(part, given.seeds)), run)
-        text = table(rows, {"steps": ("per_turn",), "rates": ("rate", "per_turn"), "lines": ("lines",)}[part])
+        text = table(
+            rows, {"steps": ("per_turn",), "rates": ("rate", "per_turn"), "lines": ("lines",)}[part]
+        )
         print(text)
         if part == "steps":
             gains = [
-                np.median(np.sqrt((percent([r for r in rows if r["per_turn"] == k], "counts") ** 2).mean(axis=1))) / PROTOTYPE[k]
+                np.median(
+                    np.sqrt(
+                        (percent([r for r in rows if r["per_turn"] == k], "counts") ** 2).mean(
+                            axis=1
+                        )
+                    )
+                )
+                / PROTOTYPE[k]
                 for k in STEPS
             ]
-            print(f"geometric mean over the prototype of the note: {np.exp(np.mean(np.log(gains))):.2f}")
+            print(
+                "geometric mean over the prototype of the note: "
+                f"{np.exp(np.mean(np.log(gains))):.2f}"
+            )
 
 
 if __name__ == "__main__":

@@ -1,16 +1,22 @@
-"""The reader of counts on simulated records of known truth: which rows of uncertain direction to leave out, and whether stated deviations hold.
+"""The reader of counts on simulated records of known truth: which rows of uncertain direction to
+leave out, and whether stated deviations hold.
 
     python benchmarks/counts_simulated.py [rows sigma gaps] [--records 100]
 
-Motions of the TX40 with an exact encoder, quantised afterwards at a random phase of every joint and record:
+Motions of the TX40 with an exact encoder, quantised afterwards at a random phase of every joint and
+record:
 
     smooth   five harmonics of some 0.3 to 2.6 Hz and a wobble of 0.2 mrad up to 25 Hz
     loop     the same followed by the simulated loop of `benchmarks/estimators.py`, whose dry friction sticks at reversals
     points   from point to point through that loop, joints at rest 5 % of the time
 
-Torques are those of the values of the robot file with white noise of 0.05 N m and noise up to 5 Hz of 3 % of the torque (`sigma`: 1 %); its dry
-friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of the same record, by what becomes of rows of uncertain
-direction; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same command goes on from there.
+Torques are those of the values of the robot file with white noise of 0.05 N m and noise up to 5 Hz
+of 3 % of the torque (`sigma`: 1 %); its dry
+friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of
+the same record, by what becomes of rows of uncertain
+direction; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered
+acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same
+command goes on from there.
 """
 
 # ruff: noqa: E402
@@ -37,17 +43,18 @@ from scipy.special import erf
 from simulation import LAW
 
 from runtime.estimators.essential import essential_of
-from runtime.estimators.methods import estimate_of
-from runtime.motion.reference import Reference, reference_of
-from runtime.motion.simulation import Simulator
-from runtime.observation.counts import read_counts
-from runtime.observation.filters import States, filtered_states
-from runtime.observation.observation import Observation, decimated_torque, observation_from_states
-from runtime.observation.rows import select_rows
-from runtime.observation.sign_errors import switches
-from runtime.observation.states import certain_rows, observed_states
+from runtime.loop.methods import estimate_of
+from runtime.loop.reference import Reference, reference_of
+from runtime.loop.simulation import Simulator
 from runtime.records.record import Record
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import decimated_torque, observation_from_states
+from runtime.rows.selection import certain_rows, select_rows
+from runtime.rows.sign_errors import switches
 from runtime.settings.study import Study, study_from_mapping
+from runtime.signals.counts.reading import read_counts
+from runtime.signals.filters import States, filtered_states
+from runtime.signals.states import observed_states
 from runtime.table import aligned
 
 Array = np.ndarray
@@ -79,11 +86,15 @@ def harmonics(seed: int) -> Motion:
     f = np.array([1, 2, 3.3, 5, 8]) * 0.33 * rng.uniform(0.8, 1.2)
     q, qd, qdd = np.zeros((3, len(t), 6))
     for j in range(6):
-        for size, w, shift in zip(rng.standard_normal(5) / f, 2 * np.pi * f, rng.uniform(0, 2 * np.pi, 5), strict=True):
+        for size, w, shift in zip(
+            rng.standard_normal(5) / f, 2 * np.pi * f, rng.uniform(0, 2 * np.pi, 5), strict=True
+        ):
             q[:, j] += size * np.sin(w * t + shift)
             qd[:, j] += size * w * np.cos(w * t + shift)
             qdd[:, j] -= size * w**2 * np.sin(w * t + shift)
-    scale = rng.uniform(2.0, 4.5, 6) / np.abs(qd).max(axis=0) * np.array([0.8, 0.7, 0.9, 1.1, 1, 1.5])
+    scale = (
+        rng.uniform(2.0, 4.5, 6) / np.abs(qd).max(axis=0) * np.array([0.8, 0.7, 0.9, 1.1, 1, 1.5])
+    )
     scale = 1.2 * np.minimum(scale, 3.2 / np.ptp(q, axis=0))
     return Motion(q * scale, qd * scale, qdd * scale)
 
@@ -99,16 +110,24 @@ def motion(kind: str, seed: int) -> Motion:
         rate = np.gradient(wobble, 1 / RATE, axis=0)
         return Motion(q + wobble, qd + rate, qdd + np.gradient(rate, 1 / RATE, axis=0))
     points = {"points": {"duration": 8, "seed": 100 + seed}}
-    study = study_from_mapping({**TX40, "controller": {**TX40["controller"], "law": LAW, "reference": points}})
+    study = study_from_mapping(
+        {**TX40, "controller": {**TX40["controller"], "law": LAW, "reference": points}}
+    )
     model = bench("tx40").model
-    reference = reference_of(study.controller, model) if kind == "points" else Reference(RATE, *harmonics(seed))
+    reference = (
+        reference_of(study.controller, model)
+        if kind == "points"
+        else Reference(RATE, *harmonics(seed))
+    )
     run = Simulator(model, study.controller).run(bench("tx40").truth, reference, seed=seed)
     inside = slice(RATE // 10, int(SECONDS * RATE))
     return Motion(run.q[inside], run.qd[inside], run.qdd[inside])
 
 
 def torque(moved: Motion, friction: str, rng: np.random.Generator, slow_noise: float) -> Array:
-    """Joint torques, shape (N, 6), of the truth with that dry friction, and their noise; slow_noise : that up to 5 Hz, as a share of the torque."""
+    """Joint torques, shape (N, 6), of the truth with that dry friction, and their noise; slow_noise
+    : that up to 5 Hz, as a share of the torque.
+    """
     model, truth = bench("tx40").model, bench("tx40").truth.copy()
     switching = switches(model, model.BASE_PARAMETERS)
     sizes = [truth[s.column] for s in switching]
@@ -118,21 +137,39 @@ def torque(moved: Motion, friction: str, rng: np.random.Generator, slow_noise: f
     for s, size in zip(switching, sizes, strict=True):
         tau = tau + np.outer(size * FRICTION[friction](moved.qd @ s.G), s.G)
     slow = sosfiltfilt(butter(2, 5, fs=RATE, output="sos"), rng.standard_normal(tau.shape), axis=0)
-    return np.asarray(tau + 0.05 * rng.standard_normal(tau.shape) + slow_noise * tau.std(axis=0) * slow / slow.std(axis=0))
+    return np.asarray(
+        tau
+        + 0.05 * rng.standard_normal(tau.shape)
+        + slow_noise * tau.std(axis=0) * slow / slow.std(axis=0)
+    )
 
 
 def settings(step: float | None = None) -> Study:
     """Those of the measured record, read by the low-pass, or as counts of that step."""
-    signals = {"median": 5, "lowpass": {"cutoff": 50}, **({} if step is None else {"reader": "counts", "step": step})}
+    signals = {
+        "median": 5,
+        "lowpass": {"cutoff": 50},
+        **({} if step is None else {"reader": "counts", "step": step}),
+    }
     return study_from_mapping({"signals": signals, "rows": {"trim": 3}})
 
 
-def observed(states: States, record: Record, names: Sequence[str], certain: Array | None = None) -> Observation:
+def observed(
+    states: States, record: Record, names: Sequence[str], certain: Array | None = None
+) -> Observation:
     """Y = W X + rho of the columns `names`; certain : rows that may be used, bool (n, N)."""
     study = settings()
-    selection = select_rows(record, states.qd, study.signals, study.rows, keep=None if certain is None else certain.T)
+    selection = select_rows(
+        record, states.qd, study.signals, study.rows, keep=None if certain is None else certain.T
+    )
     plain = States(states.q, states.qd, states.qdd)
-    return observation_from_states(bench("tx40").model, plain, decimated_torque(record.tau, selection), selection, columns=names)
+    return observation_from_states(
+        bench("tx40").model,
+        plain,
+        decimated_torque(record.tau, selection),
+        selection,
+        columns=names,
+    )
 
 
 def solved(W: Array, Y: Array) -> Array:
@@ -142,33 +179,53 @@ def solved(W: Array, Y: Array) -> Array:
 
 
 def rows_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
-    """Main parameters of one motion by step, friction and treatment of uncertain rows, with those from the exact positions."""
+    """Main parameters of one motion by step, friction and treatment of uncertain rows, with those
+    from the exact positions.
+    """
     moved, b = motion(kind, seed), bench("tx40")
     t = np.arange(len(moved.q)) / RATE
-    records = {name: Record(t, moved.q, torque(moved, name, np.random.default_rng([seed, 11]), 0.03), rate=RATE) for name in FRICTION}
+    records = {
+        name: Record(
+            t, moved.q, torque(moved, name, np.random.default_rng([seed, 11]), 0.03), rate=RATE
+        )
+        for name in FRICTION
+    }
     exact = filtered_states(moved.q, RATE, settings().signals)
     sign = observed(exact, records["sign"], b.model.BASE_PARAMETERS)
     essential = essential_of(sign, settings().essential, settings().estimate).names
     names = [name for name in b.model.BASE_PARAMETERS if name in essential or name in MAIN]
     main = [names.index(name) for name in MAIN]
-    W, Y = sign.columns(names).W, {name: observed(exact, record, names[:1]).Y for name, record in records.items()}
+    W, Y = (
+        sign.columns(names).W,
+        {name: observed(exact, record, names[:1]).Y for name, record in records.items()},
+    )
     reference = {name: solved(W, y)[main].tolist() for name, y in Y.items()}
     for per_turn in STEPS:
         step = 2 * np.pi / per_turn
-        read = observed_states(b.model, quantised(moved.q, step, seed), RATE, settings(step).signals)
+        read = observed_states(quantised(moved.q, step, seed), RATE, settings(step).signals)
         W = observed(read, records["sign"], names).W
         selection = select_rows(records["sign"], read.qd, settings().signals, settings().rows)
-        for label, (weight, columns) in treatments(read[selection.samples][selection.kept], selection.mask, names).items():
+        for label, (weight, columns) in treatments(
+            read[selection.samples][selection.kept], selection.mask, names
+        ).items():
             used = weight > 0
             rows = (W * columns)[used] * weight[used, None]
             for name, y in Y.items():
                 X = solved(rows, y[used] * weight[used])[main].tolist()
-                key = {"part": "rows", "kind": kind, "seed": seed, "per_turn": per_turn, "friction": name, "rows": label}
+                key = {
+                    "part": "rows",
+                    "kind": kind,
+                    "seed": seed,
+                    "per_turn": per_turn,
+                    "friction": name,
+                    "rows": label,
+                }
                 yield {**key, "X": X, "exact": reference[name], "left": float(1 - used.mean())}
 
 
 def treatments(states: States, mask: Array, names: Sequence[str]) -> dict[str, tuple[Array, Array]]:
-    """What becomes of rows of uncertain direction: weights of the rows, shape (r,), and factors of their columns, (r, b).
+    """What becomes of rows of uncertain direction: weights of the rows, shape (r,), and factors of
+    their columns, (r, b).
 
     E = |E sign(s)| of a column of dry friction; of a row the least of those that act on its joint.
     """
@@ -180,29 +237,55 @@ def treatments(states: States, mask: Array, names: Sequence[str]) -> dict[str, t
         certainty[list(s.joints)] = np.minimum(certainty[list(s.joints)], E)
         columns[:, :, s.column] = E
     alike = np.ones(columns.shape)
-    cases = {f"out below {least:g}": (1.0 * certain_rows(model, states, deviations=least), alike) for least in THRESHOLDS}
+    cases = {
+        f"out below {least:g}": (1.0 * certain_rows(model, states, deviations=least), alike)
+        for least in THRESHOLDS
+    }
     cases |= {f"weight E^{p:g}": (certainty**p, alike) for p in POWERS}
     cases |= {f"E sign, weight E^{p:g}": (certainty**p, columns) for p in (0, *POWERS)}
-    return {label: (weight[mask], of_columns[mask]) for label, (weight, of_columns) in cases.items()}
+    return {
+        label: (weight[mask], of_columns[mask]) for label, (weight, of_columns) in cases.items()
+    }
 
 
 def sigma_of(kind: str, seed: int) -> Iterator[dict[str, Any]]:
-    """Main parameters and stated deviations of one record, from the exact positions and read at every case; five records a motion."""
+    """Main parameters and stated deviations of one record, from the exact positions and read at
+    every case; five records a motion.
+    """
     moved, b = motion(kind, seed // 5), bench("tx40")
-    record = Record(np.arange(len(moved.q)) / RATE, moved.q, torque(moved, "sign", np.random.default_rng([seed, 12]), 0.01), rate=RATE)
+    record = Record(
+        np.arange(len(moved.q)) / RATE,
+        moved.q,
+        torque(moved, "sign", np.random.default_rng([seed, 12]), 0.01),
+        rate=RATE,
+    )
     names = [name for name, x in zip(b.model.BASE_PARAMETERS, b.truth, strict=True) if x]
 
     def estimated(states: States, certain: Array | None = None) -> dict[str, Any]:
         e = estimate_of(observed(states, record, names, certain), settings().estimate)
         at = [e.names.index(name) for name in MAIN]
-        return {"X": e.X[at].tolist(), "sigma": e.sigma_corrected[at].tolist(), "plain": e.sigma[at].tolist()}
+        return {
+            "X": e.X[at].tolist(),
+            "sigma": e.sigma_corrected[at].tolist(),
+            "plain": e.sigma[at].tolist(),
+        }
 
     key = {"part": "sigma", "kind": kind, "seed": seed}
-    yield {**key, "per_turn": 0, "lines": "", **estimated(filtered_states(moved.q, RATE, settings().signals))}
+    yield {
+        **key,
+        "per_turn": 0,
+        "lines": "",
+        **estimated(filtered_states(moved.q, RATE, settings().signals)),
+    }
     for per_turn, lines in SIGMA_CASES:
         step = 2 * np.pi / per_turn
-        read = observed_states(b.model, quantised(moved.q, step, seed, lines), RATE, settings(step).signals)
-        yield {**key, "per_turn": per_turn, "lines": lines, **estimated(read, certain_rows(b.model, read))}
+        read = observed_states(quantised(moved.q, step, seed, lines), RATE, settings(step).signals)
+        yield {
+            **key,
+            "per_turn": per_turn,
+            "lines": lines,
+            **estimated(read, certain_rows(b.model, read)),
+        }
 
 
 def rms(x: Array) -> float:
@@ -210,14 +293,29 @@ def rms(x: Array) -> float:
 
 
 def rows_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Median over the motions of the rms error, %, geometric mean over frictions; a line for each kind of motion and treatment of its rows."""
-    lines: list[Sequence[str]] = [("motion", "rows", *(f"2 pi/{k}" for k in STEPS), "geometric mean", "pure Coulomb", "tanh 0.05")]
+    """Median over the motions of the rms error, %, geometric mean over frictions; a line for each
+    kind of motion and treatment of its rows.
+    """
+    lines: list[Sequence[str]] = [
+        (
+            "motion",
+            "rows",
+            *(f"2 pi/{k}" for k in STEPS),
+            "geometric mean",
+            "pure Coulomb",
+            "tanh 0.05",
+        )
+    ]
     for kind in dict.fromkeys(r["kind"] for r in rows):
         for label in dict.fromkeys(r["rows"] for r in rows):
             mine = [r for r in rows if r["kind"] == kind and r["rows"] == label]
             error = {
                 (k, f): np.median(
-                    [rms(100 * (np.array(r["X"]) / r["exact"] - 1)) for r in mine if (r["per_turn"], r["friction"]) == (k, f)]
+                    [
+                        rms(100 * (np.array(r["X"]) / r["exact"] - 1))
+                        for r in mine
+                        if (r["per_turn"], r["friction"]) == (k, f)
+                    ]
                 )
                 for k in STEPS
                 for f in FRICTION
@@ -225,12 +323,16 @@ def rows_table(rows: Sequence[Mapping[str, Any]]) -> str:
             mean = lambda keys, error=error: np.exp(np.mean([np.log(error[key]) for key in keys]))  # noqa: E731
             by_step = [mean([(k, f) for f in FRICTION]) for k in STEPS]
             by_friction = [mean([(k, f) for k in STEPS]) for f in ("sign", "tanh 0.05")]
-            lines.append((kind, label, *(f"{x:.2f}" for x in (*by_step, mean(list(error)), *by_friction))))
+            lines.append(
+                (kind, label, *(f"{x:.2f}" for x in (*by_step, mean(list(error)), *by_friction)))
+            )
     return aligned(lines)
 
 
 def sigma_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Error over stated deviation of the main parameters, over all records, and of what reading adds alone."""
+    """Error over stated deviation of the main parameters, over all records, and of what reading
+    adds alone.
+    """
     truth = bench("tx40").truth[[bench("tx40").model.BASE_PARAMETERS.index(name) for name in MAIN]]
     exact = {(r["kind"], r["seed"]): np.array(r["X"]) for r in rows if not r["per_turn"]}
     head = (
@@ -245,8 +347,12 @@ def sigma_table(rows: Sequence[Mapping[str, Any]]) -> str:
         "rms error %",
     )
     lines: list[Sequence[str]] = [head]
-    for kind, per_turn, pattern in dict.fromkeys((r["kind"], r["per_turn"], r["lines"]) for r in rows):
-        mine = [r for r in rows if (r["kind"], r["per_turn"], r["lines"]) == (kind, per_turn, pattern)]
+    for kind, per_turn, pattern in dict.fromkeys(
+        (r["kind"], r["per_turn"], r["lines"]) for r in rows
+    ):
+        mine = [
+            r for r in rows if (r["kind"], r["per_turn"], r["lines"]) == (kind, per_turn, pattern)
+        ]
         X, sigma, plain = (np.array([r[name] for r in mine]) for name in ("X", "sigma", "plain"))
         z = (X - truth) / sigma
         worst = int(np.argmax((z**2).mean(axis=0)))
@@ -258,13 +364,33 @@ def sigma_table(rows: Sequence[Mapping[str, Any]]) -> str:
             f"{100 * np.mean(np.abs(z) > 2):.1f}",
             f"{rms((X - truth) / plain):.2f}",
         )
-        lines.append((kind, case, str(len(mine)), *cells, f"{added:.2f}", f"{rms(100 * (X / truth - 1)):.2f}"))
+        lines.append(
+            (
+                kind,
+                case,
+                str(len(mine)),
+                *cells,
+                f"{added:.2f}",
+                f"{rms(100 * (X / truth - 1)):.2f}",
+            )
+        )
     return aligned(lines)
 
 
 def gaps_table(motions: int) -> str:
-    """Errors of the filtered acceleration of smooth motions with a gap every half second: away from gaps, near gaps in rows that stay, in rows left out."""
-    lines: list[Sequence[str]] = [("step", "gap, ms", "away, rad/s^2", "rows that stay near gaps", "rows left out", "left out by gap, ms")]
+    """Errors of the filtered acceleration of smooth motions with a gap every half second: away from
+    gaps, near gaps in rows that stay, in rows left out.
+    """
+    lines: list[Sequence[str]] = [
+        (
+            "step",
+            "gap, ms",
+            "away, rad/s^2",
+            "rows that stay near gaps",
+            "rows left out",
+            "left out by gap, ms",
+        )
+    ]
     study, inner = settings(), slice(RATE // 10, -RATE // 10)
     for per_turn in (100_000, *STEPS[::2]):
         step = 2 * np.pi / per_turn
@@ -280,17 +406,35 @@ def gaps_table(motions: int) -> str:
                 read = filtered_states(reading.q, RATE, replace(study.signals, median=1))
                 error = np.abs(read.qdd - filtered_states(moved.q, RATE, study.signals).qdd)[inner]
                 unknown = reading.unknown.any(axis=1)[inner]
-                near, beside = (maximum_filter1d(missing, 2 * round(x * RATE) + 1)[inner] for x in (0.02, 0.08))
+                near, beside = (
+                    maximum_filter1d(missing, 2 * round(x * RATE) + 1)[inner] for x in (0.02, 0.08)
+                )
                 cases = (~beside, near & ~unknown, unknown)
-                found.append([*(rms(error[case]) if case.any() else np.nan for case in cases), 1e3 * unknown.sum() / RATE / len(starts)])
+                found.append(
+                    [
+                        *(rms(error[case]) if case.any() else np.nan for case in cases),
+                        1e3 * unknown.sum() / RATE / len(starts),
+                    ]
+                )
             away, stay, left, lost = np.median(found, axis=0)
-            lines.append((f"2 pi/{per_turn}", f"{1e3 * gap / RATE:g}", f"{away:.3g}", f"{stay:.3g}", f"{left:.3g}", f"{lost:.0f}"))
+            lines.append(
+                (
+                    f"2 pi/{per_turn}",
+                    f"{1e3 * gap / RATE:g}",
+                    f"{away:.3g}",
+                    f"{stay:.3g}",
+                    f"{left:.3g}",
+                    f"{lost:.0f}",
+                )
+            )
     return aligned(lines)
 
 
 def main() -> None:
     """Compute what is missing, print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("parts", nargs="*", default=["rows", "sigma"])
     parser.add_argument("--records", type=int, default=100)
     parser.add_argument("--motions", type=int, default=6)
@@ -311,7 +455,9 @@ def main() -> None:
                     rows += new
                     with file.open("a") as out:
                         out.writelines(json.dumps(row) + "\n" for row in new)
-        print({"rows": rows_table, "sigma": sigma_table}[part]([r for r in rows if r["part"] == part]))
+        print(
+            {"rows": rows_table, "sigma": sigma_table}[part]([r for r in rows if r["part"] == part])
+        )
 
 
 if __name__ == "__main__":

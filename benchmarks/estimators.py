@@ -1,10 +1,14 @@
-"""Every estimator on simulated records with known truth, the encoder inside the loop: bias and scatter against stated sigma.
+"""Every estimator on simulated records with known truth, the encoder inside the loop: bias and
+scatter against stated sigma.
 
     python benchmarks/estimators.py [--records 100] [--cloe 10] [--workers 2] [-o docs]
 
-Each record has its own seed: torque noise on the record, and a disturbance of the arm that nobody records. Estimates are kept in
-estimators_runs.jsonl as they come; the same command goes on from there. Written: estimators_simulated.md, estimators.png (bias and
-scatter by parameter). Simulating methods start 15 % from the truth, a different way in each record. %e against Delta: cestac_estimators.py.
+Each record has its own seed: torque noise on the record, and a disturbance of the arm that nobody
+records. Estimates are kept in
+estimators_runs.jsonl as they come; the same command goes on from there. Written:
+estimators_simulated.md, estimators.png (bias and
+scatter by parameter). Simulating methods start 15 % from the truth, a different way in each record.
+%e against Delta: cestac_estimators.py.
 
 EMPS needs its record for the reference (`symgen datasets`).
 """
@@ -15,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -32,32 +37,41 @@ from simulation import LAW
 
 import symgen
 from runtime import InputError, load_model
-from runtime.estimators.closed_loop import ClosedLoop, closed_loop
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
+from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.methods import estimate_of
+from runtime.loop.reference import Reference, reference_of
+from runtime.loop.simulation import Simulator, parameters_of
 from runtime.model.generated import GeneratedModel
-from runtime.motion.reference import Reference, reference_of
-from runtime.motion.simulation import Simulator, parameters_of
-from runtime.observation.observation import Observation
-from runtime.observation.position_errors import with_errors
 from runtime.parallel import results
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
+from runtime.rows.observation import Observation
+from runtime.rows.position_errors import with_errors
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
-from symgen.demo.haptic_motion import RATE, motion
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
+
+from haptic_motion import RATE, motion
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 
 METHODS = ("ols", "wls", "irls", "tls", "iv", "didim")
-SOFTER = 0.4  # of the damping, its square of the stiffness of the BIRDy gains, which shake the arm where the encoder is coarse
+# of the damping, its square of the stiffness of the BIRDy gains, which shake the arm where the
+# encoder is coarse
+SOFTER = 0.4
 TX40 = {
     "signals": {"median": 1, "lowpass": {"cutoff": 50}},
     "rows": {"trim": 3, "low_speed": 0.05},
     "controller": {
-        "law": {**LAW, "kp": [SOFTER**2 * k for k in LAW["kp"]], "kd": [SOFTER * k for k in LAW["kd"]]},
+        "law": {
+            **LAW,
+            "kp": [SOFTER**2 * k for k in LAW["kp"]],
+            "kd": [SOFTER * k for k in LAW["kd"]],
+        },
         "rate": 5000,
         "reference": {"points": {"duration": 12, "seed": 4}},
         "torque": {"noise": 0.05, "disturbance": [0.5, 0.5, 0.3, 0.1, 0.1, 0.05], "bandwidth": 50},
@@ -70,10 +84,17 @@ HAPTIC = {  # the motion of the demo; two poles of each joint at 25/s
         "law": {"kind": "pid", "kp": [30, 18, 9], "kd": [1.8, 1.0, 0.5]},
         "rate": RATE,
         "encoder": {"side": "motor"},
-        "torque": {"noise": [0.05, 0.05, 0.03], "disturbance": [0.01, 0.01, 0.005], "bandwidth": 20},
+        "torque": {
+            "noise": [0.05, 0.05, 0.03],
+            "disturbance": [0.01, 0.01, 0.005],
+            "bandwidth": 20,
+        },
     },
 }
-STEPS = {"tx40": [2 * np.pi / k for k in (8000, 4000, 2000, 1000)], "emps": [1e-6, 2e-5, 5e-5, 1e-4]}
+STEPS = {
+    "tx40": [2 * np.pi / k for k in (8000, 4000, 2000, 1000)],
+    "emps": [1e-6, 2e-5, 5e-5, 1e-4],
+}
 AROUND = {"tx40": 0.1, "emps": 0.02, "haptic": 0.2}  # s
 DETERMINED = 2.0  # %sigma, corrected, of weighted least squares on a record with an exact encoder
 AWAY = 0.15
@@ -110,15 +131,27 @@ def bench(robot: str) -> Bench:
         study = study_from_mapping(dataset_study(robot))
         reference = reference_of(study.controller, model, records=read_records(study.record, model))
         torque = replace(study.controller.torque, noise=1.0, disturbance=3.0)
-        study = replace(study, rows=replace(study.rows, low_speed=0.01), controller=replace(study.controller, delay=0, torque=torque))
-    return Bench(model, study, Simulator(model, study.controller), reference, parameters_of(model, study.controller))
+        study = replace(
+            study,
+            rows=replace(study.rows, low_speed=0.01),
+            controller=replace(study.controller, delay=0, torque=torque),
+        )
+    return Bench(
+        model,
+        study,
+        Simulator(model, study.controller),
+        reference,
+        parameters_of(model, study.controller),
+    )
 
 
 @cache
 def with_encoder(robot: str, step: float) -> Simulator:
     """The loop with steps of the encoder inside."""
     b = bench(robot)
-    controller = replace(b.study.controller, encoder=replace(b.study.controller.encoder, step=step or None))
+    controller = replace(
+        b.study.controller, encoder=replace(b.study.controller.encoder, step=step or None)
+    )
     return Simulator(b.model, controller, symbolic=b.simulator.symbolic)
 
 
@@ -126,7 +159,13 @@ def made(key: Key) -> tuple[Record, ClosedLoop]:
     """The record and its loop."""
     b = bench(key.robot)
     record = with_encoder(key.robot, key.step).run(b.truth, b.reference, seed=key.seed).record()
-    loop = closed_loop(b.model, [replace(record, q_r=b.reference.q)], b.study, b.simulator, around=AROUND[key.robot])
+    loop = closed_loop(
+        b.model,
+        [replace(record, q_r=b.reference.q)],
+        b.study,
+        b.simulator,
+        around=AROUND[key.robot],
+    )
     return record, loop
 
 
@@ -152,8 +191,15 @@ def estimates(_: None, key: Key) -> list[dict[str, Any]]:
         begun = time.process_time()
         row = {"robot": key.robot, "step": key.step, "seed": key.seed, "method": method}
         try:
-            e = estimate_of(_rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model)
-            row |= {"X": e.X.tolist(), "sigma": e.sigma.tolist(), "corrected": e.sigma_corrected.tolist(), "status": e.status}
+            e = estimate_of(
+                _rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model
+            )
+            row |= {
+                "X": e.X.tolist(),
+                "sigma": e.sigma.tolist(),
+                "corrected": e.sigma_corrected.tolist(),
+                "status": e.status,
+            }
         except InputError as error:
             row |= {"status": str(error)}
         found.append({**row, "seconds": round(time.process_time() - begun, 2)})
@@ -161,7 +207,11 @@ def estimates(_: None, key: Key) -> list[dict[str, Any]]:
 
 
 def _rows(b: Bench, record: Record, seen: Observation, method: str, key: Key) -> Observation:
-    return with_errors(b.model, record, b.study, seen, key.step / np.sqrt(12)) if method == "tls" and key.step else seen
+    return (
+        with_errors(b.model, record, b.study, seen, key.step / np.sqrt(12))
+        if method == "tls" and key.step
+        else seen
+    )
 
 
 def wanted(records: int, cloe: Mapping[str, int]) -> Iterator[Key]:
@@ -188,14 +238,24 @@ def computed(file: Path, keys: Sequence[Key], workers: int) -> list[dict[str, An
 
 
 def determined(robot: str) -> list[int]:
-    """Parameters that are not zero and that a record with an exact encoder determines to DETERMINED %."""
+    """Parameters that are not zero and that a record with an exact encoder determines to DETERMINED
+    %.
+    """
     b = bench(robot)
-    found: Estimate = estimate_of(made(Key(robot, 0.0, 0, ()))[1].measured(), EstimateSettings("wls"), model=b.model)
-    return [i for i, x in enumerate(b.truth) if x and 100 * found.sigma_corrected[i] < DETERMINED * abs(x)]
+    found: Estimate = estimate_of(
+        made(Key(robot, 0.0, 0, ()))[1].measured(), EstimateSettings("wls"), model=b.model
+    )
+    return [
+        i
+        for i, x in enumerate(b.truth)
+        if x and 100 * found.sigma_corrected[i] < DETERMINED * abs(x)
+    ]
 
 
 class Summary(NamedTuple):
-    """Of one robot, step and method over the records, in % of the truth, by determined parameter: bias, scatter, stated sigma, corrected sigma."""
+    """Of one robot, step and method over the records, in % of the truth, by determined parameter:
+    bias, scatter, stated sigma, corrected sigma.
+    """
 
     records: int
     failed: int
@@ -205,16 +265,26 @@ class Summary(NamedTuple):
     corrected: Array
 
 
-def summary(rows: Sequence[Mapping[str, Any]], robot: str, step: float, method: str, kept: Sequence[int]) -> Summary | None:
+def summary(
+    rows: Sequence[Mapping[str, Any]], robot: str, step: float, method: str, kept: Sequence[int]
+) -> Summary | None:
     """None where nothing was estimated."""
     mine = [r for r in rows if (r["robot"], r["step"], r["method"]) == (robot, step, method)]
     good = [r for r in mine if r["status"] == "ok"]
     if not good:
         return None
     truth = bench(robot).truth[list(kept)]
-    X, sigma, corrected = (100 * np.array([r[name] for r in good])[:, list(kept)] / np.abs(truth) for name in ("X", "sigma", "corrected"))
+    X, sigma, corrected = (
+        100 * np.array([r[name] for r in good])[:, list(kept)] / np.abs(truth)
+        for name in ("X", "sigma", "corrected")
+    )
     return Summary(
-        len(good), len(mine) - len(good), X.mean(axis=0) - 100 * np.sign(truth), X.std(axis=0), sigma.mean(axis=0), corrected.mean(axis=0)
+        len(good),
+        len(mine) - len(good),
+        X.mean(axis=0) - 100 * np.sign(truth),
+        X.std(axis=0),
+        sigma.mean(axis=0),
+        corrected.mean(axis=0),
     )
 
 
@@ -269,24 +339,54 @@ def _rms(x: Array) -> float:
 
 
 def bias_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[int]]) -> Figure:
-    """Bias of every determined parameter with its scatter, at the third step, and the largest bias at every step."""
+    """Bias of every determined parameter with its scatter, at the third step, and the largest bias
+    at every step.
+    """
     figure = Figure(figsize=(11, 7), layout="constrained")
     for place, robot in enumerate(kept):
         step, numbers = STEPS[robot][2], kept[robot]
-        left, right = figure.add_subplot(2, 3, (3 * place + 1, 3 * place + 2)), figure.add_subplot(2, 3, 3 * place + 3)
+        left, right = (
+            figure.add_subplot(2, 3, (3 * place + 1, 3 * place + 2)),
+            figure.add_subplot(2, 3, 3 * place + 3),
+        )
         for k, method in enumerate(("ols", "tls", "iv", "didim")):
             s = summary(rows, robot, step, method, numbers)
             if s is not None:
-                left.errorbar(np.arange(len(numbers)) + 0.15 * (k - 1.5), s.bias, s.scatter, fmt="o", ms=3, lw=1, label=method.upper())
+                left.errorbar(
+                    np.arange(len(numbers)) + 0.15 * (k - 1.5),
+                    s.bias,
+                    s.scatter,
+                    fmt="o",
+                    ms=3,
+                    lw=1,
+                    label=method.upper(),
+                )
         left.axhline(0, color="k", lw=0.5)
-        left.set_xticks(range(len(numbers)), [bench(robot).model.BASE_PARAMETERS[i] for i in numbers], rotation=90, fontsize=7)
-        left.set(ylabel="bias, scatter as bar, %", title=f"{robot}, encoder {step:.3g} {UNIT[robot]} in the loop")
+        left.set_xticks(
+            range(len(numbers)),
+            [bench(robot).model.BASE_PARAMETERS[i] for i in numbers],
+            rotation=90,
+            fontsize=7,
+        )
+        left.set(
+            ylabel="bias, scatter as bar, %",
+            title=f"{robot}, encoder {step:.3g} {UNIT[robot]} in the loop",
+        )
         left.legend(fontsize=7, ncol=4)
         for method in (*METHODS, "cloe"):
-            points = [(d, s) for d in STEPS[robot] if (s := summary(rows, robot, d, method, numbers)) is not None]
+            points = [
+                (d, s)
+                for d in STEPS[robot]
+                if (s := summary(rows, robot, d, method, numbers)) is not None
+            ]
             if points:
                 right.loglog(
-                    [d for d, _ in points], [np.abs(s.bias).max() for _, s in points], marker="o", ms=3, lw=1, label=method.upper()
+                    [d for d, _ in points],
+                    [np.abs(s.bias).max() for _, s in points],
+                    marker="o",
+                    ms=3,
+                    lw=1,
+                    label=method.upper(),
                 )
         right.axhline(5, color="k", lw=0.5, ls=":")
         right.set(xlabel=f"step, {UNIT[robot]}", ylabel="largest bias, %")
@@ -361,18 +461,35 @@ CLOE of the TX40 is not in the figure: through the verb two runs at 2 pi/2000 al
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--records", type=int, default=100)
-    parser.add_argument("--cloe", type=int, default=10, help="records of the EMPS on which output error is tried")
-    parser.add_argument("--cloe-tx40", type=int, default=0, help="the same of the TX40: minutes and 1 GB each")
+    parser.add_argument(
+        "--cloe", type=int, default=10, help="records of the EMPS on which output error is tried"
+    )
+    parser.add_argument(
+        "--cloe-tx40", type=int, default=0, help="the same of the TX40: minutes and 1 GB each"
+    )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
-    parser.add_argument("--runs", type=Path, default=Path("estimators_runs.jsonl"), help="file of the estimates")
+    parser.add_argument(
+        "--runs", type=Path, default=Path("estimators_runs.jsonl"), help="file of the estimates"
+    )
     given = parser.parse_args()
-    rows = computed(given.runs, list(wanted(given.records, {"emps": given.cloe, "tx40": given.cloe_tx40})), given.workers)
+    rows = computed(
+        given.runs,
+        list(wanted(given.records, {"emps": given.cloe, "tx40": given.cloe_tx40})),
+        given.workers,
+    )
     kept = {robot: determined(robot) for robot in ("emps", "tx40")}
-    tables = "\n\n".join(f"{robot}\n\n```\n{table(rows, robot, kept[robot])}\n```" for robot in kept)
-    counts = "; ".join(f"{robot} {', '.join(bench(robot).model.BASE_PARAMETERS[i] for i in numbers)}" for robot, numbers in kept.items())
+    tables = "\n\n".join(
+        f"{robot}\n\n```\n{table(rows, robot, kept[robot])}\n```" for robot in kept
+    )
+    counts = "; ".join(
+        f"{robot} {', '.join(bench(robot).model.BASE_PARAMETERS[i] for i in numbers)}"
+        for robot, numbers in kept.items()
+    )
     page = PAGE.format(
         tables=tables,
         counts=counts,

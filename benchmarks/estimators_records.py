@@ -2,8 +2,10 @@
 
     python benchmarks/estimators_records.py [-o docs/estimators.md]
 
-EMPS: identified on one record, torque predicted on the other, and the position simulated with the parameters found, with and without the tick of delay
-of the diagram. TX40: first half of the window predicts the second. All methods of a table use the same rows. Records: `symgen datasets`.
+EMPS: identified on one record, torque predicted on the other, and the position simulated with the
+parameters found, with and without the tick of delay
+of the diagram. TX40: first half of the window predicts the second. All methods of a table use the
+same rows. Records: `symgen datasets`.
 """
 
 # ruff: noqa: E402
@@ -25,21 +27,24 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.errors import InputError
-from runtime.estimators.closed_loop import closed_loop
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
+from runtime.loop.closed_loop import closed_loop
+from runtime.loop.methods import estimate_of
+from runtime.loop.reference import Reference
+from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
-from runtime.motion.reference import Reference
-from runtime.motion.simulation import Simulator
-from runtime.observation.observation import Observation
-from runtime.observation.position_errors import with_errors
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
+from runtime.rows.observation import Observation
+from runtime.rows.position_errors import with_errors
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
-ENCODER = {"emps": 1e-6, "tx40": 1e-5}  # deviation of a position that TLS is told, m and rad of the joint
+ENCODER = {
+    "emps": 1e-6,
+    "tx40": 1e-5,
+}  # deviation of a position that TLS is told, m and rad of the joint
 TEXT = Path(__file__).with_name("estimators_records.md")
 
 
@@ -49,13 +54,24 @@ def predicted(seen: Observation, X: np.ndarray) -> float:
 
 
 def emps() -> str:
-    """Parameters by every method on each record, error on both, error of the simulated position without and with delay."""
-    model, study = load_model("emps", folder=GENERATED), study_from_mapping(dataset_study("emps"))
+    """Parameters by every method on each record, error on both, error of the simulated position
+    without and with delay.
+    """
+    model, study = (
+        load_model("emps", folder=GENERATED, trust=True),
+        study_from_mapping(dataset_study("emps")),
+    )
     records = read_records(study.record + study.validate.record, model)
-    gain = float(study.controller.law.gain) if not isinstance(study.controller.law.gain, tuple) else study.controller.law.gain[0]
+    gain = (
+        float(study.controller.law.gain)
+        if not isinstance(study.controller.law.gain, tuple)
+        else study.controller.law.gain[0]
+    )
     pulses = gain * loadmat(fetch("emps", "DATA_EMPS_PULSES.mat"))["pulses_N"].astype(float)
     simulators = [Simulator(model, replace(study.controller, delay=delay)) for delay in (0, 1)]
-    references = [Reference.sampled(record.q_r, 1000.0) for record in records if record.q_r is not None]
+    references = [
+        Reference.sampled(record.q_r, 1000.0) for record in records if record.q_r is not None
+    ]
     head = (
         "identified on",
         "method",
@@ -71,15 +87,26 @@ def emps() -> str:
         other = closed_loop(model, [records[1 - k]], study, simulators[0]).measured()
         for label, delay, settings in EMPS_METHODS:
             if k == 1 and settings.method in ("iv", "didim", "cloe"):
-                continue  # the pulses enter behind the controller: this loop is not simulated from its reference alone
+                # the pulses enter behind the controller: this loop is not simulated from its
+                # reference alone
+                continue
             seen = closed_loop(model, [record], study, simulators[delay]).measured()
             if settings.method == "tls":
                 seen = with_errors(model, record, study, seen, ENCODER["emps"])
             found = estimate_of(seen, settings, model=model)
             errors = []
             for simulator in simulators:
-                run = simulator.run(found.X, references[k], start=record.q[0], ideal=True, disturbance=pulses if k else None)
-                errors.append(100 * float(np.linalg.norm((run.q - record.q)[49:]) / np.linalg.norm(record.q[49:])))
+                run = simulator.run(
+                    found.X,
+                    references[k],
+                    start=record.q[0],
+                    ideal=True,
+                    disturbance=pulses if k else None,
+                )
+                errors.append(
+                    100
+                    * float(np.linalg.norm((run.q - record.q)[49:]) / np.linalg.norm(record.q[49:]))
+                )
             cells = [*(f"{x:.3f}" for x in found.X), *(f"{s:.2f}" for s in found.relative_sigma)]
             lines.append(
                 (
@@ -99,7 +126,11 @@ EMPS_METHODS: tuple[tuple[str, int, EstimateSettings], ...] = (
     ("ols", 0, EstimateSettings()),
     ("wls", 0, EstimateSettings("wls")),
     ("irls", 0, EstimateSettings("irls")),
-    ("tls", 0, EstimateSettings("tls", options={"position_error": ENCODER["emps"], "bootstrap": 0})),
+    (
+        "tls",
+        0,
+        EstimateSettings("tls", options={"position_error": ENCODER["emps"], "bootstrap": 0}),
+    ),
     ("iv", 0, EstimateSettings("iv")),
     ("iv, delay", 1, EstimateSettings("iv")),
     ("didim", 0, EstimateSettings("didim")),
@@ -111,8 +142,10 @@ EMPS_METHODS: tuple[tuple[str, int, EstimateSettings], ...] = (
 
 
 def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, Observation]:
-    """Rows of the TX40 record in the loop that is assumed, without the median filter: TLS knows errors behind linear filters alone."""
-    model, mapping = load_model("tx40", folder=GENERATED), dict(dataset_study("tx40"))
+    """Rows of the TX40 record in the loop that is assumed, without the median filter: TLS knows
+    errors behind linear filters alone.
+    """
+    model, mapping = load_model("tx40", folder=GENERATED, trust=True), dict(dataset_study("tx40"))
     mapping["signals"] = {**mapping["signals"], "median": 1}
     mapping["rows"] = {**mapping["rows"], "low_speed": low_speed}
     mapping["controller"] = {"law": LAW, "rate": 5000, "torque": {"saturation": None}}
@@ -120,33 +153,67 @@ def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, O
     record = read_records(study.record, model)[0]
     until = int(np.searchsorted(record.t, 7.6))
     record = replace(record, t=record.t[:until], q=record.q[:until], tau=record.tau[:until])
-    seen = closed_loop(model, [record], study, Simulator(model, study.controller), reference="measured", around=around).measured()
+    seen = closed_loop(
+        model,
+        [record],
+        study,
+        Simulator(model, study.controller),
+        reference="measured",
+        around=around,
+    ).measured()
     return model, study, with_errors(model, record, study, seen, ENCODER["tx40"])
 
 
 def agreement() -> str:
-    """Largest difference of IV from WLS in corrected sigmas of IV, with every row and without slow ones."""
-    lines: list[Sequence[str]] = [("rows", "per joint", "largest |IV - WLS|/sigma", "of", "WLS", "IV")]
-    for label, low_speed, around in (("all", 0.0, 0.0), ("without slower than 0.1 rad/s and 0.05 s around", 0.1, 0.05)):
+    """Largest difference of IV from WLS in corrected sigmas of IV, with every row and without slow
+    ones.
+    """
+    lines: list[Sequence[str]] = [
+        ("rows", "per joint", "largest |IV - WLS|/sigma", "of", "WLS", "IV")
+    ]
+    for label, low_speed, around in (
+        ("all", 0.0, 0.0),
+        ("without slower than 0.1 rad/s and 0.05 s around", 0.1, 0.05),
+    ):
         model, _, seen = tx40_rows(low_speed, around)
-        least, iv = (estimate_of(seen, EstimateSettings(m, options=IV if m == "iv" else {}), model=model) for m in ("wls", "iv"))
+        least, iv = (
+            estimate_of(seen, EstimateSettings(m, options=IV if m == "iv" else {}), model=model)
+            for m in ("wls", "iv")
+        )
         z = np.abs(iv.X - least.X) / iv.sigma_corrected
         k = int(np.argmax(z))
-        lines.append((label, f"{min(seen.rows)} to {max(seen.rows)}", f"{z[k]:.1f}", seen.names[k], f"{least.X[k]:.4g}", f"{iv.X[k]:.4g}"))
+        lines.append(
+            (
+                label,
+                f"{min(seen.rows)} to {max(seen.rows)}",
+                f"{z[k]:.1f}",
+                seen.names[k],
+                f"{least.X[k]:.4g}",
+                f"{iv.X[k]:.4g}",
+            )
+        )
     return aligned(lines)
 
 
 def tx40(methods: Sequence[str]) -> tuple[str, str]:
-    """Errors by joint and held out, and the parameters with their sigma, on the window of the chapter."""
+    """Errors by joint and held out, and the parameters with their sigma, on the window of the
+    chapter.
+    """
     model, study, seen = tx40_rows(0.0, 0.0)
     first, second = (seen.between(*window) for window in study.validate.split)
     options: Mapping[str, Mapping[str, Any]] = {
         "tls": {"position_error": ENCODER["tx40"], "bootstrap": 0},
         "iv": IV,
-        "feasible": {"bootstrap": 0, "prior": "none", "reach": None},  # the conditions alone: the values of the robot file are from Table 2
+        "feasible": {
+            "bootstrap": 0,
+            "prior": "none",
+            "reach": None,
+        },  # the conditions alone: the values of the robot file are from Table 2
     }
     found: dict[str, Estimate] = {}
-    lines: list[Sequence[str]] = [("method", "status", *(f"joint {j} %" for j in model.JOINTS), "total %", "held out %")]
+    lines: list[Sequence[str]] = [
+        ("method", "status", *(f"joint {j} %" for j in model.JOINTS), "total %", "held out %")
+    ]
     for method in methods:
         settings = EstimateSettings(method, options=options.get(method, {}))  # type: ignore[arg-type]
         try:
@@ -156,22 +223,41 @@ def tx40(methods: Sequence[str]) -> tuple[str, str]:
             lines.append((method, str(error)))
             continue
         lines.append(
-            (method, e.status, *(f"{joint.relative_error:.2f}" for joint in e.per_joint), f"{e.relative_error:.3f}", f"{held:.2f}")
+            (
+                method,
+                e.status,
+                *(f"{joint.relative_error:.2f}" for joint in e.per_joint),
+                f"{e.relative_error:.3f}",
+                f"{held:.2f}",
+            )
         )
     values: list[Sequence[str]] = [("parameter", *(cell for m in found for cell in (m, "sigma")))]
     for i, name in enumerate(seen.names):
-        values.append((name, *(cell for e in found.values() for cell in (f"{e.X[i]:.4g}", f"{e.sigma[i]:.2g}"))))
+        values.append(
+            (
+                name,
+                *(cell for e in found.values() for cell in (f"{e.X[i]:.4g}", f"{e.sigma[i]:.2g}")),
+            )
+        )
     return aligned(lines), aligned(values)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/estimators.md"))
-    parser.add_argument("--methods", nargs="+", default=["ols", "wls", "irls", "tls", "iv", "feasible"])
+    parser.add_argument(
+        "--methods", nargs="+", default=["ols", "wls", "irls", "tls", "iv", "feasible"]
+    )
     given = parser.parse_args()
     errors, parameters = tx40(given.methods)
     page = TEXT.read_text().format(
-        emps=emps(), errors=errors, agreement=agreement(), parameters=parameters, **{f"{r}_encoder": x for r, x in ENCODER.items()}
+        emps=emps(),
+        errors=errors,
+        agreement=agreement(),
+        parameters=parameters,
+        **{f"{r}_encoder": x for r, x in ENCODER.items()},
     )
     print(page)
     given.output.write_text(page)

@@ -1,16 +1,24 @@
-"""The whole identification job of the TX40 against figaroh's on the same record: from two CSV files to base parameters with their deviations.
+"""The whole identification job of the TX40 against figaroh's on the same record: from two CSV files
+to base parameters with their deviations.
 
     python -m venv FOLDER && FOLDER/bin/pip install figaroh
     python benchmarks/figaroh_job.py --figaroh FOLDER/bin/python [--rounds 7]        needs the record `tx40`: SYMGEN_DATA, or be on line
 
-Both read the same files, take the motor side to the joints, cut the record at 7.5 s, filter (median 5, Butterworth of order 4 at 50 Hz on the
-positions, which is what figaroh filters), differentiate twice, evaluate the regressor with friction, actuators, offsets and the coupled wrist,
-decimate by 40 with zero phase, and solve by ordinary least squares. Differences that stay: figaroh pads its median with zeros and cuts the record
-before it filters, and does not filter torques by the median (here they are taken through it, which costs more); it finds its base parameters by QR
-in every job, here they are known from the generation; its wrist has one parameter more (Iam6 apart from Ia6). figaroh's report of the result is counted, ours (%sigma, residuals by joint) too.
+Both read the same files, take the motor side to the joints, cut the record at 7.5 s, filter (median
+5, Butterworth of order 4 at 50 Hz on the
+positions, which is what figaroh filters), differentiate twice, evaluate the regressor with
+friction, actuators, offsets and the coupled wrist,
+decimate by 40 with zero phase, and solve by ordinary least squares. Differences that stay: figaroh
+pads its median with zeros and cuts the record
+before it filters, and does not filter torques by the median (here they are taken through it, which
+costs more); it finds its base parameters by QR
+in every job, here they are known from the generation; its wrist has one parameter more (Iam6 apart
+from Ia6). figaroh's report of the result is counted, ours (%sigma, residuals by joint) too.
 
-First the results are compared: relative error, and the predicted torques of both against each other. Then each round runs every contender once, in
-rotated order, pinned to one core, one BLAS thread, CPU time without imports; ratios are taken per round and given as median [range], of the whole
+First the results are compared: relative error, and the predicted torques of both against each
+other. Then each round runs every contender once, in
+rotated order, pinned to one core, one BLAS thread, CPU time without imports; ratios are taken per
+round and given as median [range], of the whole
 job and of what follows the reading of the files, which is half of ours.
 """
 
@@ -37,13 +45,14 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
 from runtime.files import read_bytes
+from runtime.loop.methods import estimate_of
 from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
-from runtime.observation.observation import Observation, observe
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
+from runtime.rows.observation import Observation
+from runtime.rows.observe import observe
 from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
@@ -55,7 +64,9 @@ FILES = ("pos_read_data.csv", "curr_data.csv")
 def study_of(files: list[str]) -> Study:
     given = study_from_mapping(dataset_study("tx40"))
     records = tuple(replace(record, files=tuple(files), dataset=None) for record in given.record)
-    signals = Signals(median=5, lowpass=Lowpass(cutoff=CUTOFF, on=("q",)), decimate=Decimate(factor=FACTOR))
+    signals = Signals(
+        median=5, lowpass=Lowpass(cutoff=CUTOFF, on=("q",)), decimate=Decimate(factor=FACTOR)
+    )
     return replace(given, record=records, signals=signals, rows=Rows(window=(0.0, END), trim=0))
 
 
@@ -86,7 +97,9 @@ class Figaroh:
 
     def __init__(self, python: str, settings: dict[str, Any]) -> None:
         worker = Path(__file__).with_name("figaroh_worker.py")
-        self.process = subprocess.Popen([python, str(worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [python, str(worker)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
         self._write(json.dumps(settings))
 
     def _write(self, line: str) -> None:
@@ -109,7 +122,10 @@ def settings_of(files: list[str], study: Study) -> dict[str, Any]:
     assert robot.drives is not None
     return {
         "files": files,
-        "frames": [(f.j, f.ant, f.alpha.value(value), f.d.value(value), f.r.value(value)) for f in robot.frames],
+        "frames": [
+            (f.j, f.ant, f.alpha.value(value), f.d.value(value), f.r.value(value))
+            for f in robot.frames
+        ],
         "gravity": [e.value(value) for e in robot.gravity],
         "ratio": robot.drives.ratio,
         "offset": robot.drives.offset,
@@ -120,7 +136,9 @@ def settings_of(files: list[str], study: Study) -> dict[str, Any]:
 
 
 def compare(observation: Observation, found: Estimate, other: dict[str, Any]) -> None:
-    """Relative errors of both, and predicted torques against each other, on rows away from the ends."""
+    """Relative errors of both, and predicted torques against each other, on rows away from the
+    ends.
+    """
     n = observation.n
     W = observation.W
     ours, Y = (W @ found.X).reshape(n, -1), observation.Y.reshape(n, -1)
@@ -129,13 +147,25 @@ def compare(observation: Observation, found: Estimate, other: dict[str, Any]) ->
     inside = slice(3, K - 3)
     norm = np.linalg.norm
     print(f"parameters        {len(found.X)} and {other['parameters']}")
-    print(f"relative error    {found.relative_error:.3f} % and {100 * norm(Y_theirs - theirs) / norm(Y_theirs):.3f} %")
-    print(f"measured torques  differ by {100 * norm((Y - Y_theirs[:, :K])[:, inside]) / norm(Y):.3f} % (the median on ours)")
-    print(f"predicted torques differ by {100 * norm((ours[:, :K] - theirs[:, :K])[:, inside]) / norm(Y):.3f} % of the measured ones\n")
+    print(
+        f"relative error    {found.relative_error:.3f} % and "
+        f"{100 * norm(Y_theirs - theirs) / norm(Y_theirs):.3f} %"
+    )
+    print(
+        f"measured torques  differ by {100 * norm((Y - Y_theirs[:, :K])[:, inside]) / norm(Y):.3f} "
+        "% (the median on ours)"
+    )
+    print(
+        "predicted torques differ by "
+        f"{100 * norm((ours[:, :K] - theirs[:, :K])[:, inside]) / norm(Y):.3f} % of the measured "
+        "ones\n"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--figaroh", default=sys.executable, help="a Python that has figaroh")
     parser.add_argument("--rounds", type=int, default=7)
     arguments = parser.parse_args()
@@ -148,10 +178,12 @@ def main() -> None:
         for name in FILES:
             (Path(folder) / name).write_bytes(read_bytes(fetch("tx40", name)))
             files.append(str(Path(folder) / name))
-        for name, text in generate_files(load_robot("tx40"), targets=("numpy", "c"), command="tx40").items():
+        for name, text in generate_files(
+            load_robot("tx40"), targets=("numpy", "c"), command="tx40"
+        ).items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         study = study_of(files)
-        model = load_model("tx40", folder=Path(folder))
+        model = load_model("tx40", folder=Path(folder), trust=True)
         c = compiled_model(model, cache=Path(folder) / "cache")
         figaroh = Figaroh(arguments.figaroh, settings_of(files, study))
         contenders: dict[str, Callable[[], Done]] = {

@@ -1,9 +1,14 @@
-"""The identification of a serial robot by figaroh, run by the Python that has figaroh; started by figaroh_job.py.
+"""The identification of a serial robot by figaroh, run by the Python that has figaroh; started by
+figaroh_job.py.
 
-One JSON line with settings on standard input; then for every line `run` the job is done once and a JSON line with its CPU seconds, and those of reading the files, is written. The
-line `result` writes what the last run found. figaroh's own steps are used as they are: median, filter, differentiation, regressor, decimation, base
-parameters by QR, least squares, relative deviations. Only what figaroh asks its users for is written here: reading the files, the drives, and the
-three columns of the coupled wrist. Its validation is left out, which evaluates the regressor a second time.
+One JSON line with settings on standard input; then for every line `run` the job is done once and a
+JSON line with its CPU seconds, and those of reading the files, is written. The
+line `result` writes what the last run found. figaroh's own steps are used as they are: median,
+filter, differentiation, regressor, decimation, base
+parameters by QR, least squares, relative deviations. Only what figaroh asks its users for is
+written here: reading the files, the drives, and the
+three columns of the coupled wrist. Its validation is left out, which evaluates the regressor a
+second time.
 """
 
 import contextlib
@@ -33,7 +38,9 @@ def urdf(frames):
     """Text of a URDF with the geometry of frames (j, ant, alpha, d, r) and inertias of no meaning."""
     text = '<robot name="robot"><link name="link0"/>'
     for j, ant, alpha, d, r in frames:
-        text += LINK.format(j=j) + JOINT.format(j=j, ant=ant, x=d, y=-r * sin(alpha), z=r * cos(alpha), alpha=alpha)
+        text += LINK.format(j=j) + JOINT.format(
+            j=j, ant=ant, x=d, y=-r * sin(alpha), z=r * cos(alpha), alpha=alpha
+        )
     return text + "</robot>"
 
 
@@ -43,7 +50,10 @@ class Identification(BaseIdentification):
     def __init__(self, robot, settings):
         self.settings = settings
         super().__init__(robot)
-        self.filter_config = {"differentiation_method": "gradient", "filter_params": settings["filter"]}
+        self.filter_config = {
+            "differentiation_method": "gradient",
+            "filter_params": settings["filter"],
+        }
 
     def load_param(self, config_file, setting_type="identification"):
         n = self.model.nv
@@ -75,7 +85,9 @@ class Identification(BaseIdentification):
 
     def calculate_full_regressor(self):
         v, a = self.processed_data["velocities"], self.processed_data["accelerations"]
-        W = build_regressor_basic(self.robot, self.processed_data["positions"], v, a, self.identif_config)
+        W = build_regressor_basic(
+            self.robot, self.processed_data["positions"], v, a, self.identif_config
+        )
         wrist = np.zeros((6, len(v), 3))
         wrist[4] = np.stack([a[:, 5], v[:, 5], np.sign(v[:, 4] + v[:, 5])], axis=1)
         wrist[5] = np.stack([a[:, 4], v[:, 4], np.sign(v[:, 4] + v[:, 5])], axis=1)
@@ -86,14 +98,18 @@ class Identification(BaseIdentification):
         self.standard_parameter.update({"Iam6": 0.0, "fvm6": 0.0, "fsm6": 0.0})
 
     def _compute_validation_metrics(self):
-        """Left out: without other data figaroh would evaluate the regressor of the same record once more."""
+        """Left out: without other data figaroh would evaluate the regressor of the same record once
+        more.
+        """
 
 
 def job(robot, settings):
     """The identification, from files to base parameters and their deviations."""
     found = Identification(robot, settings)
     found.initialize(truncate=settings["truncate"])
-    found.solve(decimate=True, decimation_factor=settings["factor"], zero_tolerance=1e-3, plotting=False)
+    found.solve(
+        decimate=True, decimation_factor=settings["factor"], zero_tolerance=1e-3, plotting=False
+    )
     return found
 
 

@@ -1,13 +1,20 @@
-"""Growth of cost: time and memory against samples, joints, columns, runs and workers, as a log-log figure.
+"""Growth of cost: time and memory against samples, joints, columns, runs and workers, as a log-log
+figure.
 
     python benchmarks/growth.py [-o docs/growth.png] [--quick]
 
-Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by the NumPy and the C module; largest resident set of
-`symgen identify` with the whole record in memory and by blocks (memory.py). Joints, 2 to 30: revolute chains and binary trees with friction; generation
-from the robot file to the text of the module, the time of compiling C up to 12, and the regressor of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
+Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by
+the NumPy and the C module; largest resident set of
+`symgen identify` with the whole record in memory and by blocks (memory.py). Joints, 2 to 30:
+revolute chains and binary trees with friction; generation
+from the robot file to the text of the module, the time of compiling C up to 12, and the regressor
+of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
-One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core, elapsed time. The least of three under an unknown load is good for slopes, which is what the figure is for; ratios
-between contenders are measured in interleaved rounds by the other files of this folder. The numbers of the figure are printed.
+One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core,
+elapsed time. The least of three under an unknown load is good for slopes, which is what the figure
+is for; ratios
+between contenders are measured in interleaved rounds by the other files of this folder. The numbers
+of the figure are printed.
 """
 
 # ruff: noqa: E402
@@ -32,11 +39,11 @@ from memory import BLOCK, identified, write_npz
 from runtime.model.compile_cache import FallbackWarning
 from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
-from runtime.observation.filters import States, decimation_plan
-from runtime.observation.regressor_signals import DecimatedSignals, distinct_entries
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
+from runtime.rows.regressor import DecimatedSignals, distinct_entries
 from runtime.settings.study import CestacSettings, Decimate, Study
+from runtime.signals.filters import States, decimation_plan
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files, generate_module
 
@@ -62,9 +69,11 @@ def least(function: Callable[[], object], repeats: int = 3) -> float:
 
 def emitted(name: str, folder: Path) -> tuple[GeneratedModel, GeneratedModel]:
     """(NumPy, C) modules of a packaged robot."""
-    for file, text in generate_files(load_robot(name), targets=("numpy", "c"), command=name).items():
+    for file, text in generate_files(
+        load_robot(name), targets=("numpy", "c"), command=name
+    ).items():
         (folder / file).write_text(text, encoding="utf-8")
-    model = load_model(name, folder=folder)
+    model = load_model(name, folder=folder, trust=True)
     return model, compiled_model(model, cache=folder / "cache")
 
 
@@ -86,13 +95,19 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
             states = motion(N, len(model.JOINTS))
             found.setdefault(f"regressor, {label}", []).append((N, evaluation(model, states)))
             entries = distinct_entries(model, {})
-            columns = DecimatedSignals(model, entries, {}, decimation_plan(N, 40, Decimate(factor=40)))
-            found.setdefault(f"decimated signals, {label}", []).append((N, least(lambda: columns(states))))  # noqa: B023
+            columns = DecimatedSignals(
+                model, entries, {}, decimation_plan(N, 40, Decimate(factor=40))
+            )
+            found.setdefault(f"decimated signals, {label}", []).append(
+                (N, least(lambda: columns(states)))  # noqa: B023
+            )
     return found
 
 
 def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Curves:
-    """MB of `symgen identify`, with the whole record in memory and by blocks, beside what W would take."""
+    """MB of `symgen identify`, with the whole record in memory and by blocks, beside what W would
+    take.
+    """
     found: Curves = {"whole record": [], "by blocks": [], "W alone (never formed)": []}
     for N in samples:
         record = write_npz(model, N, folder, "lowpass")
@@ -104,16 +119,24 @@ def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Cur
 
 
 def arm(n: int, tree: bool) -> bytes:
-    """Robot file of n revolute joints, a chain or a binary tree, axes at right angles in turn, viscous and Coulomb friction."""
+    """Robot file of n revolute joints, a chain or a binary tree, axes at right angles in turn,
+    viscous and Coulomb friction.
+    """
     frames, constants = [], ["g: 9.81"]
     for j in range(1, n + 1):
         ant = (j // 2 if j > 2 else j - 1) if tree else j - 1
         length = f"L{j}"
         constants.append(f"{length}: {0.2 + 0.01 * j:.2f}")
         d, r = (length, "0") if j % 2 else ("0", length)
-        frames.append(f"  {j}: {{ant: {ant}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: {d}, theta: q{j}, r: {r}}}")
+        frames.append(
+            f"  {j}: {{ant: {ant}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: {d}, "
+            f"theta: q{j}, r: {r}}}"
+        )
     elements = "elements:\n  FV: {kind: viscous, along: all}\n  FS: {kind: coulomb, along: all}\n"
-    head = f"symgen: 1\nname: arm{n}\ngravity: [0, 0, -g]\nconstants: {{{', '.join(constants)}}}\nframes:\n"
+    head = (
+        f"symgen: 1\nname: arm{n}\ngravity: [0, 0, -g]\nconstants: "
+        f"{{{', '.join(constants)}}}\nframes:\n"
+    )
     return (head + "\n".join(frames) + "\n" + elements).encode()
 
 
@@ -130,7 +153,7 @@ def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Cur
             own.mkdir()
             for file, text in generate_files(robot, targets=("numpy", "c")).items():
                 (own / file).write_text(text, encoding="utf-8")
-            model = load_model(f"arm{n}", folder=own)
+            model = load_model(f"arm{n}", folder=own, trust=True)
             start = os.times()
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", FallbackWarning)
@@ -139,9 +162,16 @@ def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Cur
             states = motion(N, n)
             contenders = {"NumPy": model} | ({"C": c} if c is not model else {})
             for label, found in contenders.items():
-                speed.setdefault(f"{shape}, {label}", []).append((n, 1e9 * evaluation(found, states) / N))
+                speed.setdefault(f"{shape}, {label}", []).append(
+                    (n, 1e9 * evaluation(found, states) / N)
+                )
             if c is not model:
-                spent = end.children_user + end.children_system - start.children_user - start.children_system
+                spent = (
+                    end.children_user
+                    + end.children_system
+                    - start.children_user
+                    - start.children_system
+                )
                 generation.setdefault(f"{shape}, compiling C", []).append((n, spent))
     return generation, speed
 
@@ -151,7 +181,9 @@ def study_record() -> Record:
     rng, N, n = np.random.default_rng(5), 9000, 6
     t = np.arange(N) / 5000
     w = 2 * np.pi * rng.uniform(0.3, 2.5, (5, n))
-    q = (rng.uniform(-0.4, 0.4, (5, n)) * np.sin(w * t[:, None, None] + rng.uniform(0, 6, (5, n)))).sum(1)
+    q = (
+        rng.uniform(-0.4, 0.4, (5, n)) * np.sin(w * t[:, None, None] + rng.uniform(0, 6, (5, n)))
+    ).sum(1)
     return Record(t=t, q=q, tau=rng.standard_normal((N, n)), rate=5000.0, name="motion")
 
 
@@ -165,24 +197,37 @@ def by_runs(models: dict[str, GeneratedModel], record: Record, runs: tuple[int, 
     return found
 
 
-def by_columns(models: dict[str, GeneratedModel], record: Record, columns: tuple[int, ...], runs: int) -> Curves:
+def by_columns(
+    models: dict[str, GeneratedModel], record: Record, columns: tuple[int, ...], runs: int
+) -> Curves:
     """Seconds of a resolution study of some columns, spread over all."""
     found: Curves = {}
     for label, model in models.items():
         for b in columns:
             own = np.linspace(0, len(model.BASE_PARAMETERS) - 1, b).round().astype(int)
-            study = Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns=[model.BASE_PARAMETERS[k] for k in own]))
+            study = Study(
+                cestac=CestacSettings(
+                    delta=(1e-3,), runs=runs, columns=[model.BASE_PARAMETERS[k] for k in own]
+                )
+            )
             found.setdefault(label, []).append((b, least(lambda: cestac(model, record, study), 1)))  # noqa: B023
     return found
 
 
-def by_workers(models: dict[str, GeneratedModel], record: Record, workers: tuple[int, ...], runs: int) -> Curves:
+def by_workers(
+    models: dict[str, GeneratedModel], record: Record, workers: tuple[int, ...], runs: int
+) -> Curves:
     """Elapsed seconds of a resolution study by several processes, their start included."""
     found: Curves = {}
     for label, model in models.items():
         for count in workers:
             start = time.perf_counter()
-            cestac(model, record, Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns="all")), workers=count)
+            cestac(
+                model,
+                record,
+                Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns="all")),
+                workers=count,
+            )
             found.setdefault(label, []).append((count, time.perf_counter() - start))
     return found
 
@@ -199,12 +244,24 @@ def panel(axes: object, curves: Curves, x: str, y: str) -> None:
     for k, (label, points) in enumerate(curves.items()):
         exponent = slope(points)
         axes.loglog(
-            *zip(*points, strict=True), marker="o", ms=3, lw=1.2, ls="-" if k % 2 == 0 else "--", label=f"{label}  ({exponent:.2f})"
+            *zip(*points, strict=True),
+            marker="o",
+            ms=3,
+            lw=1.2,
+            ls="-" if k % 2 == 0 else "--",
+            label=f"{label}  ({exponent:.2f})",
         )  # type: ignore[attr-defined]
-        print(f"  {label:32} exponent {exponent:5.2f}   " + "  ".join(f"{a:g}: {b:.3g}" for a, b in points))
+        print(
+            f"  {label:32} exponent {exponent:5.2f}   "
+            + "  ".join(f"{a:g}: {b:.3g}" for a, b in points)
+        )
     axes.set(xlabel=x, ylabel=y)  # type: ignore[attr-defined]
     if not x.startswith("samples"):
-        counts = [2, 4, 8, 16, 30] if x == "joints" else [count for count, _ in next(iter(curves.values()))]
+        counts = (
+            [2, 4, 8, 16, 30]
+            if x == "joints"
+            else [count for count, _ in next(iter(curves.values()))]
+        )
         axes.set_xticks(counts, list(map(str, counts)))  # type: ignore[attr-defined]
     for axis in (axes.xaxis, axes.yaxis):  # type: ignore[attr-defined]
         axis.set_minor_formatter(NullFormatter())
@@ -214,34 +271,69 @@ def panel(axes: object, curves: Curves, x: str, y: str) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/growth.png"))
     parser.add_argument("--quick", action="store_true", help="few points, to see whether it runs")
     arguments = parser.parse_args()
-    samples, joints, runs, columns = (SAMPLES[:3], (2, 6), RUNS[:2], COLUMNS[-3:]) if arguments.quick else (SAMPLES, JOINTS, RUNS, COLUMNS)
+    samples, joints, runs, columns = (
+        (SAMPLES[:3], (2, 6), RUNS[:2], COLUMNS[-3:])
+        if arguments.quick
+        else (SAMPLES, JOINTS, RUNS, COLUMNS)
+    )
     cores = os.sched_getaffinity(0)
-    workers = WORKERS[:2] if arguments.quick or len(cores) < 2 else tuple(count for count in WORKERS if count <= len(cores))
+    workers = (
+        WORKERS[:2]
+        if arguments.quick or len(cores) < 2
+        else tuple(count for count in WORKERS if count <= len(cores))
+    )
     os.sched_setaffinity(0, {max(cores)})
     with TemporaryDirectory() as name:
         folder = Path(name)
         numpy_model, c = emitted("tx40", folder)
         models = {"NumPy": numpy_model} | ({"C": c} if c is not numpy_model else {})
-        peaks = memory(folder, numpy_model, samples[1:])  # first: a process inherits the largest resident set of the one that starts it
+        peaks = memory(
+            folder, numpy_model, samples[1:]
+        )  # first: a process inherits the largest resident set of the one that starts it
         figure, record = Figure(figsize=(14.5, 6.6), layout="constrained"), study_record()
         axes = figure.subplots(2, 4).ravel()
         panel(axes[0], by_samples(models, samples), "samples, TX40", "CPU time, s")
         panel(axes[1], peaks, "samples, TX40", "peak memory of an identification, MB")
-        panel(axes[2], by_runs(models, record, runs), "runs of 9000 samples, TX40", "CPU time of a resolution study, s")
         panel(
-            axes[3], by_columns(models, record, columns, runs[-2]), f"columns, {runs[-2]} runs, TX40", "CPU time of a resolution study, s"
+            axes[2],
+            by_runs(models, record, runs),
+            "runs of 9000 samples, TX40",
+            "CPU time of a resolution study, s",
+        )
+        panel(
+            axes[3],
+            by_columns(models, record, columns, runs[-2]),
+            f"columns, {runs[-2]} runs, TX40",
+            "CPU time of a resolution study, s",
         )
         generation, speed = by_joints(folder, joints)
-        panel(axes[4], {k: v for k, v in generation.items() if "C" not in k}, "joints", "CPU time of generation, s")
-        panel(axes[5], {k: v for k, v in generation.items() if "C" in k}, "joints", "CPU time of compiling C, s")
+        panel(
+            axes[4],
+            {k: v for k, v in generation.items() if "C" not in k},
+            "joints",
+            "CPU time of generation, s",
+        )
+        panel(
+            axes[5],
+            {k: v for k, v in generation.items() if "C" in k},
+            "joints",
+            "CPU time of compiling C, s",
+        )
         panel(axes[6], speed, "joints", "regressor, ns a sample")
         os.sched_setaffinity(0, cores)
         elapsed = by_workers(models, record, workers, runs[-1])
-        panel(axes[7], elapsed, f"workers, {len(cores)} cores, {runs[-1]} runs, TX40", "elapsed time of a resolution study, s")
+        panel(
+            axes[7],
+            elapsed,
+            f"workers, {len(cores)} cores, {runs[-1]} runs, TX40",
+            "elapsed time of a resolution study, s",
+        )
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(arguments.output, dpi=130)
     print(f"\n{arguments.output}")

@@ -1,15 +1,19 @@
-"""SIGKILL at random moments of the commands that write: is every file old or new, is the set of one run, does a rerun end as if nothing had been?
+"""SIGKILL at random moments of the commands that write: is every file old or new, is the set of one
+run, does a rerun end as if nothing had been?
 
     python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]        generate convert identify cestac report simulate excite
 
-Each command runs over a folder that holds the results of an earlier one (other robot constants, another record) and a file of the user. Half of the kills come
-uniformly over the time of an undisturbed run, half within the time its writing takes, from the moment the folder of unfinished files appears. After each:
+Each command runs over a folder that holds the results of an earlier one (other robot constants,
+another record) and a file of the user. Half of the kills come
+uniformly over the time of an undisturbed run, half within the time its writing takes, from the
+moment the folder of unfinished files appears. After each:
 
     whole      every file has the bytes of the old run or of the new one, the user's file is his
     one set    all are old, or all new; or the rest of the new ones stands in .symgen-finished, for the next command to move up
     rerun      the same command ends with the exit code and bytes of the undisturbed run, and leaves nothing else
 
-cestac keeps its runs every 0.02 s here, instead of every 30, so that kills meet archives. Exit code 1 where a kill broke one of these.
+cestac keeps its runs every 0.02 s here, instead of every 30, so that kills meet archives. Exit code
+1 where a kill broke one of these.
 """
 
 from __future__ import annotations
@@ -37,7 +41,10 @@ from symgen import load_robot
 from symgen.emit.generate import generate_module
 
 MAIN = "from symgen.cli.main import main; main()"
-OFTEN = "from runtime.resolution.checkpoint import Checkpoint; Checkpoint.__init__.__kwdefaults__['every'] = 0.02; " + MAIN
+OFTEN = (
+    "from runtime.resolution.checkpoint import Checkpoint; "
+    "Checkpoint.__init__.__kwdefaults__['every'] = 0.02; "
+) + MAIN
 ROBOT = "planar_2r"
 NOTE = "of the user"
 POLL = 1e-4  # s, between looks at a folder
@@ -53,12 +60,14 @@ controller:
 """
 
 
-def write_record(path: Path, seed: int, robot: str = ROBOT, duration: float = 4.0, rate: float = 500.0) -> None:
+def write_record(
+    path: Path, seed: int, robot: str = ROBOT, duration: float = 4.0, rate: float = 500.0
+) -> None:
     """Positions and torques of a packaged robot on sums of sines, noise on the torques."""
     with TemporaryDirectory() as folder:
         module = Path(folder) / f"{robot}.py"
         module.write_text(generate_module(load_robot(robot)), encoding="utf-8")
-        model = load_model(module)
+        model = load_model(module, trust=True)
         generator = np.random.default_rng(seed)
         t = np.arange(int(duration * rate)) / rate
         w = 2 * np.pi * np.array([0.5, 1.25, 2.5])
@@ -66,23 +75,49 @@ def write_record(path: Path, seed: int, robot: str = ROBOT, duration: float = 4.
         phase = generator.uniform(0, 2 * np.pi, (n, 3))
         angle = t[:, None, None] * w + phase
         amplitude = np.array([0.8, 0.4, 0.2])
-        q, qd, qdd = ((amplitude * x).sum(-1) for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
+        q, qd, qdd = (
+            (amplitude * x).sum(-1)
+            for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle))
+        )
         X = 1.0 + np.arange(len(model.BASE_PARAMETERS)) / 4
         tau = model.inverse_dynamics(q, qd, qdd, X) + 0.05 * generator.standard_normal(q.shape)
     header = ",".join(["t", *(f"{name}{j + 1}" for name in ("q", "tau") for j in range(n))])
-    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", fmt="%.12g")
+    np.savetxt(
+        path, np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", fmt="%.12g"
+    )
 
 
 class Job:
-    """One command, in a version `old` and a version `new` that write the same files; OUT stands for the folder they write into."""
+    """One command, in a version `old` and a version `new` that write the same files; OUT stands for
+    the folder they write into.
+    """
 
-    def __init__(self, folder: Path, verb: str, old: Sequence[str], new: Sequence[str], code: str = MAIN) -> None:
-        self.folder, self.verb, self.arguments, self.code = folder, verb, {"old": old, "new": new}, code
+    def __init__(
+        self, folder: Path, verb: str, old: Sequence[str], new: Sequence[str], code: str = MAIN
+    ) -> None:
+        self.folder, self.verb, self.arguments, self.code = (
+            folder,
+            verb,
+            {"old": old, "new": new},
+            code,
+        )
 
     def start(self, which: str, out: Path) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-c", self.code, self.verb, *(a.replace("OUT", out.name) for a in self.arguments[which])]
+        command = [
+            sys.executable,
+            "-c",
+            self.code,
+            self.verb,
+            *(a.replace("OUT", out.name) for a in self.arguments[which]),
+        ]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        return subprocess.Popen(command, cwd=self.folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        return subprocess.Popen(
+            command,
+            cwd=self.folder,
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
 
     def run(self, which: str, out: Path) -> int:
         process = self.start(which, out)
@@ -102,14 +137,25 @@ def jobs(folder: Path) -> dict[str, Job]:
     for which, gravity in (("old", "9.81"), ("new", "9.80665")):
         (folder / which).mkdir()
         (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
-        (folder / which / "loop.yaml").write_text(LOOP.replace("KP", "140" if which == "old" else "160.18"), encoding="utf-8")
+        (folder / which / "loop.yaml").write_text(
+            LOOP.replace("KP", "140" if which == "old" else "160.18"), encoding="utf-8"
+        )
     out = ["-o", "OUT"]
     pairs = {which: [ROBOT, f"{which}.csv", *out] for which in ("old", "new")}
-    robots = {which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp", *out] for which in pairs}
-    study = {which: [*pairs[which], "--delta", "2*pi/5000", "--delta", "2*pi/1000", "--runs", "150"] for which in pairs}
+    robots = {
+        which: [f"{which}/arm.yaml", "emps", "--target", "numpy,casadi,c,xp", *out]
+        for which in pairs
+    }
+    study = {
+        which: [*pairs[which], "--delta", "2*pi/5000", "--delta", "2*pi/1000", "--runs", "150"]
+        for which in pairs
+    }
     axis = {which: ["emps", f"{which}-axis.csv", *out] for which in pairs}
     loops = {which: ["emps", f"{which}/loop.yaml", *out] for which in pairs}
-    search = {which: [ROBOT, "--starts", "1", "--seed", seed, *out] for which, seed in (("old", "1"), ("new", "2"))}
+    search = {
+        which: [ROBOT, "--starts", "1", "--seed", seed, *out]
+        for which, seed in (("old", "1"), ("new", "2"))
+    }
     other = {which: [f"{which}/arm.yaml", "OUT/other.yaml", "--force"] for which in pairs}
     return {
         "generate": Job(folder, "generate", **robots),
@@ -125,20 +171,31 @@ def jobs(folder: Path) -> dict[str, Job]:
 def digests(folder: Path) -> dict[str, str]:
     """SHA-256 of every file, hidden ones too, by its path."""
     found = sorted(path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in found}
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in found
+    }
 
 
 def judged(folder: Path, old: dict[str, str], new: dict[str, str]) -> str:
-    """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything else."""
+    """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything
+    else.
+    """
     if (folder / "notes.txt").read_text() != NOTE:
         raise RuntimeError("the user's file changed")
     found = digests(folder)
     shown = {name: digest for name, digest in found.items() if name in new}
-    waiting = {name.partition("/")[2]: digest for name, digest in found.items() if name.startswith(f"{FINISHED}/")}
+    waiting = {
+        name.partition("/")[2]: digest
+        for name, digest in found.items()
+        if name.startswith(f"{FINISHED}/")
+    }
     others = [
         name
         for name in found
-        if name not in new and name != "notes.txt" and name.partition("/")[0] not in (LOCK, UNFINISHED, FINISHED, "runs")
+        if name not in new
+        and name != "notes.txt"
+        and name.partition("/")[0] not in (LOCK, UNFINISHED, FINISHED, "runs")
     ]
     if others or set(shown) != set(new):
         raise RuntimeError(f"files {others} are left, {sorted(set(new) - set(shown))} are missing")
@@ -161,7 +218,11 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
     code = job.run("new", fresh)
     duration = time.monotonic() - begin
     old, new = digests(base), digests(fresh)
-    if old.keys() != new.keys() or any(old[name] == new[name] for name in new if name != "study.yaml" and not name.startswith("emps")):
+    if old.keys() != new.keys() or any(
+        old[name] == new[name]
+        for name in new
+        if name != "study.yaml" and not name.startswith("emps")
+    ):
         raise RuntimeError("the two runs write other files, or the same")
     writing = write_time(job, base)
     counts: Counter[str] = Counter()
@@ -184,14 +245,27 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
             counts["with runs to go on from"] += 1
         counts[state] += 1
         counts["while writing"] += (out / UNFINISHED).exists() or (out / FINISHED).exists()
-        if job.run("new", out) != code or digests(out) != new | {"notes.txt": hashlib.sha256(NOTE.encode()).hexdigest()}:
-            raise RuntimeError(f"the rerun differs: {sorted(set(digests(out).items()) ^ set(new.items()))}")
-    print(f"{job.verb:<10}{kills} kills in runs of {duration:.2f} s, of which writing {1000 * writing:.0f} ms:", dict(counts), flush=True)
+        if job.run("new", out) != code or digests(out) != new | {
+            "notes.txt": hashlib.sha256(NOTE.encode()).hexdigest()
+        }:
+            raise RuntimeError(
+                f"the rerun differs: {sorted(set(digests(out).items()) ^ set(new.items()))}"
+            )
+    print(
+        (
+            f"{job.verb:<10}{kills} kills in runs of {duration:.2f} s, of which writing "
+            f"{1000 * writing:.0f} ms:"
+        ),
+        dict(counts),
+        flush=True,
+    )
     return counts
 
 
 def write_time(job: Job, base: Path) -> float:
-    """s from the appearance of the folder of unfinished files to the disappearance of that of finished ones."""
+    """s from the appearance of the folder of unfinished files to the disappearance of that of
+    finished ones.
+    """
     out = job.folder / f"{job.verb}-timed"
     shutil.copytree(base, out)
     process = job.start("new", out)
@@ -206,7 +280,9 @@ def write_time(job: Job, base: Path) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("verbs", nargs="*", metavar="VERB")
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)

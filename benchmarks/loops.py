@@ -1,13 +1,19 @@
-"""Robots with loops: cost of generation, operations, speed of the regressor, Newton passes of general loops.
+"""Robots with loops: cost of generation, operations, speed of the regressor, Newton passes of
+general loops.
 
     python benchmarks/loops.py [--rounds 7]
 
-1  CPU time of derivation + regrouping + text against `import sympy` in a fresh process (goal: at most 1.0 for parallelograms)
-2  multiplications and additions in inertial parameters (with Ia for the regressor) against the limits of the regrouping theory, section 6
-3  regressor on 7103 samples, CPU time per emitted operation against the serial TX40's (goal: at most 1.5); operations are
-   multiplications, additions, sines and cosines of the header, all columns. General loops: closure by Newton included, and their closure alone
-4  Newton passes per sample on a smooth record, those of the samples followed from `start` included (goal: at most 5). A pass is an
-   evaluation of `_closure_block` with a step; the evaluation that finds the loops closed is none
+1  CPU time of derivation + regrouping + text against `import sympy` in a fresh process (goal: at
+most 1.0 for parallelograms)
+2  multiplications and additions in inertial parameters (with Ia for the regressor) against the
+limits of the regrouping theory, section 6
+3  regressor on 7103 samples, CPU time per emitted operation against the serial TX40's (goal: at
+most 1.5); operations are
+   multiplications, additions, sines and cosines of the header, all columns. General loops: closure
+   by Newton included, and their closure alone
+4  Newton passes per sample on a smooth record, those of the samples followed from `start` included
+(goal: at most 5). A pass is an
+   evaluation of `_linearised_closure_block` with a step; the evaluation that finds the loops closed is none
 """
 
 # ruff: noqa: E402
@@ -32,8 +38,7 @@ from rounds import interleave, processor, ratio
 from symgen.derive.loops import close
 from symgen.description import load_robot
 from symgen.emit.numpy_target import render
-from symgen.emit.printers import Text
-from symgen.emit.spec import ModuleSpec, inverse_dynamics, is_inertial, is_inertial_or_actuator, module_spec, regressor_program
+from symgen.emit.spec import ModuleSpec, function, is_inertial, is_inertial_or_actuator, module_spec
 from symgen.regroup.regrouping import regroup
 
 PARALLELOGRAMS, GENERAL, SERIAL = ("haptic", "sr400"), ("four_bar", "five_bar"), "tx40"
@@ -60,11 +65,13 @@ def operations(specs: dict[str, ModuleSpec]) -> None:
     for name, (limit, limit_torques) in LIMITS.items():
         regrouping = specs[name].regrouping
         robot = regrouping.robot
-        _, program = regressor_program(regrouping, tuple(filter(is_inertial_or_actuator(robot), regrouping.own)))
-        mul, add = Text(program.outputs, program.sections, ()).operations
-        model = inverse_dynamics(regrouping, is_inertial(robot))
+        mul, add = function(regrouping, "regressor", is_inertial_or_actuator(robot)).operations
+        torques = function(regrouping, "inverse_dynamics", is_inertial(robot)).operations
         print(f"  {name:10} regressor {mul} / {add} ({limit[0]} / {limit[1]})", end="")
-        print(f"   inverse dynamics {model.mul} / {model.add} ({limit_torques[0]} / {limit_torques[1]})")
+        print(
+            f"   inverse dynamics {torques[0]} / {torques[1]} ({limit_torques[0]} / "
+            f"{limit_torques[1]})"
+        )
 
 
 def record(module: ModuleType) -> States:
@@ -73,7 +80,11 @@ def record(module: ModuleType) -> States:
     t = np.linspace(0.0, 10.0, SAMPLES)[:, None]
     w, phase = 2.1 + 0.7 * np.arange(n), 0.3 * np.arange(n)
     centre = np.array(module._START[:n]) if hasattr(module, "_START") else np.zeros(n)
-    return centre + 0.6 * np.sin(w * t + phase), 0.6 * w * np.cos(w * t + phase), -0.6 * w**2 * np.sin(w * t + phase)
+    return (
+        centre + 0.6 * np.sin(w * t + phase),
+        0.6 * w * np.cos(w * t + phase),
+        -0.6 * w**2 * np.sin(w * t + phase),
+    )
 
 
 def speed(modules: dict[str, ModuleType], specs: dict[str, ModuleSpec], rounds: int) -> None:
@@ -91,12 +102,18 @@ def speed(modules: dict[str, ModuleType], specs: dict[str, ModuleSpec], rounds: 
         per = [t / SAMPLES * 1e9 for t in row]
         text = f"  {name:18} {statistics.median(per):8.1f} ns/sample"
         if name in weight:
-            text += f"  {weight[name]:5} operations  {statistics.median(per) / weight[name]:6.2f} ns each"
+            text += (
+                f"  {weight[name]:5} operations  {statistics.median(per) / weight[name]:6.2f} "
+                "ns each"
+            )
         print(text)
     per_operation = {name: [t / weight[name] for t in times[name]] for name in weight}
     for name in weight:
         if name != SERIAL:
-            print(f"  time per operation, {name + ' / ' + SERIAL:20} {ratio(per_operation, name, SERIAL)}")
+            print(
+                f"  time per operation, {name + ' / ' + SERIAL:20} "
+                f"{ratio(per_operation, name, SERIAL)}"
+            )
 
 
 def _regressor(module: ModuleType, states: States) -> Callable[[], object]:
@@ -109,9 +126,11 @@ def _closed(module: ModuleType, states: States) -> Callable[[], object]:
 
 
 def newton_passes(module: ModuleType, q: Array) -> tuple[float, int]:
-    """Passes per sample on the whole, and those that the samples themselves needed from their first guess."""
+    """Passes per sample on the whole, and those that the samples themselves needed from their first
+    guess.
+    """
     passes: list[tuple[int, int]] = []
-    newton, block = module._newton, module._closure_block
+    newton, block = module._newton, module._linearised_closure_block
     evaluations = [0]
 
     def counted_block(*arguments: Array) -> None:
@@ -124,9 +143,9 @@ def newton_passes(module: ModuleType, q: Array) -> tuple[float, int]:
         passes.append((len(states), evaluations[0] - 1))  # up to 8192 samples: one block
         return result
 
-    module._closure_block, module._newton = counted_block, counted_newton  # type: ignore[attr-defined]
+    module._linearised_closure_block, module._newton = counted_block, counted_newton  # type: ignore[attr-defined]
     module.passive_joints(q)
-    module._closure_block, module._newton = block, newton  # type: ignore[attr-defined]
+    module._linearised_closure_block, module._newton = block, newton  # type: ignore[attr-defined]
     return sum(size * count for size, count in passes) / len(q), passes[-1][1]
 
 
@@ -135,14 +154,21 @@ def crank_turning(turns: float) -> Array:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--rounds", type=int, default=7)
     rounds = parser.parse_args().rounds
     load, core = os.getloadavg(), max(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {core})
-    print(f"{processor()}, numpy {np.__version__}, load {load[0]:.1f}; CPU time on one core, {rounds} rounds")
+    print(
+        f"{processor()}, numpy {np.__version__}, load {load[0]:.1f}; CPU time on one core, "
+        f"{rounds} rounds"
+    )
     generation_cost(rounds)
-    specs = {name: module_spec(regroup(load_robot(name))) for name in (SERIAL, *PARALLELOGRAMS, *GENERAL)}
+    specs = {
+        name: module_spec(regroup(load_robot(name))) for name in (SERIAL, *PARALLELOGRAMS, *GENERAL)
+    }
     operations(specs)
     with TemporaryDirectory() as folder:
         modules = {}

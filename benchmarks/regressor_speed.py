@@ -1,17 +1,23 @@
-"""Speed of an emitted regressor against pinocchio's computeJointTorqueRegressor called in a Python loop.
+"""Speed of an emitted regressor against pinocchio's computeJointTorqueRegressor called in a Python
+loop.
 
-    python benchmarks/regressor_speed.py [--robots tx40 panda] [--modules generated] [--rounds 9] [--large 1000000]
+    python benchmarks/regressor_speed.py [--robots tx40 panda] [--modules generated] [--rounds 9]
+    [--large 1000000]
 
-One process pinned to one core, one BLAS thread, CPU time. Before timing, every entry of pinocchio's regressor (standard inertial
-columns) is compared with D K, K = d base_parameters / d standard. Each round runs every contender once, in rotated order and each
-for about the same time; the ratio is taken per round and given as median [range]. All write into buffers already in use:
+One process pinned to one core, one BLAS thread, CPU time. Before timing, every entry of pinocchio's
+regressor (standard inertial
+columns) is compared with D K, K = d base_parameters / d standard. Each round runs every contender
+once, in rotated order and each
+for about the same time; the ratio is taken per round and given as median [range]. All write into
+buffers already in use:
 
     emitted      regressor(q, qd, qdd, out=store)                all base columns, then those of the inertial parameters and Ia alone
     pinocchio    W[k] = computeJointTorqueRegressor(...)         10 standard columns per link; the product to base columns is not counted
     calls        the same calls without keeping the result
     fill         the same store filled with a constant; `nonzero`: only its rows that are not identically zero
 
-Then the time per sample at a large N against the small one, and the peak memory of a call without a store: at most W + 64 MB.
+Then the time per sample at a large N against the small one, and the peak memory of a call without a
+store: at most W + 64 MB.
 """
 
 # ruff: noqa: E402
@@ -68,7 +74,9 @@ class PinocchioLoop:
 
     def __init__(self, oracle: PinocchioModel, states: States) -> None:
         if oracle.rows != list(range(len(states[0].T))):
-            raise SystemExit(f"{oracle.robot.name}: the loop takes serial robots without fixed frames")
+            raise SystemExit(
+                f"{oracle.robot.name}: the loop takes serial robots without fixed frames"
+            )
         self.model, self.data, self.states = oracle.model, oracle.data, states
         self.W = np.zeros((len(states[0]), len(oracle.rows), 10 * len(oracle.rows)))
 
@@ -84,13 +92,18 @@ class PinocchioLoop:
 
 
 def compare(module: ModuleType, oracle: PinocchioModel, D: Array, W: Array) -> float:
-    """Largest defect of pinocchio's columns against D K, relative to each column's maximum (floor: 1e-3 of W's)."""
+    """Largest defect of pinocchio's columns against D K, relative to each column's maximum (floor:
+    1e-3 of W's).
+    """
     names = list(module.STANDARD_PARAMETERS)
     K = np.array([module.base_parameters(unit) for unit in np.eye(len(names))]).T  # X = K chi
     worst = 0.0
     for (p, j), column in oracle.columns.items():
         ours, theirs = D @ K[:, names.index(f"{p}{j}")], W[:, :, column]
-        worst = max(worst, float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-3 * np.abs(W).max())))
+        worst = max(
+            worst,
+            float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-3 * np.abs(W).max())),
+        )
     return worst
 
 
@@ -108,7 +121,9 @@ def without_friction(robot: Robot) -> ModuleType:
     inertia = tuple(e for e in robot.elements if e.kind == "inertia")
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"{robot.name}.py"
-        path.write_text(generate_module(replace(robot, elements=inertia, values={})), encoding="utf-8")
+        path.write_text(
+            generate_module(replace(robot, elements=inertia, values={})), encoding="utf-8"
+        )
         return load_module(path)
 
 
@@ -119,8 +134,13 @@ def small(title: str, robot: Robot, module: ModuleType, rounds: int) -> None:
     loop()
     defect = compare(module, oracle, module.regressor(*states, out=out), loop.W)
     N, n, b = module.regressor(*states, out=out).shape
-    print(f"\n{title}: {N} samples, {n} joints, {b} base columns ({int(np.sum(module.STRUCTURE))} of {n * b} entries not zero)")
-    print(f"  largest defect against pinocchio, all {loop.W.size} entries: {defect:.1e} of the column")
+    print(
+        f"\n{title}: {N} samples, {n} joints, {b} base columns ({int(np.sum(module.STRUCTURE))} of "
+        f"{n * b} entries not zero)"
+    )
+    print(
+        f"  largest defect against pinocchio, all {loop.W.size} entries: {defect:.1e} of the column"
+    )
     if defect > TOLERANCE:
         raise SystemExit(f"{title}: the regressors differ; nothing was timed")
     plain = np.ones((b, n, N))
@@ -135,7 +155,12 @@ def small(title: str, robot: Robot, module: ModuleType, rounds: int) -> None:
     times = interleave(contenders, rounds)
     for key, row in times.items():
         print(f"  {key:10} {1e9 * statistics.median(row) / N:9.1f} ns/sample")
-    for above, below in (("pinocchio", "emitted"), ("calls", "emitted"), ("emitted", "fill"), ("emitted", "nonzero")):
+    for above, below in (
+        ("pinocchio", "emitted"),
+        ("calls", "emitted"),
+        ("emitted", "fill"),
+        ("emitted", "nonzero"),
+    ):
         print(f"  {above + ' / ' + below:22} {ratio(times, above, below)}")
 
 
@@ -148,30 +173,48 @@ def large(name: str, module: ModuleType, N: int, rounds: int) -> None:
     tracemalloc.stop()
     verdict = "" if peak <= W + MEMORY else "   MORE THAN ALLOWED"
     print(
-        f"\n{name}: {N} samples without a store: peak {peak / 1e6:.0f} MB, W {W / 1e6:.0f} MB, beside it {(peak - W) / 1e6:.1f} MB{verdict}"
+        f"\n{name}: {N} samples without a store: peak {peak / 1e6:.0f} MB, W {W / 1e6:.0f} MB, "
+        f"beside it {(peak - W) / 1e6:.1f} MB{verdict}"
     )
     del D
     out, out_few = module.store(N), module.store(SAMPLES)
     module.regressor(*states, out=out)  # first touch of the pages
     times = interleave(
-        {"large": lambda: module.regressor(*states, out=out), "small": lambda: module.regressor(*few, out=out_few)}, rounds, spent=5 * SPENT
+        {
+            "large": lambda: module.regressor(*states, out=out),
+            "small": lambda: module.regressor(*few, out=out_few),
+        },
+        rounds,
+        spent=5 * SPENT,
     )
-    per_sample = {"large": [t / N for t in times["large"]], "small": [t / SAMPLES for t in times["small"]]}
+    per_sample = {
+        "large": [t / N for t in times["large"]],
+        "small": [t / SAMPLES for t in times["small"]],
+    }
     for key, row in per_sample.items():
         print(f"  {key:10} {1e9 * statistics.median(row):9.1f} ns/sample")
     print(f"  {'large / small':22} {ratio(per_sample, 'large', 'small')}")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--robots", nargs="+", default=["tx40", "panda"])
-    parser.add_argument("--modules", type=Path, default=ROOT / "generated", help="folder of the emitted modules")
+    parser.add_argument(
+        "--modules", type=Path, default=ROOT / "generated", help="folder of the emitted modules"
+    )
     parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--large", type=int, default=1_000_000, help="samples of the large run; 0 leaves it out")
+    parser.add_argument(
+        "--large", type=int, default=1_000_000, help="samples of the large run; 0 leaves it out"
+    )
     settings = parser.parse_args()
     load, core = os.getloadavg(), max(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {core})
-    print(f"{processor()}, Python {platform.python_version()}, numpy {np.__version__}, pinocchio {pin.__version__}, load {load[0]:.1f}")
+    print(
+        f"{processor()}, Python {platform.python_version()}, numpy {np.__version__}, pinocchio "
+        f"{pin.__version__}, load {load[0]:.1f}"
+    )
     print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
     modules = {name: load_module(settings.modules / f"{name}.py") for name in settings.robots}
     for name, module in modules.items():

@@ -1,4 +1,6 @@
-"""Interleaved rounds: contenders run once in every round, in rotated order, each for about the same CPU time; ratios are taken per round."""
+"""Interleaved rounds: contenders run once in every round, in rotated order, each for about the same
+CPU time; ratios are taken per round.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +33,17 @@ def cpu(action: Callable[[], object], repeats: int, clock: Clock = time.process_
     return (clock() - start) / repeats
 
 
-def interleave(contenders: dict[str, Callable[[], object]], rounds: int, spent: float = SPENT, clock: Clock = time.process_time) -> Times:
+def interleave(
+    contenders: dict[str, Callable[[], object]],
+    rounds: int,
+    spent: float = SPENT,
+    clock: Clock = time.process_time,
+) -> Times:
     """CPU seconds of every contender in every round, order rotated from round to round."""
-    repeats = {name: max(1, round(spent / max(cpu(action, 1), 1e-6))) for name, action in contenders.items()}
+    repeats = {
+        name: max(1, round(spent / max(cpu(action, 1), 1e-6)))
+        for name, action in contenders.items()
+    }
     times: Times = {name: [] for name in contenders}
     names = list(contenders)
     for k in range(rounds):
@@ -49,4 +59,7 @@ def ratio(times: Times, above: str, below: str) -> str:
 
 def processor() -> str:
     text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
-    return next((line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")), platform.processor())
+    return next(
+        (line.split(":")[1].strip() for line in text.splitlines() if line.startswith("model name")),
+        platform.processor(),
+    )

@@ -1,6 +1,8 @@
-"""Slips that the verdict has to name, and right studies that it has to leave alone: `python benchmarks/slips.py ["kr300 values" ...] [FIRST-LAST]`.
+"""Slips that the verdict has to name, and right studies that it has to leave alone: `python
+benchmarks/slips.py ["kr300 values" ...] [FIRST-LAST]`.
 
-Prints one line per slip, and the counts that docs/guide/plausibility.md gives. SYMGEN_DATA is the folder of the records.
+Prints one line per slip, and the counts that docs/guide/plausibility.md gives. SYMGEN_DATA is the
+folder of the records.
 """
 
 from __future__ import annotations
@@ -24,7 +26,11 @@ def main(which: list[str]) -> None:
         if names and not any(word in name for word in names):
             continue
         result = case.judged()
-        usual = set() if isinstance(result, str) else {c.question for c in result.checks if c.state in ("no", "doubtful")}
+        usual = (
+            set()
+            if isinstance(result, str)
+            else {c.question for c in result.checks if c.state in ("no", "doubtful")}
+        )
         print(f"== {name}: right study told of {sorted(usual) or 'nothing'}", flush=True)
         counts = dict.fromkeys(("named", "wrong", "silent", "equivalent"), 0)
         for slip in listed:
@@ -33,7 +39,13 @@ def main(which: list[str]) -> None:
             start = time.process_time()
             state, text = slips.told(case, slip.change(case), slip, usual)
             counts[state] += 1
-            print(f"{name} {slip.number:3d} {slip.name:45s} {state:10s} {time.process_time() - start:5.1f} s  {text}", flush=True)
+            print(
+                (
+                    f"{name} {slip.number:3d} {slip.name:45s} {state:10s} "
+                    f"{time.process_time() - start:5.1f} s  {text}"
+                ),
+                flush=True,
+            )
         print(f"== {name}: {counts}", flush=True)
 
 

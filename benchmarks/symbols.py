@@ -1,10 +1,14 @@
-"""Closed forms and recursions of models as symbols: terms, characters, CPU seconds; beside the same recursion over SymPy matrices.
+"""Closed forms and recursions of models as symbols: terms, characters, CPU seconds; beside the same
+recursion over SymPy matrices.
 
     python benchmarks/symbols.py [--robots tx40] [--expand]
 
-The second way is that of SymPyBotics (sympybotics/dynamics/rne_khalil.py): Newton-Euler of Khalil over SymPy matrices, a column of A for each unit
-acceleration, nothing simplified. It is written here from the equations, since SymPyBotics is on no package index and was written for an older SymPy.
---expand multiplies its result out by sympy.expand. Both ways have the same base parameters, and agree at a random state before anything is printed.
+The second way is that of SymPyBotics (sympybotics/dynamics/rne_khalil.py): Newton-Euler of Khalil
+over SymPy matrices, a column of A for each unit
+acceleration, nothing simplified. It is written here from the equations, since SymPyBotics is on no
+package index and was written for an older SymPy.
+--expand multiplies its result out by sympy.expand. Both ways have the same base parameters, and
+agree at a random state before anything is printed.
 """
 
 from __future__ import annotations
@@ -29,7 +33,9 @@ def number(e: object) -> sympy.Expr:
     return sympy.sympify(str(e), locals={s: real(s) for s in e.symbols}, rational=True)  # type: ignore[attr-defined]
 
 
-def torques(robot: Robot, K: dict[str, sympy.Expr], qdd: dict[int, int], gravity: bool) -> sympy.Matrix:
+def torques(
+    robot: Robot, K: dict[str, sympy.Expr], qdd: dict[int, int], gravity: bool
+) -> sympy.Matrix:
     """Gamma of a robot without loops at rest, by Newton and Euler over SymPy matrices."""
     z, zero = sympy.Matrix([0, 0, 1]), sympy.zeros(3, 1)
     g = sympy.Matrix([number(e) for e in robot.gravity]) if gravity else zero
@@ -39,10 +45,15 @@ def torques(robot: Robot, K: dict[str, sympy.Expr], qdd: dict[int, int], gravity
         theta = number(f.theta0) + (q if f.sigma == REVOLUTE else 0)
         r = number(f.r0) + (q if f.sigma == PRISMATIC else 0)
         A = sympy.rot_axis3(-number(f.gamma)) * sympy.rot_axis1(-number(f.alpha))
-        R[j], P[j] = A * sympy.rot_axis3(-theta), A * sympy.Matrix([number(f.d), 0, r]) + number(f.b) * z
+        R[j], P[j] = (
+            A * sympy.rot_axis3(-theta),
+            A * sympy.Matrix([number(f.d), 0, r]) + number(f.b) * z,
+        )
         wd[j] = R[j].T * wd[i] + (qdd.get(j, 0) * z if f.sigma == REVOLUTE else zero)
         a[j] = R[j].T * (a[i] + U[i] * P[j]) + (qdd.get(j, 0) * z if f.sigma == PRISMATIC else zero)
-        U[j] = sympy.Matrix([[0, -wd[j][2], wd[j][1]], [wd[j][2], 0, -wd[j][0]], [-wd[j][1], wd[j][0], 0]])
+        U[j] = sympy.Matrix(
+            [[0, -wd[j][2], wd[j][1]], [wd[j][2], 0, -wd[j][0]], [-wd[j][1], wd[j][0], 0]]
+        )
     force, moment, result = {}, {}, {}
     for f in reversed(robot.frames):
         j, i = f.j, f.ant
@@ -75,7 +86,9 @@ def value(matrix: sympy.Matrix, at: dict[sympy.Symbol, float]) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--robots", nargs="+", default=["tx40"])
     parser.add_argument("--expand", action="store_true")
     arguments = parser.parse_args()
@@ -86,7 +99,8 @@ def main() -> None:
             start = time.process_time()
             listed = symbolic(load_robot(name)).show(form, form="recursive")
             print(
-                f"  recursion with regrouping  {form:18} {len(listed.splitlines()):7} lines {len(listed):9} {time.process_time() - start:8.2f}"
+                f"  recursion with regrouping  {form:18} {len(listed.splitlines()):7} lines "
+                f"{len(listed):9} {time.process_time() - start:8.2f}"
             )
         ours = {}
         for model, letter in (("inertia_matrix", "A"), ("gravity", "Q")):
@@ -96,25 +110,39 @@ def main() -> None:
             ours[letter] = models._sympy(model)
             total = time.process_time() - start
             upper = ours[letter].upper_triangular() if letter == "A" else ours[letter]
-            print(f"  symgen closed              {letter} {size:7} {len(str(upper)):9} {derived:8.2f}, as SymPy {total:8.2f}")
+            print(
+                f"  symgen closed              {letter} {size:7} {len(str(upper)):9} "
+                f"{derived:8.2f}, as SymPy {total:8.2f}"
+            )
         start = time.process_time()
         A, Q = by_matrices(models)
         seconds = time.process_time() - start
         rng = np.random.default_rng(0)
         robot = models.source.robot
         at = {
-            real(x): float(rng.uniform(0.2, 1.2)) for x in (*robot.constants, *(f"q{j}" for j in robot.joints), *models.source.parameters)
+            real(x): float(rng.uniform(0.2, 1.2))
+            for x in (*robot.constants, *(f"q{j}" for j in robot.joints), *models.source.parameters)
         }
-        offsets = {real(name): 0.0 for own, name in models.source.own.items() if not own.startswith(INERTIAL)}  # links alone
+        offsets = {
+            real(name): 0.0
+            for own, name in models.source.own.items()
+            if not own.startswith(INERTIAL)
+        }  # links alone
         for mine, theirs in ((ours["A"], A), (ours["Q"], Q)):
-            assert np.allclose(value(mine, at | offsets), value(theirs, at | offsets), rtol=1e-11, atol=1e-12)
+            assert np.allclose(
+                value(mine, at | offsets), value(theirs, at | offsets), rtol=1e-11, atol=1e-12
+            )
         for letter, matrix in (("A", A.upper_triangular()), ("Q", Q)):
-            print(f"  SymPy matrices             {letter} {terms(matrix):7} {len(str(matrix)):9} {seconds:8.2f} (A and Q)")
+            print(
+                f"  SymPy matrices             {letter} {terms(matrix):7} {len(str(matrix)):9} "
+                f"{seconds:8.2f} (A and Q)"
+            )
             if arguments.expand:
                 start = time.process_time()
                 expanded = matrix.applyfunc(sympy.expand)
                 print(
-                    f"  the same, expanded         {letter} {terms(expanded):7} {len(str(expanded)):9} {time.process_time() - start:8.2f} more"
+                    f"  the same, expanded         {letter} {terms(expanded):7} "
+                    f"{len(str(expanded)):9} {time.process_time() - start:8.2f} more"
                 )
 
 

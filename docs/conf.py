@@ -1,4 +1,5 @@
-"""The documentation site: `sphinx-build -W -n docs docs/_build` (pip install '.[docs]'). It reads no network, and neither do its pages.
+"""The documentation site: `sphinx-build -W -n docs docs/_build` (pip install '.[docs]'). It reads
+no network, and neither do its pages.
 
 Its reference pages are written by docs/write_reference.py beforehand; the gallery is made here.
 """

@@ -1,7 +1,10 @@
-"""Write the pages of docs/reference, docs/guide/examples.md and docs/api from the program: `python docs/write_reference.py`.
+"""Write the pages of docs/reference, docs/guide/examples.md and docs/api from the program: `python
+docs/write_reference.py`.
 
-Text between `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->` of a page is made by the function NAME; pages of docs/api beside its index are made
-whole, one for each room. `--check` writes nothing, names the pages that are not current and ends with exit code 1 where there is one.
+Text between `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->` of a page is made by the
+function NAME; pages of docs/api beside its index are made
+whole, one for each room. `--check` writes nothing, names the pages that are not current and ends
+with exit code 1 where there is one.
 """
 
 from __future__ import annotations
@@ -18,7 +21,10 @@ import api  # noqa: E402
 import notebooks  # noqa: E402
 import reference  # noqa: E402
 
-MARK = re.compile(r"^<!-- generated: (?P<name>\w+)(?: (?P<argument>[\w.]+))? -->\n.*?^<!-- end -->$", re.MULTILINE | re.DOTALL)
+MARK = re.compile(
+    r"^<!-- generated: (?P<name>\w+)(?: (?P<argument>[\w.]+))? -->\n.*?^<!-- end -->$",
+    re.MULTILINE | re.DOTALL,
+)
 SOURCES: dict[str, Callable[..., str]] = {
     "commands": reference.commands,
     "contents": api.contents,
@@ -44,10 +50,17 @@ def filled(text: str) -> str:
 
 
 def tidy(text: str) -> str:
-    """Without blanks at the ends of lines and, outside of code, without more than one empty line in a row."""
+    """Without blanks at the ends of lines and, outside of code, without more than one empty line in
+    a row.
+    """
     text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
     parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
-    return "".join(part if k % 2 else re.sub(r"\n{3,}", "\n\n", part) for k, part in enumerate(parts)).strip() + "\n"
+    return (
+        "".join(
+            part if k % 2 else re.sub(r"\n{3,}", "\n\n", part) for k, part in enumerate(parts)
+        ).strip()
+        + "\n"
+    )
 
 
 def pages() -> Iterator[tuple[Path, str]]:
@@ -61,10 +74,14 @@ def pages() -> Iterator[tuple[Path, str]]:
 
 
 def outdated() -> dict[Path, str | None]:
-    """{path: text it should have, None where it should not be} of every page that is not current."""
+    """{path: text it should have, None where it should not be} of pages that are not current."""
     expected: dict[Path, str | None] = dict(pages())
     expected |= {path: None for path in (DOCS / "api").glob("*.md") if path not in expected}
-    return {path: text for path, text in expected.items() if text != (path.read_text(encoding="utf-8") if path.is_file() else None)}
+    return {
+        path: text
+        for path, text in expected.items()
+        if text != (path.read_text(encoding="utf-8") if path.is_file() else None)
+    }
 
 
 def main() -> None:
@@ -72,7 +89,9 @@ def main() -> None:
     for path, text in stale.items():
         if "--check" not in sys.argv:
             path.write_text(text, encoding="utf-8") if text is not None else path.unlink()
-        print(f"{path.relative_to(DOCS.parent)}{' is not current' if '--check' in sys.argv else ''}")
+        print(
+            f"{path.relative_to(DOCS.parent)}{' is not current' if '--check' in sys.argv else ''}"
+        )
     if "--check" in sys.argv and stale:
         sys.exit("run python docs/write_reference.py")
 

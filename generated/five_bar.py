@@ -1,6 +1,16 @@
-"""Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor, dynamics.
+# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+# with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
+# states, parameters and random constants agree with Lagrange's equations and products of frames
+# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
+# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
+# VALUES, HEADER, DEFAULTS with the robot file.
+# sha256 of what follows: 361544bd160672ea58a6b870391c252932a4e275e3903913b1b96190d9363c8b
+"""Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor,
+    dynamics.
 
-GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.2.0. Do not edit; symgen generate five_bar
+GENERATED from five_bar.yaml, sha256 2b4cc8e44743, by symgen 0.2.0.
+Do not edit; symgen generate five_bar
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha   d  theta  r
@@ -11,28 +21,28 @@ Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JO
     5    2   0      0      0  L2     q5  0
     6    4   0      2      0  L4      0  0
 Gravity     acceleration (0, -g, 0) in frame 0, m/s**2
-Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
-Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd +
+            FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
+            MZ first moments
 Element     Ia      inertia: along q1, q3
 Element     FV      viscous: along q1, q3
 Element     FS      coulomb: along q1, q3
 Element     OFFSET  offset: along q1, q3
 Loop        frame 6 coincides with cut frame 5
 Loop        q5 = -q1 - q2 + q3 + q4
-Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 = -1.464, q4 = 1.489
+Loop        q2, q4 from the closure equations by Newton; assembly mode of q1 = 2.2, q3 = 0.9, q2 =
+            -1.464, q4 = 1.489
 
-Base parameters, 17 of 48; Gautier and Khalil (1990), exact over F_p
-    ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
-    MX1R = MX1 + L1*M2 + L1/L4*MX4
-    ZZ2R = ZZ2 + L2**2/L4*MX4
-    MX2R = MX2 + L2/L4*MX4
-    ZZ3R = ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4
-    MX3R = MX3 - L3/L4*MX4 + L3*M4
-    ZZ4R = ZZ4 - L4*MX4
-    as they are: MY1 FV1 FS1 OFFSET1 MY2 MY3 FV3 FS3 OFFSET3 MY4
-No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4 MZ4
+Base parameters, 17 of 48; Gautier and Khalil (1990)
+    exact over F_p
+    FORMULAS says what they are made of; what it leaves out is as it is
+    No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4
+        XZ4 YY4 YZ4 MZ4
 
-Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
+            part that several share, N16a of N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -54,16 +64,17 @@ Names       family, then component digits, then link: W12 is component 1 of link
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor         38 multiplications, 22 additions, 4 sin, 4 cos
-    inverse_dynamics  49 multiplications, 36 additions, 4 sin, 4 cos
-    inertia_matrix    27 multiplications, 17 additions, 2 sin, 1 cos
-    bias              45 multiplications, 30 additions, 4 sin, 4 cos
-    gravity           21 multiplications, 14 additions, 4 sin, 4 cos
-    frame_poses       8 multiplications, 7 additions, 4 sin, 4 cos
-    closure           8 multiplications, 10 additions, 4 sin, 4 cos
-    curvature         24 multiplications, 10 additions, 4 sin, 4 cos
+    regressor          38 multiplications, 22 additions, 4 sin, 4 cos
+    inverse_dynamics   49 multiplications, 36 additions, 4 sin, 4 cos
+    inertia_matrix     27 multiplications, 17 additions, 2 sin, 1 cos
+    bias               45 multiplications, 30 additions, 4 sin, 4 cos
+    gravity            21 multiplications, 14 additions, 4 sin, 4 cos
+    frame_poses        8 multiplications, 7 additions, 4 sin, 4 cos
+    linearised_closure 8 multiplications, 10 additions, 4 sin, 4 cos
+    curvature          24 multiplications, 10 additions, 4 sin, 4 cos
 
-Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then have no axis of samples; rad or m and seconds
+Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then have no axis
+            of samples; rad or m and seconds
             X of shape (17,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
@@ -75,37 +86,35 @@ SOURCE_SHA256 = '2b4cc8e4474326a906119102db0f1bf535a90a4786fa82f82d634d09856e330
 JOINTS = (1, 3)
 PASSIVE = (2, 4, 5)
 CONSTANTS = {'L0': 0.2, 'L1': 0.25, 'L2': 0.36, 'L3': 0.27, 'L4': 0.34, 'g': 9.81}
-BASE_PARAMETERS = (
-    'ZZ1R', 'MX1R', 'MY1', 'FV1', 'FS1', 'OFFSET1', 'ZZ2R', 'MX2R', 'MY2', 'ZZ3R', 'MX3R', 'MY3', 'FV3', 'FS3',
-    'OFFSET3', 'ZZ4R', 'MY4',
-)
-STANDARD_PARAMETERS = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
-    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'XX3', 'XY3', 'XZ3', 'YY3', 'YZ3', 'ZZ3', 'MX3', 'MY3',
-    'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4',
-)
-UNITS = {
-    'ZZ1R': 'kg*m**2', 'MX1R': 'kg*m', 'MY1': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
-    'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3': 'kg*m',
-    'FV3': 'N*m*s/rad', 'FS3': 'N*m', 'OFFSET3': 'N*m', 'ZZ4R': 'kg*m**2', 'MY4': 'kg*m',
-}
+BASE_PARAMETERS = tuple("""
+ZZ1R MX1R MY1 FV1 FS1 OFFSET1 ZZ2R MX2R MY2 ZZ3R MX3R MY3 FV3 FS3 OFFSET3 ZZ4R MY4
+""".split())
+STANDARD_PARAMETERS = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1 Ia1 FV1 FS1 OFFSET1 XX2 XY2 XZ2 YY2 YZ2 ZZ2 MX2 MY2 MZ2 M2
+XX3 XY3 XZ3 YY3 YZ3 ZZ3 MX3 MY3 MZ3 M3 Ia3 FV3 FS3 OFFSET3 XX4 XY4 XZ4 YY4 YZ4 ZZ4 MX4 MY4 MZ4 M4
+""".split())
+NO_EFFECT = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4
+MZ4
+""".split())
 FORMULAS = {
-    'ZZ1R': 'ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4', 'MX1R': 'MX1 + L1*M2 + L1/L4*MX4', 'MY1': 'MY1', 'FV1': 'FV1',
-    'FS1': 'FS1', 'OFFSET1': 'OFFSET1', 'ZZ2R': 'ZZ2 + L2**2/L4*MX4', 'MX2R': 'MX2 + L2/L4*MX4', 'MY2': 'MY2',
-    'ZZ3R': 'ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4', 'MX3R': 'MX3 - L3/L4*MX4 + L3*M4', 'MY3': 'MY3', 'FV3': 'FV3',
-    'FS3': 'FS3', 'OFFSET3': 'OFFSET3', 'ZZ4R': 'ZZ4 - L4*MX4', 'MY4': 'MY4',
+    'ZZ1R': 'ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4',
+    'MX1R': 'MX1 + L1*M2 + L1/L4*MX4',
+    'ZZ2R': 'ZZ2 + L2**2/L4*MX4',
+    'MX2R': 'MX2 + L2/L4*MX4',
+    'ZZ3R': 'ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4',
+    'MX3R': 'MX3 - L3/L4*MX4 + L3*M4',
+    'ZZ4R': 'ZZ4 - L4*MX4',
 }
-NO_EFFECT = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2', 'XX3', 'XY3', 'XZ3',
-    'YY3', 'YZ3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'MZ4',
-)
-STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
-    "x.", "x.", "x.", "x.", "x.", "x.", "xx", "xx", "xx", ".x", ".x", ".x", ".x", ".x", ".x", "xx", "xx",
+UNITS = dict(zip(BASE_PARAMETERS, tuple("""
+kg*m**2 kg*m kg*m N*m*s/rad N*m N*m kg*m**2 kg*m kg*m kg*m**2 kg*m kg*m N*m*s/rad N*m N*m kg*m**2
+kg*m
+""".split())))
+# STRUCTURE[k, j]: whether base parameter k acts on joint j
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (
+    "x.", "x.", "x.", "x.", "x.", "x.", "xx", "xx", "xx", ".x", ".x", ".x", ".x", ".x", ".x", "xx",
+    "xx",
 )])
-DRIVES = None
-LIMITS = {}
-VALUES = {}
-LINKS = (1, 2, 3, 4)
 _START = (2.2, 0.9, -1.4637535910825177, 1.4891269023374534)
 _MODE = -1.0  # sign of det J_u in the assembly mode of _START
 
@@ -120,28 +129,43 @@ class Store(np.ndarray):
 
 
 def store(N: int) -> Store:
-    """Room for N samples, shape (17, 2, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
-    S = np.zeros((17, 2, N)).view(Store)
-    S[5, 0] = S[14, 1] = 1.0
-    S.ready = True
-    return S
+    """Room for N samples, shape (17, 2, N): zeros and constants are written here, once.
+    Reuse it: a fresh one costs page faults.
+    """
+    zeros = np.zeros((17, 2, N)).view(Store)
+    zeros[5, 0] = zeros[14, 1] = 1.0
+    zeros.ready = True
+    return zeros
 
 
 def _states(*arrays):
-    """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape (N, 2), or all (2,)."""
+    """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape
+    (N, 2), or all (2,).
+    """
     states = [np.asarray(x, dtype=float) for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (2,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
-        raise ValueError(f"states of shape {shapes}; expected (N, 2) each, or (2,) each for one state")
+        raise ValueError(f"states of shape {shapes}; expected (N, 2) each, or (2,) each")
     return tuple([x.reshape(-1, 2) for x in states])
 
 
+def _parameters(X):
+    """X as an array; ValueError unless it has a value for each base parameter."""
+    X = np.asarray(X, dtype=float)
+    if X.shape != (17,):
+        raise ValueError(f"X of shape {X.shape}; expected (17,) in the order of BASE_PARAMETERS")
+    return X
+
+
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+    (..., B), result ends in samples.
+    """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
-        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
+        block(*rows, result[..., t:t + B], *arguments)
 
 
 def _by_sample(result, q):
@@ -151,12 +175,16 @@ def _by_sample(result, q):
 
 
 def elements(
-    *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
 ) -> dict:
-    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
+    {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
+    """
     return {
-        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
+        'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
+        'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
         'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
     }
 
@@ -165,15 +193,18 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
-    g: float = 9.81
+    standard: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """X, shape (17,), from the 48 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    """X, shape (17,), from the 48 standard parameters: a mapping by name, or a vector in the
+    order of STANDARD_PARAMETERS.
+    """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _, M2, _, _, _, _, _,
-        ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _, ZZ4, MX4, MY4, _, M4
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
+        MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _,
+        ZZ4, MX4, MY4, _, M4
     ) = standard
     ZZ1R = ZZ1 + Ia1 + L1**2*M2 + L1**2/L4*MX4
     MX1R = MX1 + L1*M2 + L1/L4*MX4
@@ -183,118 +214,158 @@ def base_parameters(
     MX3R = MX3 - L3/L4*MX4 + L3*M4
     ZZ4R = ZZ4 - L4*MX4
     return np.array([
-        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3, ZZ4R, MY4,
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
+        ZZ4R, MY4,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
 ) -> np.ndarray:
     """D of Gamma = D X. Shape (N, 2, 17).
 
-    A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
-    faults, up to several times the arithmetic for large N.
+    A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and
+    reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    D = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).transpose(2, 1, 0)
-    return D[0] if np.ndim(q) == 1 else D
+    filled = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).transpose(2, 1, 0)
+    return filled[0] if np.ndim(q) == 1 else filled
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
 ) -> np.ndarray:
-    """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same store, no copy."""
+    """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same
+    store, no copy.
+    """
     return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).reshape(17, -1).T
+
+
+def _ready(out, N):
+    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+    out = store(N) if out is None else out
+    if not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
+        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {kind}")
+    return out.view(np.ndarray)
 
 
 def _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g):
     """`out`, or a new store, filled."""
-    states = _closed(_states(q, qd, qdd), L0, L1, L2, L3, L4)
-    N = len(states[0])
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    D = out.view(np.ndarray)
-    _fill(_regressor_block, D, states, L1, L3, g)
-    return D
+    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = _ready(out, len(states[0]))
+    _fill(_regressor_block, result, states, L1, L3, g)
+    return result
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, L0: float = 0.2,
+    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """Joint torques Gamma. Shape (N, 2)."""
-    states = _closed(_states(q, qd, qdd), L0, L1, L2, L3, L4)
-    GAM = np.zeros((2, len(states[0])))
-    _fill(_inverse_dynamics_block, GAM, states, X, L1, L3, g)
-    return _by_sample(GAM, q)
+    """Joint torques Gamma = A qdd + C qd + Q + friction.
+
+    Shape (N, 2).
+    """
+    X = _parameters(X)
+    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = np.zeros((2, len(states[0])))
+    _fill(_inverse_dynamics_block, result, states, X, L1, L3, g)
+    return _by_sample(result, q)
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
-    L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 2, 2)."""
-    states = _closed(_states(q), L0, L1, L2, L3, L4)
-    A = np.zeros((2, 2, len(states[0])))
-    _fill(_inertia_matrix_block, A, (states[0], states[3]), X, L1, L3)
-    return _by_sample(A, q)
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
+
+    Shape (N, 2, 2).
+    """
+    X = _parameters(X)
+    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = np.zeros((2, 2, len(states[0])))
+    _fill(_inertia_matrix_block, result, (states[0], states[3]), X, L1, L3)
+    return _by_sample(result, q)
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
-    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 2)."""
-    states = _closed(_states(q, qd), L0, L1, L2, L3, L4)
-    GAM = np.zeros((2, len(states[0])))
-    _fill(_bias_block, GAM, states, X, L1, L3, g)
-    return _by_sample(GAM, q)
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
+
+    Shape (N, 2).
+    """
+    X = _parameters(X)
+    states = _closed(_states(q, qd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = np.zeros((2, len(states[0])))
+    _fill(_bias_block, result, states, X, L1, L3, g)
+    return _by_sample(result, q)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
-    L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 2)."""
-    states = _closed(_states(q), L0, L1, L2, L3, L4)
-    GAM = np.zeros((2, len(states[0])))
-    _fill(_gravity_block, GAM, (states[0], states[3]), X, g)
-    return _by_sample(GAM, q)
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
+
+    Shape (N, 2).
+    """
+    X = _parameters(X)
+    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = np.zeros((2, len(states[0])))
+    _fill(_gravity_block, result, (states[0], states[3]), X, g)
+    return _by_sample(result, q)
 
 
 def frame_poses(
-    q: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
-    g: float = 9.81
+    q: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 6, 4, 4)."""
-    states = _closed(_states(q), L0, L1, L2, L3, L4)
-    T = np.zeros((6, 4, 4, len(states[0])))
-    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = T[3, 3, 3] = 1.0
-    T[4, 2, 2] = T[4, 3, 3] = T[5, 2, 2] = T[5, 3, 3] = 1.0
-    _fill(_frame_poses_block, T, (states[0],), L0, L1, L2, L3, L4)
-    return _by_sample(T, q)
+    """Homogeneous transform of every frame j in frame 0, at index j - 1.
+
+    Shape (N, 6, 4, 4).
+    """
+    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    result = np.zeros((6, 4, 4, len(states[0])))
+    result[0, 2, 2] = result[0, 3, 3] = result[1, 2, 2] = result[1, 3, 3] = result[2, 2, 2] = 1.0
+    result[2, 3, 3] = result[3, 2, 2] = result[3, 3, 3] = result[4, 2, 2] = result[4, 3, 3] = 1.0
+    result[5, 2, 2] = result[5, 3, 3] = 1.0
+    _fill(_frame_poses_block, result, (states[0],), L0, L1, L2, L3, L4)
+    return _by_sample(result, q)
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, L0: float = 0.2,
+    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
-    A, H = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4), bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
-    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+    """Qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
-    L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, *, frame: int | None = None, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> np.ndarray:
-    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 2)."""
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
+    frame 0, per joint rate. Shape (N, 6, 2).
+    """
     frame = 6 if frame is None else frame
-    path, T = _paths()[frame], frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
-    G = _closed(_states(q), L0, L1, L2, L3, L4)[3].reshape(-1, 2, 2)
+    poses = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
+    result = _jacobian(_paths()[frame], poses, frame)
+    rates = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))[3].reshape(-1, 2, 2)
+    result = result[..., :2] + result[..., 2:] @ rates
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def _jacobian(path, T, frame):
+    """Columns of the joints on `path`, shape (N, 6, 4), from the poses T of all frames."""
     J, P = np.zeros((len(T), 6, 4)), T[:, frame - 1, :3, 3]
     for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
@@ -302,25 +373,30 @@ def jacobian(
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    J = J[..., :2] + J[..., 2:] @ G
-    return J[0] if np.ndim(q) == 1 else J
+    return J
 
 
 def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
+    how the joints in the columns move them.
+    """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)),), 3: ((3, 0, ((1, 1.0),)),),
-        4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2, -1.0),)),),
+        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)),),
+        3: ((3, 0, ((1, 1.0),)),), 4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2,
+            -1.0),)),),
         6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
+    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
+    g: float = 9.81
 ) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also
+    their accelerations.
+    """
     rates = np.zeros((3, 4))
     rates[0, 2] = 1.0
     rates[1, 3] = 1.0
@@ -328,83 +404,127 @@ def passive_joints(
     rates[2, 3] = 1.0
     rates[2, 0] = -1.0
     rates[2, 2] = -1.0
-    offsets = np.array([0.0, 0.0, 0.0])
-    given = [x is not None for x in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
-    states = _closed(states, L0, L1, L2, L3, L4)[:3]
-    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 3) for x, wanted in zip(states, given) if wanted]
-    found[0] += offsets
-    return found[0] if len(found) == 1 else tuple(found)
+    origin = np.array([
+        0.0,
+        0.0,
+        0.0,
+    ])
+    given = [state is not None for state in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
+    states = _closed(states, ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))[:3]
+    shape = (*np.shape(q)[:-1], 3)
+    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
+    results[0] += origin
+    return results[0] if len(results) == 1 else tuple(results)
 
 
-def _closed(states, L0, L1, L2, L3, L4):
-    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 2*2), rates of the tied ones."""
+def _closed(states, constants):
+    """Joints of the closed mechanism, actuated then tied: q, qd, qdd (N, 4), and G (N, 2*2),
+    rates of the tied ones. `constants` are those of `_closure`, then those of `_curvature`.
+    """
     q, qd, qdd = (*states, *[np.zeros_like(states[0])] * (3 - len(states)))
     N = len(q)
-    q = np.concatenate([q, _assembled(q, L0, L1, L2, L3, L4)], axis=1)
-    J = _closure((q,), L0, L1, L2, L3, L4)[:, 1:]
+    q = np.concatenate([q, _assembled(q, constants[0])], axis=1)
+    J = _closure((q,), *constants[0])[:, 1:]
     J_a, J_u = J[:, :2], J[:, 2:]
     volume = _determinant(J_u) / np.prod(np.sqrt((J**2).sum(axis=1)), axis=0)
     if (np.abs(volume) < 1e-6).any():  # a dead point is found to half the digits of the closure
         t = int(np.abs(volume).argmin())
-        raise ValueError(f"singular configuration at sample {t}: q = {q[t, :2]}, tied joints {q[t, 2:]} move freely there")
+        raise ValueError(
+            f"singular configuration at sample {t}: q = {q[t, :2]}, "
+            f"tied joints {q[t, 2:]} move freely there"
+        )
     G = -_solved(J_u, J_a)
     qd = np.concatenate([qd, np.einsum("uit,ti->tu", G, qd)], axis=1)
-    B = _curvature((q, qd), L1, L2, L3, L4)
-    other = (volume * _MODE < 0) | (B[2:] < 0).any(axis=0)  # beyond a dead point, or frames opposite (trace -1, not 3)
+    B = _curvature((q, qd), *constants[1])
+    # Beyond a dead point, or frames opposite (trace -1, not 3)
+    other = (volume * _MODE < 0) | (B[2:] < 0).any(axis=0)
     if other.any():
         t = int(other.argmax())
-        raise ValueError(f"the mechanism does not close in the assembly mode of _START at sample {t}: q = {q[t, :2]}")
-    qdd = np.concatenate([qdd, np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:2]).T], axis=1)
-    return q, qd, qdd, G.reshape(4, N).T
+        raise ValueError(
+            "the mechanism does not close in the assembly mode of _START "
+            f"at sample {t}: q = {q[t, :2]}"
+        )
+    qdd_u = np.einsum("uit,ti->tu", G, qdd) - _solved(J_u, B[:2]).T
+    return q, qd, np.concatenate([qdd, qdd_u], axis=1), G.reshape(4, N).T
 
 
 def _closure(states, L0, L1, L2, L3, L4):
-    """Closure residuals, then their derivatives by the joints. Shape (2, 5, N)."""
-    R = np.zeros((2, 5, len(states[0])))
-    _fill(_closure_block, R, (states[0],), L0, L1, L2, L3, L4)
-    return R
+    """Closure residuals, then their derivatives by the joints.
+
+    Shape (2, 5, N).
+    """
+    result = np.zeros((2, 5, len(states[0])))
+    _fill(_linearised_closure_block, result, (states[0],), L0, L1, L2, L3, L4)
+    return result
 
 
 def _curvature(states, L1, L2, L3, L4):
-    """Second derivatives of the residuals at constant rates, then traces of A_cut' A_twin. Shape (2, N)."""
-    B = np.zeros((2, len(states[0])))
-    _fill(_curvature_block, B, (states[0], states[1]), L1, L2, L3, L4)
-    return B
+    """Second derivatives of the residuals at constant rates, then traces of A_cut' A_twin.
+
+    Shape (2, N).
+    """
+    result = np.zeros((2, len(states[0])))
+    _fill(_curvature_block, result, (states[0], states[1]), L1, L2, L3, L4)
+    return result
 
 
-def _assembled(q, L0, L1, L2, L3, L4):
+def _assembled(q, constants):
     """Tied joints (N, 2) that close the loops, in the assembly mode of _START and continuous in q.
 
-    Along a smooth record only knots are followed from _START; the samples between them start from interpolation.
+    Along a smooth record only knots are followed from _START; the samples between them start from
+    interpolation.
     """
     N = len(q)
     pace = np.abs(np.diff(q, axis=0)).max(initial=0.0)
     every = int(np.clip(0.25 / max(pace, 1e-12), 1, 64)) if N > 64 else 1
     knots = np.unique(np.append(np.arange(0, N, every), N - 1)) if N else np.arange(0)
-    start, x = np.array(_START[:2]), np.tile(_START[2:], (len(knots), 1))
+    start, x = _start(constants)
+    x = np.tile(x, (len(knots), 1))
     away = q[knots] - start
     steps = int(np.ceil(np.abs(away).max(initial=0.0) / 0.2))
     for s in range(1, steps):
-        x, _ = _newton(start + s / steps * away, x, 2, L0, L1, L2, L3, L4)
-    x, residual = _newton(q[knots], x, 20, L0, L1, L2, L3, L4)
+        x, _ = _newton(start + s / steps * away, x, 2, constants)
+    x, residual = _newton(q[knots], x, 20, constants)
     if every > 1:
         x = np.stack([np.interp(np.arange(N), knots, column) for column in x.T], axis=1)
-        x, residual = _newton(q, x, 5, L0, L1, L2, L3, L4)
+        x, residual = _newton(q, x, 5, constants)
     if not (residual < 1e-10).all():
         t = int((~(residual < 1e-10)).argmax())
-        raise ValueError(f"the mechanism does not close at sample {t}: residual {residual[t]:.3g} at q = {q[t]}")
+        raise ValueError(
+            f"the mechanism does not close at sample {t}: residual {residual[t]:.3g} at q = {q[t]}"
+        )
     return x
 
 
-def _newton(q, x, passes, L0, L1, L2, L3, L4):
-    """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of each sample."""
+def _start(constants):
+    """Actuated and tied joints of _START, the loops closed anew at other constants."""
+    q, x = np.array(_START[:2]), np.array([_START[2:]])
+    given = np.array([CONSTANTS[name] for name in ('L0', 'L1', 'L2', 'L3', 'L4')])
+    away = np.array(constants) - given
+    for s in np.arange(1, 17) / 16 if away.any() else ():  # along a straight line of the constants
+        x, residual = _newton(q[None], x, 20, given + s * away)
+        J_u = _closure((np.append(q, x)[None],), *(given + s * away))[:, 3:]
+        if not (residual[0] < 1e-10 and _determinant(J_u)[0] * _MODE > 0):
+            raise ValueError(
+                "the loops do not close in the assembly mode of _START at the constants "
+                f"L0, L1, L2, L3, L4 = {given + away}; "
+                "emit the model anew from a robot file with these constants"
+            )
+    return q, x[0]
+
+
+def _newton(q, x, passes, constants):
+    """At most `passes` Newton steps on the tied joints x; returns x and the largest residual of
+    each sample.
+    """
     for k in range(passes + 1):
-        R = _closure((np.concatenate([q, x], axis=1),), L0, L1, L2, L3, L4)
+        R = _closure((np.concatenate([q, x], axis=1),), *constants)
         residual = np.abs(R[:, 0]).max(axis=0)
         if k == passes or not residual.max(initial=0.0) > 1e-13:
             return x, residual
-        step = _solved(R[:, 3:] + 1e-14 * np.eye(2)[..., None], R[:, 0])  # a singular sample ends as one that does not close
+        # A singular sample ends as one that does not close
+        step = _solved(R[:, 3:] + 1e-14 * np.eye(2)[..., None], R[:, 0])
         x = x - np.clip(step, -0.5, 0.5).T
 
 
@@ -420,7 +540,8 @@ def _solved(J, b):
 
 
 def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
-    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G
+    (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
@@ -489,13 +610,17 @@ def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
 
 
 def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, L3, g):
-    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4,
+    N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP1, QDP3, QDP2, QDP4 = qdd
     G21, G23, G41, G43 = G
-    ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3, ZZ4R, MY4 = X
+    (
+        ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
+        ZZ4R, MY4
+    ) = X
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -566,9 +691,7 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     S2 = np.sin(q2)
     S4 = np.sin(q4)
     # Link 2
-    WP321 = 1 + G21
-    VP121 = L1*S2
-    VP221 = L1*C2
+    WP321 = G21 + 1
     # Joint 4
     F141 = -MY4*G41
     N341 = ZZ4R*G41
@@ -577,16 +700,15 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     # Joint 2
     F121 = -MY2*WP321
     F221 = MX2R*WP321
-    N321 = ZZ2R*WP321 + MX2R*VP221 - MY2*VP121
+    N321 = ZZ2R*WP321 + MX2R*L1*C2 - MY2*L1*S2
     FDI221 = S2*F121 + C2*F221
     # Joint 1
     NE311 = ZZ1R + N321 + L1*FDI221
     # Link 4
     WP343 = 1 + G43
-    VP143 = L3*S4
     # Joint 4
     F143 = -MY4*WP343
-    N343 = ZZ4R*WP343 - MY4*VP143
+    N343 = ZZ4R*WP343 - MY4*L3*S4
     FDI243 = S4*F143
     # Joint 3
     NE333 = ZZ3R + N343 + L3*FDI243
@@ -594,12 +716,13 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     N323 = ZZ2R*G23
     # Inertia matrix
     A[0, 0] = NE311 + G21*N321 + G41*N341
-    A[1, 0] = A[0, 1] = NE331 + N321*G23 + N341*G43
+    A[0, 1] = A[1, 0] = NE331 + N321*G23 + N341*G43
     A[1, 1] = NE333 + G23*N323 + G43*N343
 
 
 def _bias_block(q, qd, qdd, G, GAM, X, L1, L3, g):
-    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
+    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4,
+    N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
@@ -781,7 +904,7 @@ def _frame_poses_block(q, T, L0, L1, L2, L3, L4):
     T[5, 1, 3] = P26
 
 
-def _closure_block(q, R, L0, L1, L2, L3, L4):
+def _linearised_closure_block(q, R, L0, L1, L2, L3, L4):
     """Fill R, shape (2, 5, N), where it is not constant, from q (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
@@ -842,9 +965,17 @@ def _curvature_block(q, qd, B, L1, L2, L3, L4):
     th34 = q3 + q4
     C34 = np.cos(th34)
     S34 = np.sin(th34)
-    # Inputs
-    QP1pQP2 = QP1 + QP2
-    QP3pQP4 = QP3 + QP4
+    # Link 2
+    W32 = QP1 + QP2
+    # Link 4
+    W34 = QP3 + QP4
     # Second derivatives at constant rates
-    B[0] = L3*QP3*QP3*C3 + L4*QP3pQP4*C34*QP3pQP4 - L1*QP1*QP1*C1 - L2*QP1pQP2*C12*QP1pQP2
-    B[1] = L3*QP3*QP3*S3 + L4*QP3pQP4*S34*QP3pQP4 - L1*QP1*QP1*S1 - L2*QP1pQP2*S12*QP1pQP2
+    B[0] = L3*QP3*C3*QP3 + L4*W34*C34*W34 - L1*QP1*C1*QP1 - L2*W32*C12*W32
+    B[1] = L3*QP3*S3*QP3 + L4*W34*S34*W34 - L1*QP1*S1*QP1 - L2*W32*S12*W32
+
+
+# Of the robot file: drives, limits and values, which no function above reads
+LINKS = (1, 2, 3, 4)
+DRIVES = None
+LIMITS = {}
+VALUES = {}

@@ -1,6 +1,16 @@
-"""Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double parallelogram: base parameters, regressor, dynamics.
+# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+# with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
+# states, parameters and random constants agree with Lagrange's equations and products of frames
+# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
+# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
+# VALUES, HEADER, DEFAULTS with the robot file.
+# sha256 of what follows: 651b1d707b6edf1fa9da0f184cabc57dbdec3dd78f3eede016ced60eaa6d55ed
+"""Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
+    parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.2.0. Do not edit; symgen generate haptic
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.2.0.
+Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  mu  sigma  alpha    d  theta  r
@@ -13,8 +23,10 @@ Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JO
     7    6   0      0      0   D3     q7  0
     8    3   0      2      0  -D6      0  0
 Gravity     acceleration (gx, gy, 0) in frame 0, m/s**2
-Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
-Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd +
+            FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
+            MZ first moments
 Element     Ia      inertia: along q1, q2, q5
 Element     FV      viscous: along q1, q2, q4, q5
 Element     FS      coulomb: along q1, q2, q4, q5
@@ -27,32 +39,14 @@ Loop        q4 = c - q5 (declared)
 Loop        q6 = q2 - q5
 Loop        q7 = pi - q2 + q5
 
-Base parameters, 30 of 78; Gautier and Khalil (1990), exact over F_p
-    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + sin(c)**2*XX4 + 2*cos(c)*sin(c)*XY4 + cos(c)**2*YY4 + (D3**2 +
-        D4**2)*M4 + D6**2*M6
-    MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
-    XX2R = XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)
-    XY2R = XY2 + XY6
-    XZ2R = XZ2 + XZ6 - D3*(MZ3 + MZ4)
-    YZ2R = YZ2 + YZ6
-    ZZ2R = ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)
-    MX2R = MX2 + MX6 + D3*(M3 + M4)
-    FV2R = FV2 + FVP2
-    FS2R = FS2 + FSP2
-    XX3R = XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6
-    XY3R = XY3 + XY5
-    XZ3R = XZ3 - XZ5 - D4*MZ4 + D6*MZ6
-    YZ3R = YZ3 - YZ5
-    ZZ3R = ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6
-    MX3R = MX3 + D4*M4 - D6/D3*MX6
-    MX4R = MX4 - sin(c)/cos(c)*MY4
-    MX5R = MX5 - D6/D3*MX6 + D6*M6
-    FV5R = FV5 + FV4 + FVP5
-    FS5R = FS5 + FS4 + FSP5
-    as they are: MX1 FV1 FS1 OFFSET1 MY2 OFFSET2 MY3 MY5 OFFSET5 MY6
-No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
+Base parameters, 30 of 78; Gautier and Khalil (1990)
+    exact over F_p
+    FORMULAS says what they are made of; what it leaves out is as it is
+    No effect: XX1 XY1 XZ1 YY1 YZ1 MZ1 M1 M2 XZ4 YZ4 ZZ4 M5
 
-Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
+            part that several share, N16a of N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -75,18 +69,20 @@ Names       family, then component digits, then link: W12 is component 1 of link
     FDI  the transmitted force, in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
+    DF   the part of DG that pushes: velocity times force
     R    orientation of a frame in frame 0
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor         101 multiplications, 63 additions, 6 sin, 6 cos
-    inverse_dynamics  141 multiplications, 123 additions, 6 sin, 6 cos
-    inertia_matrix    47 multiplications, 35 additions, 4 sin, 5 cos
-    bias              131 multiplications, 98 additions, 6 sin, 6 cos
-    gravity           46 multiplications, 35 additions, 5 sin, 5 cos
-    frame_poses       21 multiplications, 6 additions, 4 sin, 4 cos
+    regressor          101 multiplications, 63 additions, 6 sin, 6 cos
+    inverse_dynamics   141 multiplications, 119 additions, 6 sin, 6 cos
+    inertia_matrix     45 multiplications, 29 additions, 4 sin, 5 cos
+    bias               131 multiplications, 98 additions, 6 sin, 6 cos
+    gravity            42 multiplications, 34 additions, 5 sin, 5 cos
+    frame_poses        21 multiplications, 6 additions, 4 sin, 4 cos
 
-Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis of samples; rad or m and seconds
+Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis
+            of samples; rad or m and seconds
             X of shape (30,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
@@ -98,66 +94,50 @@ SOURCE_SHA256 = '905194db7b3b75bf540a196cd93f3044c531cdf74245c6c84322acf1f75f482
 JOINTS = (1, 2, 5)
 PASSIVE = (3, 4, 6, 7)
 CONSTANTS = {'D3': 0.2, 'D4': 0.22, 'D6': 0.1, 'c': 0.0, 'gx': -9.81, 'gy': 0.0}
-BASE_PARAMETERS = (
-    'ZZ1R', 'MX1', 'MY1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2R', 'MY2', 'FV2R',
-    'FS2R', 'OFFSET2', 'XX3R', 'XY3R', 'XZ3R', 'YZ3R', 'ZZ3R', 'MX3R', 'MY3', 'MX4R', 'MX5R', 'MY5', 'FV5R', 'FS5R',
-    'OFFSET5', 'MY6',
-)
-STANDARD_PARAMETERS = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
-    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
-    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4', 'FV4',
-    'FS4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5', 'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6',
-    'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6', 'FVP2', 'FVP5', 'FSP2', 'FSP5',
-)
-UNITS = {
-    'ZZ1R': 'kg*m**2', 'MX1': 'kg*m', 'MY1R': 'kg*m', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m',
-    'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2', 'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m',
-    'MY2': 'kg*m', 'FV2R': 'N*m*s/rad', 'FS2R': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2',
-    'XZ3R': 'kg*m**2', 'YZ3R': 'kg*m**2', 'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3': 'kg*m', 'MX4R': 'kg*m',
-    'MX5R': 'kg*m', 'MY5': 'kg*m', 'FV5R': 'N*m*s/rad', 'FS5R': 'N*m', 'OFFSET5': 'N*m', 'MY6': 'kg*m',
-}
-FORMULAS = {
-    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + sin(c)**2*XX4 + 2*cos(c)*sin(c)*XY4 + cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6',
-    'MX1': 'MX1', 'MY1R': 'MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
-    'XX2R': 'XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)', 'XY2R': 'XY2 + XY6', 'XZ2R': 'XZ2 + XZ6 - D3*(MZ3 + MZ4)',
-    'YZ2R': 'YZ2 + YZ6', 'ZZ2R': 'ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)', 'MX2R': 'MX2 + MX6 + D3*(M3 + M4)', 'MY2': 'MY2',
-    'FV2R': 'FV2 + FVP2', 'FS2R': 'FS2 + FSP2', 'OFFSET2': 'OFFSET2',
-    'XX3R': 'XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6', 'XY3R': 'XY3 + XY5', 'XZ3R': 'XZ3 - XZ5 - D4*MZ4 + D6*MZ6',
-    'YZ3R': 'YZ3 - YZ5', 'ZZ3R': 'ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6', 'MX3R': 'MX3 + D4*M4 - D6/D3*MX6',
-    'MY3': 'MY3', 'MX4R': 'MX4 - sin(c)/cos(c)*MY4', 'MX5R': 'MX5 - D6/D3*MX6 + D6*M6', 'MY5': 'MY5',
-    'FV5R': 'FV5 + FV4 + FVP5', 'FS5R': 'FS5 + FS4 + FSP5', 'OFFSET5': 'OFFSET5', 'MY6': 'MY6',
-}
+BASE_PARAMETERS = tuple("""
+ZZ1R MX1 MY1R FV1 FS1 OFFSET1 XX2R XY2R XZ2R YZ2R ZZ2R MX2R MY2 FV2R FS2R OFFSET2 XX3R XY3R XZ3R
+YZ3R ZZ3R MX3R MY3 MX4R MX5R MY5 FV5R FS5R OFFSET5 MY6
+""".split())
+STANDARD_PARAMETERS = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1 Ia1 FV1 FS1 OFFSET1 XX2 XY2 XZ2 YY2 YZ2 ZZ2 MX2 MY2 MZ2 M2
+Ia2 FV2 FS2 OFFSET2 XX3 XY3 XZ3 YY3 YZ3 ZZ3 MX3 MY3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4 ZZ4 MX4 MY4 MZ4 M4
+FV4 FS4 XX5 XY5 XZ5 YY5 YZ5 ZZ5 MX5 MY5 MZ5 M5 Ia5 FV5 FS5 OFFSET5 XX6 XY6 XZ6 YY6 YZ6 ZZ6 MX6 MY6
+MZ6 M6 FVP2 FVP5 FSP2 FSP5
+""".split())
 NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MZ1', 'M1', 'M2', 'XZ4', 'YZ4', 'ZZ4', 'M5')
-STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
-    "x..", "x..", "x..", "x..", "x..", "x..", "xx.", "xx.", "xx.", "xx.", ".x.", "xx.", "xx.", ".x.", ".x.", ".x.",
-    "x.x", "x.x", "x.x", "x.x", "..x", "xxx", "xxx", "xxx", "x.x", "x.x", "..x", "..x", "..x", "xxx",
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + sin(c)**2*XX4 +'
+        ' 2*cos(c)*sin(c)*XY4 + cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6',
+    'MY1R': 'MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6',
+    'XX2R': 'XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)',
+    'XY2R': 'XY2 + XY6',
+    'XZ2R': 'XZ2 + XZ6 - D3*(MZ3 + MZ4)',
+    'YZ2R': 'YZ2 + YZ6',
+    'ZZ2R': 'ZZ2 + Ia2 + ZZ6 + D3**2*(M3 + M4)',
+    'MX2R': 'MX2 + MX6 + D3*(M3 + M4)',
+    'FV2R': 'FV2 + FVP2',
+    'FS2R': 'FS2 + FSP2',
+    'XX3R': 'XX3 - YY3 + XX5 - YY5 - D4**2*M4 - D6**2*M6',
+    'XY3R': 'XY3 + XY5',
+    'XZ3R': 'XZ3 - XZ5 - D4*MZ4 + D6*MZ6',
+    'YZ3R': 'YZ3 - YZ5',
+    'ZZ3R': 'ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6',
+    'MX3R': 'MX3 + D4*M4 - D6/D3*MX6',
+    'MX4R': 'MX4 - sin(c)/cos(c)*MY4',
+    'MX5R': 'MX5 - D6/D3*MX6 + D6*M6',
+    'FV5R': 'FV5 + FV4 + FVP5',
+    'FS5R': 'FS5 + FS4 + FSP5',
+}
+UNITS = dict(zip(BASE_PARAMETERS, tuple("""
+kg*m**2 kg*m kg*m N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m N*m*s/rad N*m
+N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m kg*m kg*m N*m*s/rad N*m N*m kg*m
+""".split())))
+# STRUCTURE[k, j]: whether base parameter k acts on joint j
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (
+    "x..", "x..", "x..", "x..", "x..", "x..", "xx.", "xx.", "xx.", "xx.", ".x.", "xx.", "xx.",
+    ".x.", ".x.", ".x.", "x.x", "x.x", "x.x", "x.x", "..x", "xxx", "xxx", "xxx", "x.x", "x.x",
+    "..x", "..x", "..x", "xxx",
 )])
-DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)
-    'ratio': (
-        (10.0, 0.0, 0.0),
-        (0.0, 10.0, 0.0),
-        (0.0, 0.0, 10.0),
-    ),
-    'offset': (0.0, 0.0, 0.0),
-    'torque_constant': (1.0, 1.0, 1.0),
-}
-LIMITS = {'q': ((-1.0, 1.0), (-1.7, 0.1), (-3.2, -1.5)), 'qd': (6.0, 6.0, 6.0), 'qdd': (60.0, 60.0, 60.0)}
-VALUES = {
-    'XX1': 0.0060936, 'XY1': -2e-07, 'XZ1': 2e-07, 'YY1': 0.007194, 'YZ1': 0.0004387, 'ZZ1': 0.00731594, 'MX1': 1e-05,
-    'MY1': 0.0219355, 'MZ1': -0.026865, 'M1': 1.3432, 'Ia1': 0.0086827, 'FV1': 0.0002, 'FS1': 0.12, 'OFFSET1': 0.0002,
-    'XX2': 0.0005008, 'XY2': 7e-07, 'XZ2': 9.88e-05, 'YY2': 0.009455, 'YZ2': 0.0, 'ZZ2': 0.0094661, 'MX2': -0.0895382,
-    'MY2': 1e-05, 'MZ2': 0.0012839, 'M2': 1.1377, 'Ia2': 0.0054814, 'FV2': 0.0001, 'FS2': 0.09, 'OFFSET2': 0.02,
-    'XX3': 3.156e-05, 'XY3': -1e-06, 'XZ3': -4.23e-05, 'YY3': 0.0034816, 'YZ3': 0.0, 'ZZ3': 0.00348384,
-    'MX3': 0.0279611, 'MY3': 1e-05, 'MZ3': 0.0004654, 'M3': 0.281, 'XX4': 2.74e-05, 'XY4': 0.0, 'XZ4': 0.0,
-    'YY4': 2.74e-05, 'YZ4': 0.0, 'ZZ4': 3.35e-05, 'MX4': -1e-05, 'MY4': 5.69e-05, 'MZ4': 1.08e-05, 'M4': 0.0569,
-    'FV4': 1e-05, 'FS4': 0.005, 'XX5': 0.0004348, 'XY5': 6e-07, 'XZ5': -4.19e-05, 'YY5': 0.0048428, 'YZ5': 0.0,
-    'ZZ5': 0.0048887, 'MX5': 0.0655991, 'MY5': -1e-05, 'MZ5': 0.0003762, 'M5': 0.9757, 'Ia5': 0.0024855, 'FV5': 0.0001,
-    'FS5': 0.085, 'OFFSET5': 0.03, 'XX6': 6.8e-06, 'XY6': -7e-07, 'XZ6': 5.3e-06, 'YY6': 0.0005366, 'YZ6': 0.0,
-    'ZZ6': 0.0005365, 'MX6': 0.0029582, 'MY6': 1e-05, 'MZ6': -7.18e-05, 'M6': 0.0388, 'FVP2': 2e-05, 'FVP5': 2e-05,
-    'FSP2': 0.02, 'FSP5': 0.02,
-}
-LINKS = (1, 2, 3, 4, 5, 6)
 
 
 class Store(np.ndarray):
@@ -170,28 +150,43 @@ class Store(np.ndarray):
 
 
 def store(N: int) -> Store:
-    """Room for N samples, shape (30, 3, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
-    S = np.zeros((30, 3, N)).view(Store)
-    S[5, 0] = S[15, 1] = S[28, 2] = 1.0
-    S.ready = True
-    return S
+    """Room for N samples, shape (30, 3, N): zeros and constants are written here, once.
+    Reuse it: a fresh one costs page faults.
+    """
+    zeros = np.zeros((30, 3, N)).view(Store)
+    zeros[5, 0] = zeros[15, 1] = zeros[28, 2] = 1.0
+    zeros.ready = True
+    return zeros
 
 
 def _states(*arrays):
-    """The states as rows of samples, shape (N, 3) each; ValueError unless all have shape (N, 3), or all (3,)."""
+    """The states as rows of samples, shape (N, 3) each; ValueError unless all have shape
+    (N, 3), or all (3,).
+    """
     states = [np.asarray(x, dtype=float) for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (3,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
-        raise ValueError(f"states of shape {shapes}; expected (N, 3) each, or (3,) each for one state")
+        raise ValueError(f"states of shape {shapes}; expected (N, 3) each, or (3,) each")
     return tuple([x.reshape(-1, 3) for x in states])
 
 
+def _parameters(X):
+    """X as an array; ValueError unless it has a value for each base parameter."""
+    X = np.asarray(X, dtype=float)
+    if X.shape != (30,):
+        raise ValueError(f"X of shape {X.shape}; expected (30,) in the order of BASE_PARAMETERS")
+    return X
+
+
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+    (..., B), result ends in samples.
+    """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
-        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
+        block(*rows, result[..., t:t + B], *arguments)
 
 
 def _by_sample(result, q):
@@ -200,16 +195,23 @@ def _by_sample(result, q):
     return result[0] if np.ndim(q) == 1 else result
 
 
-def elements(*, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0) -> dict:
-    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+def elements(
+    *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
+) -> dict:
+    """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
+    {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
+    """
     return {
-        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
-        'FS4': ('coulomb', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
+        'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
+        'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+        'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
+        'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
         'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
-        'FVP2': ('viscous', 'both', {2: 1.0}), 'FVP5': ('viscous', 'both', {5: 1.0}), 'FSP2': ('coulomb', 'both', {2: 1.0}),
-        'FSP5': ('coulomb', 'both', {5: 1.0}),
+        'FVP2': ('viscous', 'both', {2: 1.0}), 'FVP5': ('viscous', 'both', {5: 1.0}),
+        'FSP2': ('coulomb', 'both', {2: 1.0}), 'FSP5': ('coulomb', 'both', {5: 1.0}),
     }
 
 
@@ -217,19 +219,23 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
-    gy: float = 0.0
+    standard: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """X, shape (30,), from the 78 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    """X, shape (30,), from the 78 standard parameters: a mapping by name, or a vector in the
+    order of STANDARD_PARAMETERS.
+    """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, MZ2, _, Ia2,
-        FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, _, YY4, _, _, MX4, MY4, MZ4, M4,
-        FV4, FS4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, _, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6,
-        MX6, MY6, MZ6, M6, FVP2, FVP5, FSP2, FSP5
+        _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2,
+        ZZ2, MX2, MY2, MZ2, _, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3,
+        MZ3, M3, XX4, XY4, _, YY4, _, _, MX4, MY4, MZ4, M4, FV4, FS4, XX5, XY5, XZ5, YY5, YZ5,
+        ZZ5, MX5, MY5, MZ5, _, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6,
+        MZ6, M6, FVP2, FVP5, FSP2, FSP5
     ) = standard
-    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + np.sin(c)**2*XX4 + 2*np.cos(c)*np.sin(c)*XY4 + np.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6
+    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + np.sin(c)**2*XX4 +
+        2*np.cos(c)*np.sin(c)*XY4 + np.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6)
     MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
     XX2R = XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)
     XY2R = XY2 + XY6
@@ -250,118 +256,155 @@ def base_parameters(
     FV5R = FV5 + FV4 + FVP5
     FS5R = FS5 + FS4 + FSP5
     return np.array([
-        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R, XZ3R,
-        YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6,
+        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
+        OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
 ) -> np.ndarray:
     """D of Gamma = D X. Shape (N, 3, 30).
 
-    A view on one store of shape (30, 3, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
-    faults, up to several times the arithmetic for large N.
+    A view on one store of shape (30, 3, N). `out` is such a store, made by `store(N)` and
+    reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    D = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).transpose(2, 1, 0)
-    return D[0] if np.ndim(q) == 1 else D
+    filled = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).transpose(2, 1, 0)
+    return filled[0] if np.ndim(q) == 1 else filled
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
 ) -> np.ndarray:
-    """W of Y = W X + rho, shape (3*N, 30), Fortran order, rows joint-major: the same store, no copy."""
+    """W of Y = W X + rho, shape (3*N, 30), Fortran order, rows joint-major: the same
+    store, no copy.
+    """
     return _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).reshape(30, -1).T
+
+
+def _ready(out, N):
+    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+    out = store(N) if out is None else out
+    if not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
+        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {kind}")
+    return out.view(np.ndarray)
 
 
 def _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy):
     """`out`, or a new store, filled."""
     states = _states(q, qd, qdd)
-    N = len(states[0])
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    D = out.view(np.ndarray)
-    _fill(_regressor_block, D, states, D3, D4, D6, c, gx, gy)
-    return D
+    result = _ready(out, len(states[0]))
+    _fill(_regressor_block, result, states, D3, D4, D6, c, gx, gy)
+    return result
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D3: float = 0.2,
+    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """Joint torques Gamma. Shape (N, 3)."""
+    """Joint torques Gamma = A qdd + C qd + Q + friction.
+
+    Shape (N, 3).
+    """
+    X = _parameters(X)
     states = _states(q, qd, qdd)
-    GAM = np.zeros((3, len(states[0])))
-    _fill(_inverse_dynamics_block, GAM, states, X, D3, D4, D6, c, gx, gy)
-    return _by_sample(GAM, q)
+    result = np.zeros((3, len(states[0])))
+    _fill(_inverse_dynamics_block, result, states, X, D3, D4, D6, c, gx, gy)
+    return _by_sample(result, q)
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
-    gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 3, 3)."""
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
+
+    Shape (N, 3, 3).
+    """
+    X = _parameters(X)
     states = _states(q)
-    A = np.zeros((3, 3, len(states[0])))
-    _fill(_inertia_matrix_block, A, states, X, D3, D4, D6, c)
-    return _by_sample(A, q)
+    result = np.zeros((3, 3, len(states[0])))
+    _fill(_inertia_matrix_block, result, states, X, D3, D4, D6, c)
+    return _by_sample(result, q)
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
-    gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 3)."""
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
+
+    Shape (N, 3).
+    """
+    X = _parameters(X)
     states = _states(q, qd)
-    GAM = np.zeros((3, len(states[0])))
-    _fill(_bias_block, GAM, states, X, D3, D4, D6, c, gx, gy)
-    return _by_sample(GAM, q)
+    result = np.zeros((3, len(states[0])))
+    _fill(_bias_block, result, states, X, D3, D4, D6, c, gx, gy)
+    return _by_sample(result, q)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
-    gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 3)."""
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
+
+    Shape (N, 3).
+    """
+    X = _parameters(X)
     states = _states(q)
-    GAM = np.zeros((3, len(states[0])))
-    _fill(_gravity_block, GAM, states, X, c, gx, gy)
-    return _by_sample(GAM, q)
+    result = np.zeros((3, len(states[0])))
+    _fill(_gravity_block, result, states, X, c, gx, gy)
+    return _by_sample(result, q)
 
 
 def frame_poses(
-    q: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
-    gy: float = 0.0
+    q: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 8, 4, 4)."""
+    """Homogeneous transform of every frame j in frame 0, at index j - 1.
+
+    Shape (N, 8, 4, 4).
+    """
     states = _states(q)
-    T = np.zeros((8, 4, 4, len(states[0])))
-    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
-    T[7, 3, 3] = 1.0
-    _fill(_frame_poses_block, T, states, D3, D4, D6, c)
-    return _by_sample(T, q)
+    result = np.zeros((8, 4, 4, len(states[0])))
+    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
+    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = result[7, 3, 3] = 1.0
+    _fill(_frame_poses_block, result, states, D3, D4, D6, c)
+    return _by_sample(result, q)
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D3: float = 0.2,
+    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """qdd = A(q)**-1 (tau - bias). Shape (N, 3)."""
-    A, H = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c), bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
-    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+    """Qdd = A(q)**-1 (tau - bias). Shape (N, 3)."""
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+    inertia = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
-    gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, *, frame: int | None = None, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
 ) -> np.ndarray:
-    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 3)."""
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
+    frame 0, per joint rate. Shape (N, 6, 3).
+    """
     frame = 8 if frame is None else frame
-    path, T = _paths()[frame], frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
+    poses = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
+    result = _jacobian(_paths()[frame], poses, frame)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def _jacobian(path, T, frame):
+    """Columns of the joints on `path`, shape (N, 6, 3), from the poses T of all frames."""
     J, P = np.zeros((len(T), 6, 3)), T[:, frame - 1, :3, 3]
     for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
@@ -369,27 +412,34 @@ def jacobian(
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    return J[0] if np.ndim(q) == 1 else J
+    return J
 
 
 def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
+    how the joints in the columns move them.
+    """
     return {
         1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
         3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)), (4, 0, ((2, -1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)), (4, 0, ((2,
+            -1.0),)),),
         5: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)),),
         6: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)),),
-        7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)), (7, 0, ((1, -1.0), (2, 1.0),)),),
+        7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)), (7, 0, ((1,
+            -1.0), (2, 1.0),)),),
         8: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
+    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
+    gy: float = 0.0
 ) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd also their accelerations."""
+    """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd also
+    their accelerations.
+    """
     rates = np.zeros((4, 3))
     rates[0, 1] = -1.0
     rates[0, 2] = 1.0
@@ -398,12 +448,18 @@ def passive_joints(
     rates[2, 2] = -1.0
     rates[3, 1] = -1.0
     rates[3, 2] = 1.0
-    offsets = np.array([np.pi, c, 0.0, np.pi])
-    given = [x is not None for x in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
-    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 4) for x, wanted in zip(states, given) if wanted]
-    found[0] += offsets
-    return found[0] if len(found) == 1 else tuple(found)
+    origin = np.array([
+        np.pi,
+        c,
+        0.0,
+        np.pi,
+    ])
+    given = [state is not None for state in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
+    shape = (*np.shape(q)[:-1], 4)
+    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
+    results[0] += origin
+    return results[0] if len(results) == 1 else tuple(results)
 
 
 def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
@@ -576,11 +632,13 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     QP1, QP2, QP5 = qd
     QDP1, QDP2, QDP5 = qdd
     (
-        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R,
-        XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6
+        ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
+        OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
+        MY6
     ) = X
     # Constants
-    cosc = np.cos(c)
+    Z241 = np.cos(c)
+    Z141 = np.sin(c)
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -600,10 +658,12 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - S2*QDP1
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = -C2*QDP1 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -613,10 +673,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     DW122 = DV112 - DV222
     U112 = -DV222 - DV332
     U122 = DV122 - QDP2
-    U132 = DV132 + WP22
     U212 = QDP2 + DV122
     U222 = -DV112 - DV332
-    U232 = DV232 - WP12
     U312 = DV132 - WP22
     U322 = DV232 + WP12
     VP12 = C2*VP11
@@ -624,10 +682,12 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     # Link 3
     W13 = S5*QP1
     W23 = C5*QP1
+    S5QDP1 = S5*QDP1
+    C5QDP1 = C5*QDP1
     DV233 = QP5*W23
-    WP13 = S5*QDP1 + DV233
+    WP13 = S5QDP1 + DV233
     DV133 = QP5*W13
-    WP23 = C5*QDP1 - DV133
+    WP23 = C5QDP1 - DV133
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -637,10 +697,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     DW123 = DV113 - DV223
     U113 = -DV223 - DV333
     U123 = DV123 - QDP5
-    U133 = DV133 + WP23
     U213 = QDP5 + DV123
     U223 = -DV113 - DV333
-    U233 = DV233 - WP13
     U313 = DV133 - WP23
     U323 = DV233 + WP13
     VSP13 = VP12 + D3*U112
@@ -649,9 +707,9 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     VP13 = S2m5*VSP23 - C2m5*VSP13
     VP23 = -C2m5*VSP23 - S2m5*VSP13
     # Link 4
-    W14 = np.sin(c)*QP1
-    W24 = cosc*QP1
-    WP24 = cosc*QDP1
+    W14 = Z141*QP1
+    W24 = Z241*QP1
+    WP24 = Z241*QDP1
     DV124 = W14*W24
     DV224 = W24**2
     VSP14 = VP13 + D4*U113
@@ -697,7 +755,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     E33 = F34 + F33
     N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*U213 + MY3*VSP33 - XY3R*U313
     N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*U123 - MX3R*VSP33
-    N33 = ZZ3R*QDP5 + XY3R*DW123 + YZ3R*U133 + MX3R*VP23 - XX3R*DV123 - XZ3R*U233 - MY3*VP13
+    N33 = ZZ3R*QDP5 + XY3R*DW123 + YZ3R*C5QDP1 + XZ3R*S5QDP1 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
     NE13 = S5b*N24 + N13
     NE23 = C5b*N24 + N23 - D4*F34
     NE33 = N34 + D4*FDI24 + N33
@@ -705,7 +763,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     # Joint 2
     N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*U212 + MY2*VP21 - XY2R*U312
     N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*U122 - MX2R*VP21
-    N32 = ZZ2R*QDP2 + XY2R*DW122 + YZ2R*U132 + MX2R*VP22 - XX2R*DV122 - XZ2R*U232 - MY2*VP12
+    N32 = ZZ2R*QDP2 + XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - YZ2R*C2QDP1 - XZ2R*S2QDP1 - MY2*VP12
     NE12 = N12 - C2m5*NE13 - S2m5*NE23
     NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*E33
     NE32 = NE33 + D3*FDI23 + N32
@@ -738,8 +796,8 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     MX4R = X[23]
     MY6 = X[29]
     # Constants
-    WP241 = np.cos(c)
-    F341 = -MX4R*WP241
+    Z241 = np.cos(c)
+    F341 = -Z241*MX4R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -752,14 +810,12 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     C5b = np.cos(th5b)
     S5b = np.sin(th5b)
     # Link 3
-    VSP331 = D3*C2
+    C2D3 = D3*C2
     # Link 4
-    VSP341 = VSP331 - D4*C5
-    # Link 6
-    VSP361 = D6*C5
+    VSP341 = C2D3 - D4*C5
     # Joint 6
     F361 = -MY6*S2
-    N161 = MY6*VSP361
+    N161 = MY6*D6*C5
     NE151 = C2m5*N161
     NE251 = S2m5*N161 - D6*F361
     # Joint 4
@@ -768,8 +824,8 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     F331 = MY3*S5 - MX3R*C5
     E331 = F341 + F331
     N331 = YZ3R*C5 + XZ3R*S5
-    N131 = XX3R*S5 + XY3R*C5 + MY3*VSP331
-    N231 = XY3R*S5 - MX3R*VSP331
+    N131 = XX3R*S5 + XY3R*C5 + MY3*C2D3
+    N231 = XY3R*S5 - MX3R*C2D3
     NE131 = S5b*N241 + N131
     NE231 = C5b*N241 + N231 - D4*F341
     # Joint 2
@@ -778,37 +834,28 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     N321 = -YZ2R*C2 - XZ2R*S2
     NE121 = N121 - C2m5*NE131 - S2m5*NE231
     NE221 = S2m5*NE131 + N221 - C2m5*NE231 - D3*E331
-    NE321 = N331 + N321
     # Joint 1
     NE311 = ZZ1R - S5*NE151 - C5*NE251 - S2*NE121 - C2*NE221
     # Link 3
-    VP132 = D3*S2m5
-    VP232 = -D3*C2m5
+    S2m5D3 = D3*S2m5
+    C2m5D3 = D3*C2m5
     # Link 4
-    VP242 = C5b*VP232 + S5b*VP132
+    VP242 = S5b*S2m5D3 - C5b*C2m5D3
     # Joint 6
     FDI262 = -MY6*S2m5
     NE352 = D6*FDI262
     # Joint 4
     N342 = MX4R*VP242
     # Joint 3
-    N332 = MX3R*VP232 - MY3*VP132
+    N332 = -MX3R*C2m5D3 - MY3*S2m5D3
     NE332 = N342 + N332
-    # Joint 2
-    NE322 = ZZ2R + NE332
-    # Link 4
-    VP245 = D4*C5b
-    # Joint 4
-    N345 = MX4R*VP245
-    # Joint 3
-    NE335 = ZZ3R + N345
     # Inertia matrix
     A[0, 0] = NE311
-    A[1, 0] = A[0, 1] = NE321 - N331
-    A[2, 0] = A[0, 2] = N331
-    A[1, 1] = NE322 - NE332
-    A[2, 1] = A[1, 2] = NE332 + NE352 - N342
-    A[2, 2] = NE335 - N345
+    A[0, 1] = A[1, 0] = N321
+    A[1, 1] = ZZ2R
+    A[0, 2] = A[2, 0] = N331
+    A[1, 2] = A[2, 1] = NE332 + NE352 - N342
+    A[2, 2] = ZZ3R
 
 
 def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
@@ -817,9 +864,13 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
     (
-        MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R, OFFSET2, XX3R, XY3R, XZ3R,
-        YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6
+        MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
+        OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
+        MY6
     ) = X[1:]
+    # Constants
+    Z241 = np.cos(c)
+    Z141 = np.sin(c)
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -839,8 +890,8 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    WP12 = QP2*W22
-    WP22 = -QP2*W12
+    DV232 = QP2*W22
+    DV132 = QP2*W12
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -850,15 +901,15 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     DW122 = DV112 - DV222
     U112 = -DV222 - DV332
     U222 = -DV112 - DV332
-    U312 = -2*WP22
-    U322 = 2*WP12
+    U312 = 2*DV132
+    U322 = 2*DV232
     VP12 = C2*VP11
     VP22 = -S2*VP11
     # Link 3
     W13 = S5*QP1
     W23 = C5*QP1
-    WP13 = QP5*W23
-    WP23 = -QP5*W13
+    DV233 = QP5*W23
+    DV133 = QP5*W13
     DV113 = W13**2
     DV123 = W13*W23
     DV223 = W23**2
@@ -868,16 +919,16 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     DW123 = DV113 - DV223
     U113 = -DV223 - DV333
     U223 = -DV113 - DV333
-    U313 = -2*WP23
-    U323 = 2*WP13
+    U313 = 2*DV133
+    U323 = 2*DV233
     VSP13 = VP12 + D3*U112
     VSP23 = VP22 + D3*DV122
     VSP33 = VP21 + D3*U312
     VP13 = S2m5*VSP23 - C2m5*VSP13
     VP23 = -C2m5*VSP23 - S2m5*VSP13
     # Link 4
-    W14 = np.sin(c)*QP1
-    W24 = np.cos(c)*QP1
+    W14 = Z141*QP1
+    W24 = Z241*QP1
     DV124 = W14*W24
     DV224 = W24**2
     VSP14 = VP13 + D4*U113
@@ -919,16 +970,16 @@ def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
     F33 = MX3R*U313 + MY3*U323
     E13 = FDI14 + F13
     E23 = FDI24 + F23
-    N13 = XX3R*WP13 + ZZ3R*WP13 + YZ3R*DW233 + XZ3R*DV123 + MY3*VSP33 - XY3R*U313
-    N23 = XZ3R*DW313 + XY3R*U323 - (XX3R - ZZ3R)*WP23 - YZ3R*DV123 - MX3R*VSP33
+    N13 = XX3R*DV233 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*DV123 + MY3*VSP33 - XY3R*U313
+    N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*DV123 - MX3R*VSP33
     N33 = XY3R*DW123 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
     NE13 = S5b*N24 + N13
     NE23 = C5b*N24 + N23
     NE33 = N34 + D4*FDI24 + N33
     FDI23 = S2m5*E13 - C2m5*E23
     # Joint 2
-    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2R*DW232 + XZ2R*DV122 + MY2*VP21 - XY2R*U312
-    N22 = XZ2R*DW312 + XY2R*U322 - (XX2R - ZZ2R)*WP22 - YZ2R*DV122 - MX2R*VP21
+    N12 = XX2R*DV232 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*DV122 + MY2*VP21 - XY2R*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*DV122 - MX2R*VP21
     N32 = XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - MY2*VP12
     NE12 = N12 - C2m5*NE13 - S2m5*NE23
     NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*F33
@@ -983,18 +1034,13 @@ def _gravity_block(q, GAM, X, c, gx, gy):
     VP23 = -C2m5*VP22 - S2m5*VP12
     # Link 4
     VP24 = C5b*VP23 + S5b*VP13
-    # Link 5
-    VP15 = C5*VP11
-    VP25 = -S5*VP11
-    # Link 6
-    VP16 = C2m5*VP15 + S2m5*VP25
     # Joint 6
     N16 = MY6*VP21
-    N36 = -MY6*VP16
+    N36 = -MY6*VP12
     # Joint 5
     N15 = MY5*VP21
     N25 = -MX5R*VP21
-    N35 = MX5R*VP25 - MY5*VP15
+    N35 = MY5*VP13 - MX5R*VP23
     NE15 = C2m5*N16 + N15
     NE25 = S2m5*N16 + N25
     NE35 = N36 + N35
@@ -1029,8 +1075,8 @@ def _frame_poses_block(q, T, D3, D4, D6, c):
     # Inputs
     q1, q2, q5 = q
     # Constants
-    R324 = np.cos(c)
-    R314 = np.sin(c)
+    Z241 = np.cos(c)
+    Z141 = np.sin(c)
     # Trigonometry
     C1 = np.cos(q1)
     S1 = np.sin(q1)
@@ -1052,10 +1098,10 @@ def _frame_poses_block(q, T, D3, D4, D6, c):
     P23 = D3*R212
     P33 = -D3*S2
     # Frame 4
-    R114 = -R324*C1
-    R124 = R314*C1
-    R214 = -R324*S1
-    R224 = R314*S1
+    R114 = -Z241*C1
+    R124 = Z141*C1
+    R214 = -Z241*S1
+    R224 = Z141*S1
     P14 = P13 + D4*R113
     P24 = P23 + D4*R213
     P34 = P33 + D4*S5
@@ -1099,8 +1145,8 @@ def _frame_poses_block(q, T, D3, D4, D6, c):
     T[3, 1, 1] = R224
     T[3, 1, 2] = C1
     T[3, 1, 3] = P24
-    T[3, 2, 0] = R314
-    T[3, 2, 1] = R324
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
     T[3, 2, 3] = P34
     T[4, 0, 0] = -R113
     T[4, 0, 1] = -R123
@@ -1143,3 +1189,38 @@ def _frame_poses_block(q, T, D3, D4, D6, c):
     T[7, 2, 0] = S5
     T[7, 2, 1] = C5
     T[7, 2, 3] = P37
+
+
+# Of the robot file: drives, limits and values, which no function above reads
+LINKS = (1, 2, 3, 4, 5, 6)
+DRIVES = {  # qm = ratio (q - offset), tau = ratio' (torque_constant * u)
+    'ratio': (
+        (10.0, 0.0, 0.0),
+        (0.0, 10.0, 0.0),
+        (0.0, 0.0, 10.0),
+    ),
+    'offset': (0.0, 0.0, 0.0),
+    'torque_constant': (1.0, 1.0, 1.0),
+}
+LIMITS = {
+    'q': ((-1.0, 1.0), (-1.7, 0.1), (-3.2, -1.5)),
+    'qd': (6.0, 6.0, 6.0),
+    'qdd': (60.0, 60.0, 60.0),
+}
+VALUES = {
+    'XX1': 0.0060936, 'XY1': -2e-07, 'XZ1': 2e-07, 'YY1': 0.007194, 'YZ1': 0.0004387,
+    'ZZ1': 0.00731594, 'MX1': 1e-05, 'MY1': 0.0219355, 'MZ1': -0.026865, 'M1': 1.3432,
+    'Ia1': 0.0086827, 'FV1': 0.0002, 'FS1': 0.12, 'OFFSET1': 0.0002, 'XX2': 0.0005008,
+    'XY2': 7e-07, 'XZ2': 9.88e-05, 'YY2': 0.009455, 'YZ2': 0.0, 'ZZ2': 0.0094661,
+    'MX2': -0.0895382, 'MY2': 1e-05, 'MZ2': 0.0012839, 'M2': 1.1377, 'Ia2': 0.0054814,
+    'FV2': 0.0001, 'FS2': 0.09, 'OFFSET2': 0.02, 'XX3': 3.156e-05, 'XY3': -1e-06,
+    'XZ3': -4.23e-05, 'YY3': 0.0034816, 'YZ3': 0.0, 'ZZ3': 0.00348384, 'MX3': 0.0279611,
+    'MY3': 1e-05, 'MZ3': 0.0004654, 'M3': 0.281, 'XX4': 2.74e-05, 'XY4': 0.0, 'XZ4': 0.0,
+    'YY4': 2.74e-05, 'YZ4': 0.0, 'ZZ4': 3.35e-05, 'MX4': -1e-05, 'MY4': 5.69e-05,
+    'MZ4': 1.08e-05, 'M4': 0.0569, 'FV4': 1e-05, 'FS4': 0.005, 'XX5': 0.0004348, 'XY5': 6e-07,
+    'XZ5': -4.19e-05, 'YY5': 0.0048428, 'YZ5': 0.0, 'ZZ5': 0.0048887, 'MX5': 0.0655991,
+    'MY5': -1e-05, 'MZ5': 0.0003762, 'M5': 0.9757, 'Ia5': 0.0024855, 'FV5': 0.0001,
+    'FS5': 0.085, 'OFFSET5': 0.03, 'XX6': 6.8e-06, 'XY6': -7e-07, 'XZ6': 5.3e-06,
+    'YY6': 0.0005366, 'YZ6': 0.0, 'ZZ6': 0.0005365, 'MX6': 0.0029582, 'MY6': 1e-05,
+    'MZ6': -7.18e-05, 'M6': 0.0388, 'FVP2': 2e-05, 'FVP5': 2e-05, 'FSP2': 0.02, 'FSP5': 0.02,
+}

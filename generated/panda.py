@@ -1,6 +1,15 @@
+# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+# with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
+# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian at random states,
+# parameters and random constants agree with Lagrange's equations and products of frames to 1e-09;
+# SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
+# FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
+# robot file.
+# sha256 of what follows: d6970e2aaadf0428c375d0396e17a9ccfe06852b2ef18b4a956ea3e5927ebd5e
 """Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.2.0. Do not edit; symgen generate panda
+GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.2.0.
+Do not edit; symgen generate panda
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha    d  theta    r
@@ -12,42 +21,23 @@ Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JO
     6    5      0   pi/2    0     q6    0
     7    6      0   pi/2   D7     q7    0
 Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
-Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
-Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd +
+            FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
+            MZ first moments
 Element     Ia      inertia: along q1, q2, q3, q4, q5, q6, q7
 Element     FV      viscous: along q1, q2, q3, q4, q5, q6, q7
 Element     FS      coulomb: along q1, q2, q3, q4, q5, q6, q7
 Element     OFFSET  offset: along q1, q2, q3, q4, q5, q6, q7
 
-Base parameters, 69 of 98; Gautier and Khalil (1990), exact over F_p
-    ZZ1R = ZZ1 + Ia1 + YY2
-    XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
-    ZZ2R = ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
-    MY2R = MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)
-    XX3R = XX3 - YY3 + YY4 - D4**2*M4
-    XY3R = XY3 + D4*MZ4
-    ZZ3R = ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)
-    MX3R = MX3 + D4*(M4 + M5 + M6 + M7)
-    MY3R = MY3 - MZ4
-    XX4R = XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)
-    XY4R = XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)
-    ZZ4R = ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)
-    MX4R = MX4 - D4*(M5 + M6 + M7)
-    MY4R = MY4 + MZ5 + RL5*(M5 + M6 + M7)
-    XX5R = XX5 - YY5 + YY6 + D7**2*M7
-    ZZ5R = ZZ5 + YY6 + D7**2*M7
-    MY5R = MY5 - MZ6
-    XX6R = XX6 - YY6 + YY7 - D7**2*M7
-    XY6R = XY6 + D7*MZ7
-    ZZ6R = ZZ6 + YY7 + D7**2*M7
-    MX6R = MX6 + D7*M7
-    MY6R = MY6 - MZ7
-    XX7R = XX7 - YY7
-    as they are: FV1 FS1 OFFSET1 XY2 XZ2 YZ2 MX2 FV2 FS2 OFFSET2 XZ3 YZ3 Ia3 FV3 FS3 OFFSET3 XZ4 YZ4 Ia4 FV4 FS4 OFFSET4
-        XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5 OFFSET5 XZ6 YZ6 Ia6 FV6 FS6 OFFSET6 XY7 XZ7 YZ7 ZZ7 MX7 MY7 Ia7 FV7 FS7 OFFSET7
-No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
+Base parameters, 69 of 98; Gautier and Khalil (1990)
+    exact over F_p
+    FORMULAS says what they are made of; what it leaves out is as it is
+    No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 M2
 
-Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
+            part that several share, N16a of N16
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
     QP   joint velocity; with the name of an element, QPFSM6, the velocity that it acts along
@@ -69,18 +59,20 @@ Names       family, then component digits, then link: W12 is component 1 of link
     FDI  the transmitted force, in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
+    DF   the part of DG that pushes: velocity times force
     R    orientation of a frame in frame 0
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor         684 multiplications, 497 additions, 6 sin, 6 cos
-    inverse_dynamics  333 multiplications, 323 additions, 6 sin, 6 cos
-    inertia_matrix    572 multiplications, 416 additions, 6 sin, 6 cos
-    bias              322 multiplications, 299 additions, 6 sin, 6 cos
-    gravity           64 multiplications, 45 additions, 6 sin, 6 cos
-    frame_poses       77 multiplications, 41 additions, 7 sin, 7 cos
+    regressor          684 multiplications, 497 additions, 6 sin, 6 cos
+    inverse_dynamics   333 multiplications, 321 additions, 6 sin, 6 cos
+    inertia_matrix     567 multiplications, 415 additions, 6 sin, 6 cos
+    bias               322 multiplications, 299 additions, 6 sin, 6 cos
+    gravity            60 multiplications, 42 additions, 6 sin, 6 cos
+    frame_poses        77 multiplications, 41 additions, 7 sin, 7 cos
 
-Arguments   q, qd, qdd, tau of shape (N, 7), or (7,) for one state: results then have no axis of samples; rad or m and seconds
+Arguments   q, qd, qdd, tau of shape (N, 7), or (7,) for one state: results then have no axis
+            of samples; rad or m and seconds
             X of shape (69,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
@@ -91,74 +83,64 @@ NAME = 'panda'
 SOURCE_SHA256 = '69d8ce994a1a6da19a1e7c019c757c841da3b362c433aeebbc97846fc2eef261'
 JOINTS = (1, 2, 3, 4, 5, 6, 7)
 CONSTANTS = {'RL1': 0.333, 'RL3': 0.316, 'D4': 0.0825, 'RL5': 0.384, 'D7': 0.088, 'g': 9.81}
-BASE_PARAMETERS = (
-    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2', 'XZ2', 'YZ2', 'ZZ2R', 'MX2', 'MY2R', 'FV2', 'FS2', 'OFFSET2',
-    'XX3R', 'XY3R', 'XZ3', 'YZ3', 'ZZ3R', 'MX3R', 'MY3R', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4R', 'XY4R', 'XZ4', 'YZ4',
-    'ZZ4R', 'MX4R', 'MY4R', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5',
-    'FV5', 'FS5', 'OFFSET5', 'XX6R', 'XY6R', 'XZ6', 'YZ6', 'ZZ6R', 'MX6R', 'MY6R', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
-    'XX7R', 'XY7', 'XZ7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'Ia7', 'FV7', 'FS7', 'OFFSET7',
-)
-STANDARD_PARAMETERS = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
-    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
-    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
-    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5',
-    'MZ5', 'M5', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6',
-    'Ia6', 'FV6', 'FS6', 'OFFSET6', 'XX7', 'XY7', 'XZ7', 'YY7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'MZ7', 'M7', 'Ia7', 'FV7',
-    'FS7', 'OFFSET7',
-)
-UNITS = {
-    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2': 'kg*m**2',
-    'XZ2': 'kg*m**2', 'YZ2': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2': 'kg*m', 'MY2R': 'kg*m', 'FV2': 'N*m*s/rad',
-    'FS2': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2', 'XZ3': 'kg*m**2', 'YZ3': 'kg*m**2',
-    'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3R': 'kg*m', 'Ia3': 'kg*m**2', 'FV3': 'N*m*s/rad', 'FS3': 'N*m',
-    'OFFSET3': 'N*m', 'XX4R': 'kg*m**2', 'XY4R': 'kg*m**2', 'XZ4': 'kg*m**2', 'YZ4': 'kg*m**2', 'ZZ4R': 'kg*m**2',
-    'MX4R': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad', 'FS4': 'N*m', 'OFFSET4': 'N*m',
-    'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2', 'ZZ5R': 'kg*m**2', 'MX5': 'kg*m',
-    'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m', 'OFFSET5': 'N*m', 'XX6R': 'kg*m**2',
-    'XY6R': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6R': 'kg*m**2', 'MX6R': 'kg*m', 'MY6R': 'kg*m',
-    'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m', 'XX7R': 'kg*m**2', 'XY7': 'kg*m**2',
-    'XZ7': 'kg*m**2', 'YZ7': 'kg*m**2', 'ZZ7': 'kg*m**2', 'MX7': 'kg*m', 'MY7': 'kg*m', 'Ia7': 'kg*m**2',
-    'FV7': 'N*m*s/rad', 'FS7': 'N*m', 'OFFSET7': 'N*m',
-}
-FORMULAS = {
-    'ZZ1R': 'ZZ1 + Ia1 + YY2', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
-    'XX2R': 'XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)', 'XY2': 'XY2',
-    'XZ2': 'XZ2', 'YZ2': 'YZ2',
-    'ZZ2R': 'ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)', 'MX2': 'MX2',
-    'MY2R': 'MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)', 'FV2': 'FV2', 'FS2': 'FS2', 'OFFSET2': 'OFFSET2',
-    'XX3R': 'XX3 - YY3 + YY4 - D4**2*M4', 'XY3R': 'XY3 + D4*MZ4', 'XZ3': 'XZ3', 'YZ3': 'YZ3',
-    'ZZ3R': 'ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)', 'MX3R': 'MX3 + D4*(M4 + M5 + M6 + M7)',
-    'MY3R': 'MY3 - MZ4', 'Ia3': 'Ia3', 'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3',
-    'XX4R': 'XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)',
-    'XY4R': 'XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)', 'XZ4': 'XZ4', 'YZ4': 'YZ4',
-    'ZZ4R': 'ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)', 'MX4R': 'MX4 - D4*(M5 + M6 + M7)',
-    'MY4R': 'MY4 + MZ5 + RL5*(M5 + M6 + M7)', 'Ia4': 'Ia4', 'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4',
-    'XX5R': 'XX5 - YY5 + YY6 + D7**2*M7', 'XY5': 'XY5', 'XZ5': 'XZ5', 'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6 + D7**2*M7',
-    'MX5': 'MX5', 'MY5R': 'MY5 - MZ6', 'Ia5': 'Ia5', 'FV5': 'FV5', 'FS5': 'FS5', 'OFFSET5': 'OFFSET5',
-    'XX6R': 'XX6 - YY6 + YY7 - D7**2*M7', 'XY6R': 'XY6 + D7*MZ7', 'XZ6': 'XZ6', 'YZ6': 'YZ6',
-    'ZZ6R': 'ZZ6 + YY7 + D7**2*M7', 'MX6R': 'MX6 + D7*M7', 'MY6R': 'MY6 - MZ7', 'Ia6': 'Ia6', 'FV6': 'FV6',
-    'FS6': 'FS6', 'OFFSET6': 'OFFSET6', 'XX7R': 'XX7 - YY7', 'XY7': 'XY7', 'XZ7': 'XZ7', 'YZ7': 'YZ7', 'ZZ7': 'ZZ7',
-    'MX7': 'MX7', 'MY7': 'MY7', 'Ia7': 'Ia7', 'FV7': 'FV7', 'FS7': 'FS7', 'OFFSET7': 'OFFSET7',
-}
+BASE_PARAMETERS = tuple("""
+ZZ1R FV1 FS1 OFFSET1 XX2R XY2 XZ2 YZ2 ZZ2R MX2 MY2R FV2 FS2 OFFSET2 XX3R XY3R XZ3 YZ3 ZZ3R MX3R MY3R
+Ia3 FV3 FS3 OFFSET3 XX4R XY4R XZ4 YZ4 ZZ4R MX4R MY4R Ia4 FV4 FS4 OFFSET4 XX5R XY5 XZ5 YZ5 ZZ5R MX5
+MY5R Ia5 FV5 FS5 OFFSET5 XX6R XY6R XZ6 YZ6 ZZ6R MX6R MY6R Ia6 FV6 FS6 OFFSET6 XX7R XY7 XZ7 YZ7 ZZ7
+MX7 MY7 Ia7 FV7 FS7 OFFSET7
+""".split())
+STANDARD_PARAMETERS = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1 Ia1 FV1 FS1 OFFSET1 XX2 XY2 XZ2 YY2 YZ2 ZZ2 MX2 MY2 MZ2 M2
+Ia2 FV2 FS2 OFFSET2 XX3 XY3 XZ3 YY3 YZ3 ZZ3 MX3 MY3 MZ3 M3 Ia3 FV3 FS3 OFFSET3 XX4 XY4 XZ4 YY4 YZ4
+ZZ4 MX4 MY4 MZ4 M4 Ia4 FV4 FS4 OFFSET4 XX5 XY5 XZ5 YY5 YZ5 ZZ5 MX5 MY5 MZ5 M5 Ia5 FV5 FS5 OFFSET5
+XX6 XY6 XZ6 YY6 YZ6 ZZ6 MX6 MY6 MZ6 M6 Ia6 FV6 FS6 OFFSET6 XX7 XY7 XZ7 YY7 YZ7 ZZ7 MX7 MY7 MZ7 M7
+Ia7 FV7 FS7 OFFSET7
+""".split())
 NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'MZ2', 'M2')
-STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
-    "x......", "x......", "x......", "x......", "xx.....", "xx.....", "xx.....", "xx.....", ".x.....", ".x.....",
-    ".x.....", ".x.....", ".x.....", ".x.....", "xxx....", "xxx....", "xxx....", "xxx....", "xxx....", "xxx....",
-    "xxx....", "..x....", "..x....", "..x....", "..x....", "xxxx...", "xxxx...", "xxxx...", "xxxx...", "xxxx...",
-    "xxxx...", "xxxx...", "...x...", "...x...", "...x...", "...x...", "xxxxx..", "xxxxx..", "xxxxx..", "xxxxx..",
-    "xxxxx..", "xxxxx..", "xxxxx..", "....x..", "....x..", "....x..", "....x..", "xxxxxx.", "xxxxxx.", "xxxxxx.",
-    "xxxxxx.", "xxxxxx.", "xxxxxx.", "xxxxxx.", ".....x.", ".....x.", ".....x.", ".....x.", "xxxxxxx", "xxxxxxx",
-    "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "......x", "......x", "......x", "......x",
-)])
-DRIVES = None
-LIMITS = {
-    'q': ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973), (-0.0175, 3.7525), (-2.8973, 2.8973)),
-    'qd': (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61), 'qdd': (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
-    'tau': (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2',
+    'XX2R': 'XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)',
+    'ZZ2R': 'ZZ2 + Ia2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)',
+    'MY2R': 'MY2 - MZ3 - RL3*(M3 + M4 + M5 + M6 + M7)',
+    'XX3R': 'XX3 - YY3 + YY4 - D4**2*M4',
+    'XY3R': 'XY3 + D4*MZ4',
+    'ZZ3R': 'ZZ3 + YY4 + D4**2*M4 + 2*D4**2*(M5 + M6 + M7)',
+    'MX3R': 'MX3 + D4*(M4 + M5 + M6 + M7)',
+    'MY3R': 'MY3 - MZ4',
+    'XX4R': 'XX4 - YY4 + YY5 + 2*RL5*MZ5 + (-D4**2 + RL5**2)*(M5 + M6 + M7)',
+    'XY4R': 'XY4 + D4*MZ5 + D4*RL5*(M5 + M6 + M7)',
+    'ZZ4R': 'ZZ4 + YY5 + 2*RL5*MZ5 + (D4**2 + RL5**2)*(M5 + M6 + M7)',
+    'MX4R': 'MX4 - D4*(M5 + M6 + M7)',
+    'MY4R': 'MY4 + MZ5 + RL5*(M5 + M6 + M7)',
+    'XX5R': 'XX5 - YY5 + YY6 + D7**2*M7',
+    'ZZ5R': 'ZZ5 + YY6 + D7**2*M7',
+    'MY5R': 'MY5 - MZ6',
+    'XX6R': 'XX6 - YY6 + YY7 - D7**2*M7',
+    'XY6R': 'XY6 + D7*MZ7',
+    'ZZ6R': 'ZZ6 + YY7 + D7**2*M7',
+    'MX6R': 'MX6 + D7*M7',
+    'MY6R': 'MY6 - MZ7',
+    'XX7R': 'XX7 - YY7',
 }
-VALUES = {}
-LINKS = (1, 2, 3, 4, 5, 6, 7)
+UNITS = dict(zip(BASE_PARAMETERS, tuple("""
+kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m N*m*s/rad N*m N*m
+kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2
+kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m
+kg*m kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad
+N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m N*m
+""".split())))
+# STRUCTURE[k, j]: whether base parameter k acts on joint j
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (
+    "x......", "x......", "x......", "x......", "xx.....", "xx.....", "xx.....", "xx.....",
+    ".x.....", ".x.....", ".x.....", ".x.....", ".x.....", ".x.....", "xxx....", "xxx....",
+    "xxx....", "xxx....", "xxx....", "xxx....", "xxx....", "..x....", "..x....", "..x....",
+    "..x....", "xxxx...", "xxxx...", "xxxx...", "xxxx...", "xxxx...", "xxxx...", "xxxx...",
+    "...x...", "...x...", "...x...", "...x...", "xxxxx..", "xxxxx..", "xxxxx..", "xxxxx..",
+    "xxxxx..", "xxxxx..", "xxxxx..", "....x..", "....x..", "....x..", "....x..", "xxxxxx.",
+    "xxxxxx.", "xxxxxx.", "xxxxxx.", "xxxxxx.", "xxxxxx.", "xxxxxx.", ".....x.", ".....x.",
+    ".....x.", ".....x.", "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx", "xxxxxxx",
+    "xxxxxxx", "......x", "......x", "......x", "......x",
+)])
 
 
 class Store(np.ndarray):
@@ -171,28 +153,44 @@ class Store(np.ndarray):
 
 
 def store(N: int) -> Store:
-    """Room for N samples, shape (69, 7, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
-    S = np.zeros((69, 7, N)).view(Store)
-    S[3, 0] = S[13, 1] = S[24, 2] = S[35, 3] = S[46, 4] = S[57, 5] = S[68, 6] = 1.0
-    S.ready = True
-    return S
+    """Room for N samples, shape (69, 7, N): zeros and constants are written here, once.
+    Reuse it: a fresh one costs page faults.
+    """
+    zeros = np.zeros((69, 7, N)).view(Store)
+    zeros[3, 0] = zeros[13, 1] = zeros[24, 2] = zeros[35, 3] = zeros[46, 4] = zeros[57, 5] = 1.0
+    zeros[68, 6] = 1.0
+    zeros.ready = True
+    return zeros
 
 
 def _states(*arrays):
-    """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape (N, 7), or all (7,)."""
+    """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape
+    (N, 7), or all (7,).
+    """
     states = [np.asarray(x, dtype=float) for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (7,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
-        raise ValueError(f"states of shape {shapes}; expected (N, 7) each, or (7,) each for one state")
+        raise ValueError(f"states of shape {shapes}; expected (N, 7) each, or (7,) each")
     return tuple([x.reshape(-1, 7) for x in states])
 
 
+def _parameters(X):
+    """X as an array; ValueError unless it has a value for each base parameter."""
+    X = np.asarray(X, dtype=float)
+    if X.shape != (69,):
+        raise ValueError(f"X of shape {X.shape}; expected (69,) in the order of BASE_PARAMETERS")
+    return X
+
+
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+    (..., B), result ends in samples.
+    """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
-        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
+        block(*rows, result[..., t:t + B], *arguments)
 
 
 def _by_sample(result, q):
@@ -202,21 +200,27 @@ def _by_sample(result, q):
 
 
 def elements(
-    *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
-    g: float = 9.81
+    *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
 ) -> dict:
-    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
+    {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
+    """
     return {
-        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-        'OFFSET4': ('offset', 'both', {4: 1.0}), 'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
-        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}),
-        'FV6': ('viscous', 'both', {6: 1.0}), 'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
-        'Ia7': ('inertia', 'both', {7: 1.0}), 'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}),
-        'OFFSET7': ('offset', 'both', {7: 1.0}),
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
+        'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
+        'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+        'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
+        'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
+        'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
+        'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
+        'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
+        'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
+        'Ia7': ('inertia', 'both', {7: 1.0}), 'FV7': ('viscous', 'both', {7: 1.0}),
+        'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
     }
 
 
@@ -224,18 +228,21 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
-    D7: float = 0.088, g: float = 9.81
+    standard: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """X, shape (69,), from the 98 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    """X, shape (69,), from the 98 standard parameters: a mapping by name, or a vector in the
+    order of STANDARD_PARAMETERS.
+    """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, _, Ia2, FV2,
-        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4,
-        ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5,
-        OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7,
-        MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
+        MX2, MY2, _, _, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3,
+        Ia3, FV3, FS3, OFFSET3, XX4, XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4,
+        OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6,
+        XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7,
+        YZ7, ZZ7, MX7, MY7, MZ7, M7, Ia7, FV7, FS7, OFFSET7
     ) = standard
     ZZ1R = ZZ1 + Ia1 + YY2
     XX2R = XX2 - YY2 + YY3 + 2*RL3*MZ3 + RL3**2*M3 + (D4**2 + RL3**2)*(M4 + M5 + M6 + M7)
@@ -261,119 +268,160 @@ def base_parameters(
     MY6R = MY6 - MZ7
     XX7R = XX7 - YY7
     return np.array([
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3, YZ3, ZZ3R, MX3R,
-        MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5,
-        ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7,
-        XZ7, YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7,
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R,
+        XY3R, XZ3, YZ3, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R,
+        MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5,
+        XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7,
+        MX7, MY7, Ia7, FV7, FS7, OFFSET7,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL1: float = 0.333, RL3: float = 0.316,
-    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
     """D of Gamma = D X. Shape (N, 7, 69).
 
-    A view on one store of shape (69, 7, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
-    faults, up to several times the arithmetic for large N.
+    A view on one store of shape (69, 7, N). `out` is such a store, made by `store(N)` and
+    reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    D = _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g).transpose(2, 1, 0)
-    return D[0] if np.ndim(q) == 1 else D
+    filled = _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g).transpose(2, 1, 0)
+    return filled[0] if np.ndim(q) == 1 else filled
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, RL1: float = 0.333, RL3: float = 0.316,
-    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
+    D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """W of Y = W X + rho, shape (7*N, 69), Fortran order, rows joint-major: the same store, no copy."""
+    """W of Y = W X + rho, shape (7*N, 69), Fortran order, rows joint-major: the same
+    store, no copy.
+    """
     return _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g).reshape(69, -1).T
+
+
+def _ready(out, N):
+    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+    out = store(N) if out is None else out
+    if not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
+        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {kind}")
+    return out.view(np.ndarray)
 
 
 def _filled_store(q, qd, qdd, out, RL3, D4, RL5, D7, g):
     """`out`, or a new store, filled."""
     states = _states(q, qd, qdd)
-    N = len(states[0])
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (69, 7, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(69, 7, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    D = out.view(np.ndarray)
-    _fill(_regressor_block, D, states, RL3, D4, RL5, D7, g)
-    return D
+    result = _ready(out, len(states[0]))
+    _fill(_regressor_block, result, states, RL3, D4, RL5, D7, g)
+    return result
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316,
-    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333,
+    RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
+    g: float = 9.81
 ) -> np.ndarray:
-    """Joint torques Gamma. Shape (N, 7)."""
+    """Joint torques Gamma = A qdd + C qd + Q + friction.
+
+    Shape (N, 7).
+    """
+    X = _parameters(X)
     states = _states(q, qd, qdd)
-    GAM = np.zeros((7, len(states[0])))
-    _fill(_inverse_dynamics_block, GAM, states, X, RL3, D4, RL5, D7, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((7, len(states[0])))
+    _fill(_inverse_dynamics_block, result, states, X, RL3, D4, RL5, D7, g)
+    return _by_sample(result, q)
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
-    D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 7, 7)."""
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
+
+    Shape (N, 7, 7).
+    """
+    X = _parameters(X)
     states = _states(q)
-    A = np.zeros((7, 7, len(states[0])))
-    _fill(_inertia_matrix_block, A, states, X, RL3, D4, RL5, D7)
-    return _by_sample(A, q)
+    result = np.zeros((7, 7, len(states[0])))
+    _fill(_inertia_matrix_block, result, states, X, RL3, D4, RL5, D7)
+    return _by_sample(result, q)
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
-    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 7)."""
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
+
+    Shape (N, 7).
+    """
+    X = _parameters(X)
     states = _states(q, qd)
-    GAM = np.zeros((7, len(states[0])))
-    _fill(_bias_block, GAM, states, X, RL3, D4, RL5, D7, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((7, len(states[0])))
+    _fill(_bias_block, result, states, X, RL3, D4, RL5, D7, g)
+    return _by_sample(result, q)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384,
-    D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 7)."""
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
+
+    Shape (N, 7).
+    """
+    X = _parameters(X)
     states = _states(q)
-    GAM = np.zeros((7, len(states[0])))
-    _fill(_gravity_block, GAM, states, X, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((7, len(states[0])))
+    _fill(_gravity_block, result, states, X, g)
+    return _by_sample(result, q)
 
 
 def frame_poses(
-    q: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
-    g: float = 9.81
+    q: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
+    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 7, 4, 4)."""
+    """Homogeneous transform of every frame j in frame 0, at index j - 1.
+
+    Shape (N, 7, 4, 4).
+    """
     states = _states(q)
-    T = np.zeros((7, 4, 4, len(states[0])))
-    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
-    _fill(_frame_poses_block, T, states, RL1, RL3, D4, RL5, D7)
-    return _by_sample(T, q)
+    result = np.zeros((7, 4, 4, len(states[0])))
+    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
+    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = 1.0
+    _fill(_frame_poses_block, result, states, RL1, RL3, D4, RL5, D7)
+    return _by_sample(result, q)
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, RL1: float = 0.333, RL3: float = 0.316,
-    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, RL1: float = 0.333,
+    RL3: float = 0.316, D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088,
+    g: float = 9.81
 ) -> np.ndarray:
-    """qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
-    A, H = inertia_matrix(q, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7), bias(q, qd, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
-    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+    """Qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
+    inertia = inertia_matrix(q, X, RL3=RL3, D4=D4, RL5=RL5, D7=D7)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, RL1: float = 0.333, RL3: float = 0.316, D4: float = 0.0825,
-    RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
+    q: np.ndarray, *, frame: int | None = None, RL1: float = 0.333, RL3: float = 0.316,
+    D4: float = 0.0825, RL5: float = 0.384, D7: float = 0.088, g: float = 9.81
 ) -> np.ndarray:
-    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 7)."""
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
+    frame 0, per joint rate. Shape (N, 6, 7).
+    """
     frame = 7 if frame is None else frame
-    path, T = _paths()[frame], frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7).reshape(-1, 7, 4, 4)
+    poses = frame_poses(q, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7).reshape(-1, 7, 4, 4)
+    result = _jacobian(_paths()[frame], poses, frame)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def _jacobian(path, T, frame):
+    """Columns of the joints on `path`, shape (N, 6, 7), from the poses T of all frames."""
     J, P = np.zeros((len(T), 6, 7)), T[:, frame - 1, :3, 3]
     for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
@@ -381,18 +429,23 @@ def jacobian(
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    return J[0] if np.ndim(q) == 1 else J
+    return J
 
 
 def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
+    how the joints in the columns move them.
+    """
     return {
         1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
         3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
         4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
-        7: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5, 0, ((4, 1.0),)), (6, 0, ((5, 1.0),)), (7, 0, ((6, 1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5,
+            0, ((4, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5,
+            0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+        7: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5,
+            0, ((4, 1.0),)), (6, 0, ((5, 1.0),)), (7, 0, ((6, 1.0),)),),
     }
 
 
@@ -913,10 +966,11 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
     QP1, QP2, QP3, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6, QDP7 = qdd
     (
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3, YZ3, ZZ3R,
-        MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5,
-        XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6,
-        OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2, YZ2, ZZ2R, MX2, MY2R, FV2, FS2, OFFSET2, XX3R,
+        XY3R, XZ3, YZ3, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4, YZ4, ZZ4R,
+        MX4R, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
+        OFFSET5, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R, Ia6, FV6, FS6, OFFSET6, XX7R, XY7, XZ7,
+        YZ7, ZZ7, MX7, MY7, Ia7, FV7, FS7, OFFSET7
     ) = X
     # Trigonometry
     C2 = np.cos(q2)
@@ -934,10 +988,12 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV232 = QP2*W22
-    WP12 = DV232 - S2*QDP1
+    WP12 = DV232 - S2QDP1
     DV132 = QP2*W12
-    WP22 = -C2*QDP1 - DV132
+    WP22 = -C2QDP1 - DV132
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -946,10 +1002,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
     DW312 = DV332 - DV112
     DW122 = DV112 - DV222
     U122 = DV122 - QDP2
-    U132 = DV132 + WP22
     U212 = QDP2 + DV122
     U222 = -DV112 - DV332
-    U232 = DV232 - WP12
     U312 = DV132 - WP22
     U322 = DV232 + WP12
     VP12 = -g*S2
@@ -1166,7 +1220,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, RL3, D4, RL5, D7, g):
     # Joint 2
     N12 = XX2R*WP12 + ZZ2R*DV232 + YZ2*DW232 + XZ2*U212 - XY2*U312
     N22 = (XX2R - ZZ2R)*DV132 + XZ2*DW312 + XY2*U322 - YZ2*U122
-    N32 = ZZ2R*QDP2 + XY2*DW122 + YZ2*U132 + MX2*VP22 - XX2R*DV122 - XZ2*U232 - MY2R*VP12
+    N32 = ZZ2R*QDP2 + XY2*DW122 + MX2*VP22 - XX2R*DV122 - YZ2*C2QDP1 - XZ2*S2QDP1 - MY2R*VP12
     NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
     NE22 = N22 - NE33
     NE32 = S3*NE13 + C3*NE23 + RL3*FDI13 + N32
@@ -1247,87 +1301,87 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     C7 = np.cos(q7)
     S7 = np.sin(q7)
     # Link 3
-    WP131 = -S2*C3
-    WP231 = S2*S3
+    S2C3 = S2*C3
+    S2S3 = S2*S3
     VSP331 = RL3*S2
-    VP131 = S3*VSP331
-    VP231 = C3*VSP331
+    S3VSP331 = S3*VSP331
+    C3VSP331 = C3*VSP331
     # Link 4
-    WP141 = C4*WP131 + C2*S4
-    WP241 = C2*C4 - S4*WP131
-    VSP341 = -D4*WP231
-    VSP241 = VP231 + D4*C2
-    VP141 = C4*VP131 + S4*VSP341
-    VP241 = C4*VSP341 - S4*VP131
+    F371a = C4*S2C3 - C2*S4
+    VSP351a = C2*C4 + S4*S2C3
+    D4S2S3 = D4*S2S3
+    VSP241 = C3VSP331 + D4*C2
+    VP141 = C4*S3VSP331 - S4*D4S2S3
+    VP241 = -C4*D4S2S3 - S4*S3VSP331
     # Link 5
-    WP151 = C5*WP141 + S5*WP231
-    WP251 = C5*WP231 - S5*WP141
-    VSP151 = VP141 + RL5*WP231
-    VSP251 = VP241 - VSP341
-    VSP351 = D4*WP241 + RL5*WP141 - VSP241
+    F371b = C5*F371a - S5*S2S3
+    F371c = C5*S2S3 + S5*F371a
+    VSP151 = VP141 + RL5*S2S3
+    VSP251 = D4S2S3 + VP241
+    VSP351 = D4*VSP351a - VSP241 - RL5*F371a
     VP151 = C5*VSP151 - S5*VSP351
     VP251 = -C5*VSP351 - S5*VSP151
     # Link 6
-    WP161 = C6*WP151 + S6*WP241
-    WP261 = C6*WP241 - S6*WP151
+    F371d = C6*F371b - S6*VSP351a
+    VSP371a = C6*VSP351a + S6*F371b
     VP161 = C6*VP151 + S6*VSP251
     VP261 = C6*VSP251 - S6*VP151
     # Link 7
-    WP171 = C7*WP161 - S7*WP251
-    WP271 = -C7*WP251 - S7*WP161
-    VSP271 = VP261 - D7*WP251
-    VSP371 = -VP251 - D7*WP261
+    F371e = C7*F371d + S7*F371c
+    F371f = C7*F371c - S7*F371d
+    VSP271 = VP261 - D7*F371c
+    VSP371 = -VP251 - D7*VSP371a
     VP171 = C7*VP161 + S7*VSP371
     VP271 = C7*VSP371 - S7*VP161
     # Joint 7
-    F171 = MY7*WP261
-    F271 = -MX7*WP261
-    F371 = MY7*WP171 - MX7*WP271
-    N171 = XX7R*WP171 + XY7*WP271 - XZ7*WP261 - MY7*VSP271
-    N271 = XY7*WP171 + MX7*VSP271 - YZ7*WP261
-    N371 = YZ7*WP271 + XZ7*WP171 + MX7*VP271 - ZZ7*WP261 - MY7*VP171
+    F171 = MY7*VSP371a
+    F271 = -MX7*VSP371a
+    F371 = MX7*F371f - MY7*F371e
+    N171 = -XX7R*F371e - XZ7*VSP371a - XY7*F371f - MY7*VSP271
+    N271 = MX7*VSP271 - XY7*F371e - YZ7*VSP371a
+    N371 = MX7*VP271 - ZZ7*VSP371a - YZ7*F371f - XZ7*F371e - MY7*VP171
     FDI171 = C7*F171 - S7*F271
     FDI371 = S7*F171 + C7*F271
     # Joint 6
-    F161 = MY6R*WP251
-    F261 = -MX6R*WP251
-    F361 = MY6R*WP161 - MX6R*WP261
+    F161 = MY6R*F371c
+    F261 = -MX6R*F371c
+    F361 = -MX6R*VSP371a - MY6R*F371d
     E161 = FDI171 + F161
     E261 = F261 - F371
     E361 = FDI371 + F361
-    N161 = XX6R*WP161 + XY6R*WP261 - XZ6*WP251 - MY6R*VP251
-    N261 = XY6R*WP161 + MX6R*VP251 - YZ6*WP251
-    N361 = YZ6*WP261 + XZ6*WP161 + MX6R*VP261 - ZZ6R*WP251 - MY6R*VP161
+    N161 = XY6R*VSP371a - XX6R*F371d - XZ6*F371c - MY6R*VP251
+    N261 = MX6R*VP251 - XY6R*F371d - YZ6*F371c
+    N361 = YZ6*VSP371a + MX6R*VP261 - ZZ6R*F371c - XZ6*F371d - MY6R*VP161
     NE161 = C7*N171 + N161 - S7*N271
     NE261 = N261 - N371 - D7*FDI371
     NE361 = S7*N171 + C7*N271 + N361 - D7*F371
     FDI161 = C6*E161 - S6*E261
     FDI361 = S6*E161 + C6*E261
     # Joint 5
-    F151 = -MY5R*WP241
-    F251 = MX5*WP241
-    F351 = MY5R*WP151 - MX5*WP251
+    F151 = -MY5R*VSP351a
+    F251 = MX5*VSP351a
+    F351 = -MX5*F371c - MY5R*F371b
     E151 = FDI161 + F151
     E251 = F251 - E361
     E351 = FDI361 + F351
-    N151 = XX5R*WP151 + XZ5*WP241 + XY5*WP251 + MY5R*VSP251
-    N251 = XY5*WP151 + YZ5*WP241 - MX5*VSP251
-    N351 = ZZ5R*WP241 + YZ5*WP251 + XZ5*WP151 + MX5*VP251 - MY5R*VP151
+    N151 = XZ5*VSP351a + XY5*F371c + MY5R*VSP251 - XX5R*F371b
+    N251 = YZ5*VSP351a - XY5*F371b - MX5*VSP251
+    N351 = ZZ5R*VSP351a + YZ5*F371c + MX5*VP251 - XZ5*F371b - MY5R*VP151
     NE151 = C6*NE161 + N151 - S6*NE261
     NE251 = N251 - NE361
     NE351 = S6*NE161 + C6*NE261 + N351
     FDI151 = C5*E151 - S5*E251
     FDI351 = -S5*E151 - C5*E251
     # Joint 4
-    F141 = MY4R*WP231
-    F241 = -MX4R*WP231
-    F341 = MY4R*WP141 - MX4R*WP241
+    F141 = MY4R*S2S3
+    F241 = -MX4R*S2S3
+    F341 = -MX4R*VSP351a - MY4R*F371a
     E141 = FDI151 + F141
     E241 = E351 + F241
     E341 = FDI351 + F341
-    N141 = XX4R*WP141 + XY4R*WP241 - XZ4*WP231 - MY4R*VSP241
-    N241 = XY4R*WP141 + MX4R*VSP241 - YZ4*WP231
-    N341 = YZ4*WP241 + XZ4*WP141 + MX4R*VP241 - ZZ4R*WP231 - MY4R*VP141
+    N141 = XY4R*VSP351a - XX4R*F371a - XZ4*S2S3 - MY4R*VSP241
+    N241 = MX4R*VSP241 - XY4R*F371a - YZ4*S2S3
+    N341 = YZ4*VSP351a + MX4R*VP241 - ZZ4R*S2S3 - XZ4*F371a - MY4R*VP141
     NE141 = C5*NE151 + RL5*FDI351 + N141 - S5*NE251
     NE241 = NE351 + D4*FDI351 + N241
     NE341 = N341 - S5*NE151 - C5*NE251 - D4*E351 - RL5*FDI151
@@ -1338,9 +1392,9 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     F231 = MX3R*C2
     E131 = FDI141 + F131
     E231 = F231 - E341
-    N131 = XX3R*WP131 + XZ3*C2 + XY3R*WP231
-    N231 = XY3R*WP131 + YZ3*C2
-    N331 = ZZ3R*C2 + YZ3*WP231 + XZ3*WP131 + MX3R*VP231 - MY3R*VP131
+    N131 = XZ3*C2 + XY3R*S2S3 - XX3R*S2C3
+    N231 = YZ3*C2 - XY3R*S2C3
+    N331 = ZZ3R*C2 + YZ3*S2S3 + MX3R*C3VSP331 - XZ3*S2C3 - MY3R*S3VSP331
     NE131 = C4*NE141 + N131 - S4*NE241
     NE231 = N231 - NE341 - D4*FDI341
     NE331 = S4*NE141 + C4*NE241 + N331 - D4*E341
@@ -1356,68 +1410,68 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 1
     NE311 = ZZ1R - S2*NE121 - C2*NE221
     # Link 3
-    VP132 = RL3*C3
-    VP232 = -RL3*S3
+    C3RL3 = RL3*C3
+    S3RL3 = RL3*S3
     # Link 4
-    WP142 = S3*C4
-    WP242 = -S3*S4
-    VSP342 = -D4*C3
-    VP142 = C4*VP132 + S4*VSP342
-    VP242 = C4*VSP342 - S4*VP132
+    S3C4 = S3*C4
+    S3S4 = S3*S4
+    C3D4 = D4*C3
+    VP142 = C4*C3RL3 - S4*C3D4
+    VP242 = -C4*C3D4 - S4*C3RL3
     # Link 5
-    WP152 = C5*WP142 + C3*S5
-    WP252 = C3*C5 - S5*WP142
+    F372a = C5*S3C4 + C3*S5
+    F372b = C3*C5 - S5*S3C4
     VSP152 = VP142 + RL5*C3
-    VSP252 = VP242 - VSP342
-    VSP352 = D4*WP242 + RL5*WP142 - VP232
+    VSP252 = C3D4 + VP242
+    VSP352 = S3RL3 + RL5*S3C4 - D4*S3S4
     VP152 = C5*VSP152 - S5*VSP352
     VP252 = -C5*VSP352 - S5*VSP152
     # Link 6
-    WP162 = C6*WP152 + S6*WP242
-    WP262 = C6*WP242 - S6*WP152
+    F372c = C6*F372a - S6*S3S4
+    VSP372a = C6*S3S4 + S6*F372a
     VP162 = C6*VP152 + S6*VSP252
     VP262 = C6*VSP252 - S6*VP152
     # Link 7
-    WP172 = C7*WP162 - S7*WP252
-    WP272 = -C7*WP252 - S7*WP162
-    VSP272 = VP262 - D7*WP252
-    VSP372 = -VP252 - D7*WP262
+    F372d = C7*F372c - S7*F372b
+    F372e = C7*F372b + S7*F372c
+    VSP272 = VP262 - D7*F372b
+    VSP372 = D7*VSP372a - VP252
     VP172 = C7*VP162 + S7*VSP372
     VP272 = C7*VSP372 - S7*VP162
     # Joint 7
-    F172 = MY7*WP262
-    F272 = -MX7*WP262
-    F372 = MY7*WP172 - MX7*WP272
-    N172 = XX7R*WP172 + XY7*WP272 - XZ7*WP262 - MY7*VSP272
-    N272 = XY7*WP172 + MX7*VSP272 - YZ7*WP262
-    N372 = YZ7*WP272 + XZ7*WP172 + MX7*VP272 - ZZ7*WP262 - MY7*VP172
+    F172 = -MY7*VSP372a
+    F272 = MX7*VSP372a
+    F372 = MX7*F372e + MY7*F372d
+    N172 = XX7R*F372d + XZ7*VSP372a - XY7*F372e - MY7*VSP272
+    N272 = XY7*F372d + YZ7*VSP372a + MX7*VSP272
+    N372 = ZZ7*VSP372a + XZ7*F372d + MX7*VP272 - YZ7*F372e - MY7*VP172
     FDI172 = C7*F172 - S7*F272
     FDI372 = S7*F172 + C7*F272
     # Joint 6
-    F162 = MY6R*WP252
-    F262 = -MX6R*WP252
-    F362 = MY6R*WP162 - MX6R*WP262
+    F162 = MY6R*F372b
+    F262 = -MX6R*F372b
+    F362 = MX6R*VSP372a + MY6R*F372c
     E162 = FDI172 + F162
     E262 = F262 - F372
     E362 = FDI372 + F362
-    N162 = XX6R*WP162 + XY6R*WP262 - XZ6*WP252 - MY6R*VP252
-    N262 = XY6R*WP162 + MX6R*VP252 - YZ6*WP252
-    N362 = YZ6*WP262 + XZ6*WP162 + MX6R*VP262 - ZZ6R*WP252 - MY6R*VP162
+    N162 = XX6R*F372c - XZ6*F372b - XY6R*VSP372a - MY6R*VP252
+    N262 = XY6R*F372c + MX6R*VP252 - YZ6*F372b
+    N362 = XZ6*F372c + MX6R*VP262 - ZZ6R*F372b - YZ6*VSP372a - MY6R*VP162
     NE162 = C7*N172 + N162 - S7*N272
     NE262 = N262 - N372 - D7*FDI372
     NE362 = S7*N172 + C7*N272 + N362 - D7*F372
     FDI162 = C6*E162 - S6*E262
     FDI362 = S6*E162 + C6*E262
     # Joint 5
-    F152 = -MY5R*WP242
-    F252 = MX5*WP242
-    F352 = MY5R*WP152 - MX5*WP252
+    F152 = MY5R*S3S4
+    F252 = -MX5*S3S4
+    F352 = MY5R*F372a - MX5*F372b
     E152 = FDI162 + F152
     E252 = F252 - E362
     E352 = FDI362 + F352
-    N152 = XX5R*WP152 + XZ5*WP242 + XY5*WP252 + MY5R*VSP252
-    N252 = XY5*WP152 + YZ5*WP242 - MX5*VSP252
-    N352 = ZZ5R*WP242 + YZ5*WP252 + XZ5*WP152 + MX5*VP252 - MY5R*VP152
+    N152 = XX5R*F372a + XY5*F372b + MY5R*VSP252 - XZ5*S3S4
+    N252 = XY5*F372a - YZ5*S3S4 - MX5*VSP252
+    N352 = YZ5*F372b + XZ5*F372a + MX5*VP252 - ZZ5R*S3S4 - MY5R*VP152
     NE152 = C6*NE162 + N152 - S6*NE262
     NE252 = N252 - NE362
     NE352 = S6*NE162 + C6*NE262 + N352
@@ -1426,13 +1480,13 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 4
     F142 = MY4R*C3
     F242 = -MX4R*C3
-    F342 = MY4R*WP142 - MX4R*WP242
+    F342 = MX4R*S3S4 + MY4R*S3C4
     E142 = FDI152 + F142
     E242 = E352 + F242
     E342 = FDI352 + F342
-    N142 = XX4R*WP142 + XY4R*WP242 - XZ4*C3 - MY4R*VP232
-    N242 = XY4R*WP142 + MX4R*VP232 - YZ4*C3
-    N342 = YZ4*WP242 + XZ4*WP142 + MX4R*VP242 - ZZ4R*C3 - MY4R*VP142
+    N142 = XX4R*S3C4 + MY4R*S3RL3 - XZ4*C3 - XY4R*S3S4
+    N242 = XY4R*S3C4 - YZ4*C3 - MX4R*S3RL3
+    N342 = XZ4*S3C4 + MX4R*VP242 - ZZ4R*C3 - YZ4*S3S4 - MY4R*VP142
     NE142 = C5*NE152 + RL5*FDI352 + N142 - S5*NE252
     NE242 = NE352 + D4*FDI352 + N242
     NE342 = N342 - S5*NE152 - C5*NE252 - D4*E352 - RL5*FDI152
@@ -1441,7 +1495,7 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 3
     N132 = XX3R*S3 + XY3R*C3
     N232 = XY3R*S3
-    N332 = YZ3*C3 + XZ3*S3 + MX3R*VP232 - MY3R*VP132
+    N332 = YZ3*C3 + XZ3*S3 - MX3R*S3RL3 - MY3R*C3RL3
     NE132 = C4*NE142 + N132 - S4*NE242
     NE232 = N232 - NE342 - D4*FDI342
     NE332 = S4*NE142 + C4*NE242 + N332 - D4*E342
@@ -1449,42 +1503,42 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 2
     NE322 = ZZ2R + S3*NE132 + C3*NE232 + RL3*FDI132
     # Link 5
-    WP153 = S4*C5
-    WP253 = -S4*S5
+    S4C5 = S4*C5
+    S4S5 = S4*S5
     VSP353 = D4*C4 + RL5*S4 - D4
-    VP153 = -S5*VSP353
-    VP253 = -C5*VSP353
+    S5VSP353 = S5*VSP353
+    C5VSP353 = C5*VSP353
     # Link 6
-    WP163 = C6*WP153 + C4*S6
-    WP263 = C4*C6 - S6*WP153
-    VP163 = C6*VP153
-    VP263 = -S6*VP153
+    F373a = C6*S4C5 + C4*S6
+    VSP373a = C4*C6 - S6*S4C5
+    C6S5VSP353 = C6*S5VSP353
+    S6S5VSP353 = S6*S5VSP353
     # Link 7
-    WP173 = C7*WP163 - S7*WP253
-    WP273 = -C7*WP253 - S7*WP163
-    VSP273 = VP263 - D7*WP253
-    VSP373 = -VP253 - D7*WP263
-    VP173 = C7*VP163 + S7*VSP373
-    VP273 = C7*VSP373 - S7*VP163
+    F373b = C7*F373a + S7*S4S5
+    F373c = C7*S4S5 - S7*F373a
+    VSP273 = S6S5VSP353 + D7*S4S5
+    VSP373 = C5VSP353 - D7*VSP373a
+    VP173 = S7*VSP373 - C7*C6S5VSP353
+    VP273 = C7*VSP373 + S7*C6S5VSP353
     # Joint 7
-    F173 = MY7*WP263
-    F273 = -MX7*WP263
-    F373 = MY7*WP173 - MX7*WP273
-    N173 = XX7R*WP173 + XY7*WP273 - XZ7*WP263 - MY7*VSP273
-    N273 = XY7*WP173 + MX7*VSP273 - YZ7*WP263
-    N373 = YZ7*WP273 + XZ7*WP173 + MX7*VP273 - ZZ7*WP263 - MY7*VP173
+    F173 = MY7*VSP373a
+    F273 = -MX7*VSP373a
+    F373 = MY7*F373b - MX7*F373c
+    N173 = XX7R*F373b + XY7*F373c - XZ7*VSP373a - MY7*VSP273
+    N273 = XY7*F373b + MX7*VSP273 - YZ7*VSP373a
+    N373 = YZ7*F373c + XZ7*F373b + MX7*VP273 - ZZ7*VSP373a - MY7*VP173
     FDI173 = C7*F173 - S7*F273
     FDI373 = S7*F173 + C7*F273
     # Joint 6
-    F163 = MY6R*WP253
-    F263 = -MX6R*WP253
-    F363 = MY6R*WP163 - MX6R*WP263
+    F163 = -MY6R*S4S5
+    F263 = MX6R*S4S5
+    F363 = MY6R*F373a - MX6R*VSP373a
     E163 = FDI173 + F163
     E263 = F263 - F373
     E363 = FDI373 + F363
-    N163 = XX6R*WP163 + XY6R*WP263 - XZ6*WP253 - MY6R*VP253
-    N263 = XY6R*WP163 + MX6R*VP253 - YZ6*WP253
-    N363 = YZ6*WP263 + XZ6*WP163 + MX6R*VP263 - ZZ6R*WP253 - MY6R*VP163
+    N163 = XX6R*F373a + XZ6*S4S5 + XY6R*VSP373a + MY6R*C5VSP353
+    N263 = XY6R*F373a + YZ6*S4S5 - MX6R*C5VSP353
+    N363 = ZZ6R*S4S5 + YZ6*VSP373a + XZ6*F373a + MX6R*S6S5VSP353 + MY6R*C6S5VSP353
     NE163 = C7*N173 + N163 - S7*N273
     NE263 = N263 - N373 - D7*FDI373
     NE363 = S7*N173 + C7*N273 + N363 - D7*F373
@@ -1493,13 +1547,13 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 5
     F153 = -MY5R*C4
     F253 = MX5*C4
-    F353 = MY5R*WP153 - MX5*WP253
+    F353 = MX5*S4S5 + MY5R*S4C5
     E153 = FDI163 + F153
     E253 = F253 - E363
     E353 = FDI363 + F353
-    N153 = XX5R*WP153 + XZ5*C4 + XY5*WP253
-    N253 = XY5*WP153 + YZ5*C4
-    N353 = ZZ5R*C4 + YZ5*WP253 + XZ5*WP153 + MX5*VP253 - MY5R*VP153
+    N153 = XX5R*S4C5 + XZ5*C4 - XY5*S4S5
+    N253 = XY5*S4C5 + YZ5*C4
+    N353 = ZZ5R*C4 + XZ5*S4C5 + MY5R*S5VSP353 - YZ5*S4S5 - MX5*C5VSP353
     NE153 = C6*NE163 + N153 - S6*NE263
     NE253 = N253 - NE363
     NE353 = S6*NE163 + C6*NE263 + N353
@@ -1509,47 +1563,47 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     F343 = MY4R*S4 - MX4R*C4
     E343 = FDI353 + F343
     N343 = YZ4*C4 + XZ4*S4
-    N143 = XX4R*S4 + XY4R*C4 - MY4R*D4
-    N243 = XY4R*S4 + MX4R*D4
+    N143 = XX4R*S4 + XY4R*C4 - D4*MY4R
+    N243 = XY4R*S4 + D4*MX4R
     NE143 = C5*NE153 + RL5*FDI353 + N143 - S5*NE253
     NE243 = NE353 + D4*FDI353 + N243
     NE343 = N343 - S5*NE153 - C5*NE253 - D4*E353 - RL5*FDI153
     # Joint 3
     NE333 = ZZ3R + S4*NE143 + C4*NE243 - D4*E343
     # Link 5
-    VP154 = -RL5*C5
-    VP254 = RL5*S5
+    C5RL5 = RL5*C5
+    S5RL5 = RL5*S5
     # Link 6
-    WP164 = -S5*C6
-    WP264 = S5*S6
-    VP164 = C6*VP154 - D4*S6
-    VP264 = -D4*C6 - S6*VP154
+    S5C6 = S5*C6
+    S5S6 = S5*S6
+    VP164 = -C6*C5RL5 - D4*S6
+    VP264 = S6*C5RL5 - D4*C6
     # Link 7
-    WP174 = C7*WP164 + C5*S7
-    WP274 = C5*C7 - S7*WP164
+    F374a = C7*S5C6 - C5*S7
+    F374b = C5*C7 + S7*S5C6
     VSP274 = VP264 + D7*C5
-    VSP374 = -VP254 - D7*WP264
+    VSP374 = -S5RL5 - D7*S5S6
     VP174 = C7*VP164 + S7*VSP374
     VP274 = C7*VSP374 - S7*VP164
     # Joint 7
-    F174 = MY7*WP264
-    F274 = -MX7*WP264
-    F374 = MY7*WP174 - MX7*WP274
-    N174 = XX7R*WP174 + XY7*WP274 - XZ7*WP264 - MY7*VSP274
-    N274 = XY7*WP174 + MX7*VSP274 - YZ7*WP264
-    N374 = YZ7*WP274 + XZ7*WP174 + MX7*VP274 - ZZ7*WP264 - MY7*VP174
+    F174 = MY7*S5S6
+    F274 = -MX7*S5S6
+    F374 = -MX7*F374b - MY7*F374a
+    N174 = XY7*F374b - XX7R*F374a - XZ7*S5S6 - MY7*VSP274
+    N274 = MX7*VSP274 - XY7*F374a - YZ7*S5S6
+    N374 = YZ7*F374b + MX7*VP274 - ZZ7*S5S6 - XZ7*F374a - MY7*VP174
     FDI174 = C7*F174 - S7*F274
     FDI374 = S7*F174 + C7*F274
     # Joint 6
     F164 = -MY6R*C5
     F264 = MX6R*C5
-    F364 = MY6R*WP164 - MX6R*WP264
+    F364 = -MX6R*S5S6 - MY6R*S5C6
     E164 = FDI174 + F164
     E264 = F264 - F374
     E364 = FDI374 + F364
-    N164 = XX6R*WP164 + XZ6*C5 + XY6R*WP264 - MY6R*VP254
-    N264 = XY6R*WP164 + YZ6*C5 + MX6R*VP254
-    N364 = ZZ6R*C5 + YZ6*WP264 + XZ6*WP164 + MX6R*VP264 - MY6R*VP164
+    N164 = XZ6*C5 + XY6R*S5S6 - XX6R*S5C6 - MY6R*S5RL5
+    N264 = YZ6*C5 + MX6R*S5RL5 - XY6R*S5C6
+    N364 = ZZ6R*C5 + YZ6*S5S6 + MX6R*VP264 - XZ6*S5C6 - MY6R*VP164
     NE164 = C7*N174 + N164 - S7*N274
     NE264 = N264 - N374 - D7*FDI374
     NE364 = S7*N174 + C7*N274 + N364 - D7*F374
@@ -1558,9 +1612,9 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 5
     F354 = MX5*C5 - MY5R*S5
     E354 = FDI364 + F354
-    N154 = -XX5R*S5 - XY5*C5 - MY5R*D4
-    N254 = MX5*D4 - XY5*S5
-    N354 = MX5*VP254 - YZ5*C5 - XZ5*S5 - MY5R*VP154
+    N154 = -XX5R*S5 - XY5*C5 - D4*MY5R
+    N254 = D4*MX5 - XY5*S5
+    N354 = MX5*S5RL5 + MY5R*C5RL5 - YZ5*C5 - XZ5*S5
     NE154 = C6*NE164 + N154 - S6*NE264
     NE254 = N254 - NE364
     NE354 = S6*NE164 + C6*NE264 + N354
@@ -1568,63 +1622,59 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     # Joint 4
     NE344 = ZZ4R - S5*NE154 - C5*NE254 - D4*E354 - RL5*FDI154
     # Link 7
-    WP175 = S6*C7
-    WP275 = -S6*S7
-    VSP375 = -D7*C6
-    VP175 = S7*VSP375
-    VP275 = C7*VSP375
+    S6C7 = S6*C7
+    S6S7 = S6*S7
+    C6D7 = D7*C6
     # Joint 7
-    F175 = MY7*C6
-    F275 = -MX7*C6
-    F375 = MY7*WP175 - MX7*WP275
-    N175 = XX7R*WP175 + XY7*WP275 - XZ7*C6
-    N275 = XY7*WP175 - YZ7*C6
-    N375 = YZ7*WP275 + XZ7*WP175 + MX7*VP275 - ZZ7*C6 - MY7*VP175
-    FDI375 = S7*F175 + C7*F275
+    F375 = MX7*S6S7 + MY7*S6C7
+    N175 = XX7R*S6C7 - XZ7*C6 - XY7*S6S7
+    N275 = XY7*S6C7 - YZ7*C6
+    N375a = MX7*C7*C6D7 - MY7*S7*C6D7
+    N375 = XZ7*S6C7 - ZZ7*C6 - YZ7*S6S7 - N375a
     # Joint 6
     N165 = XX6R*S6 + XY6R*C6
     N265 = XY6R*S6
     N365 = YZ6*C6 + XZ6*S6
     NE165 = C7*N175 + N165 - S7*N275
-    NE265 = N265 - N375 - D7*FDI375
+    NE265 = N375a + N265 - N375
     NE365 = S7*N175 + C7*N275 + N365 - D7*F375
     # Joint 5
     NE355 = ZZ5R + S6*NE165 + C6*NE265
     # Joint 7
     F376 = MY7*S7 - MX7*C7
     N376 = YZ7*C7 + XZ7*S7
-    N176 = XX7R*S7 + XY7*C7 - MY7*D7
-    N276 = XY7*S7 + MX7*D7
+    N176 = XX7R*S7 + XY7*C7 - D7*MY7
+    N276 = XY7*S7 + D7*MX7
     # Joint 6
     NE366 = ZZ6R + S7*N176 + C7*N276 - D7*F376
     # Inertia matrix
     A[0, 0] = NE311
-    A[1, 0] = A[0, 1] = NE321
-    A[2, 0] = A[0, 2] = NE331
-    A[3, 0] = A[0, 3] = NE341
-    A[4, 0] = A[0, 4] = NE351
-    A[5, 0] = A[0, 5] = NE361
-    A[6, 0] = A[0, 6] = N371
+    A[0, 1] = A[1, 0] = NE321
     A[1, 1] = NE322
-    A[2, 1] = A[1, 2] = NE332
-    A[3, 1] = A[1, 3] = NE342
-    A[4, 1] = A[1, 4] = NE352
-    A[5, 1] = A[1, 5] = NE362
-    A[6, 1] = A[1, 6] = N372
+    A[0, 2] = A[2, 0] = NE331
+    A[1, 2] = A[2, 1] = NE332
     A[2, 2] = Ia3 + NE333
-    A[3, 2] = A[2, 3] = NE343
-    A[4, 2] = A[2, 4] = NE353
-    A[5, 2] = A[2, 5] = NE363
-    A[6, 2] = A[2, 6] = N373
+    A[0, 3] = A[3, 0] = NE341
+    A[1, 3] = A[3, 1] = NE342
+    A[2, 3] = A[3, 2] = NE343
     A[3, 3] = Ia4 + NE344
-    A[4, 3] = A[3, 4] = NE354
-    A[5, 3] = A[3, 5] = NE364
-    A[6, 3] = A[3, 6] = N374
+    A[0, 4] = A[4, 0] = NE351
+    A[1, 4] = A[4, 1] = NE352
+    A[2, 4] = A[4, 2] = NE353
+    A[3, 4] = A[4, 3] = NE354
     A[4, 4] = Ia5 + NE355
-    A[5, 4] = A[4, 5] = NE365
-    A[6, 4] = A[4, 6] = N375
+    A[0, 5] = A[5, 0] = NE361
+    A[1, 5] = A[5, 1] = NE362
+    A[2, 5] = A[5, 2] = NE363
+    A[3, 5] = A[5, 3] = NE364
+    A[4, 5] = A[5, 4] = NE365
     A[5, 5] = Ia6 + NE366
-    A[6, 5] = A[5, 6] = N376
+    A[0, 6] = A[6, 0] = N371
+    A[1, 6] = A[6, 1] = N372
+    A[2, 6] = A[6, 2] = N373
+    A[3, 6] = A[6, 3] = N374
+    A[4, 6] = A[6, 4] = N375
+    A[5, 6] = A[6, 5] = N376
     A[6, 6] = ZZ7 + Ia7
 
 
@@ -1712,8 +1762,8 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
-    WP12 = QP2*W22
-    WP22 = -QP2*W12
+    DV232 = QP2*W22
+    DV132 = QP2*W12
     DV112 = W12**2
     DV122 = W12*W22
     DV222 = W22**2
@@ -1722,16 +1772,16 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     DW312 = DV332 - DV112
     DW122 = DV112 - DV222
     U222 = -DV112 - DV332
-    U312 = -2*WP22
-    U322 = 2*WP12
+    U312 = 2*DV132
+    U322 = 2*DV232
     VP12 = -g*S2
     VP22 = -g*C2
     # Link 3
     W13 = C3*W12 + S3*QP2
     W23 = C3*QP2 - S3*W12
     W33 = QP3 - W22
-    WP13 = C3*WP12 + QP3*W23
-    WP23 = -S3*WP12 - QP3*W13
+    WP13 = C3*DV232 + QP3*W23
+    WP23 = -S3*DV232 - QP3*W13
     DV113 = W13**2
     DV123 = W13*W23
     DV133 = W13*W33
@@ -1742,9 +1792,9 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     DW313 = DV333 - DV113
     DW123 = DV113 - DV223
     U113 = -DV223 - DV333
-    U123 = WP22 + DV123
+    U123 = DV123 - DV132
     U133 = WP23 + DV133
-    U213 = DV123 - WP22
+    U213 = DV132 + DV123
     U223 = -DV113 - DV333
     U233 = DV233 - WP13
     U313 = DV133 - WP23
@@ -1758,8 +1808,8 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     W14 = C4*W13 + S4*W33
     W24 = C4*W33 - S4*W13
     W34 = QP4 - W23
-    WP14 = C4*WP13 + QP4*W24 - S4*WP22
-    WP24 = -C4*WP22 - S4*WP13 - QP4*W14
+    WP14 = C4*WP13 + S4*DV132 + QP4*W24
+    WP24 = C4*DV132 - S4*WP13 - QP4*W14
     DV114 = W14**2
     DV124 = W14*W24
     DV134 = W14*W34
@@ -1924,15 +1974,15 @@ def _bias_block(q, qd, GAM, X, RL3, D4, RL5, D7, g):
     E23 = F23 - E34
     N13 = XX3R*WP13 + ZZ3R*DV233 + YZ3*DW233 + XZ3*U213 - XY3R*U313 - MY3R*VSP23
     N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3R*U323 + MX3R*VSP23 - YZ3*U123
-    N33 = XY3R*DW123 + YZ3*U133 + MX3R*VP23 - ZZ3R*WP22 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
+    N33 = ZZ3R*DV132 + XY3R*DW123 + YZ3*U133 + MX3R*VP23 - XX3R*DV123 - XZ3*U233 - MY3R*VP13
     NE13 = C4*NE14 + N13 - S4*NE24
     NE23 = N23 - NE34 - D4*FDI34
     NE33 = S4*NE14 + C4*NE24 + N33 - D4*E34
     FDI13 = C3*E13 - S3*E23
     FDI33 = S3*E13 + C3*E23
     # Joint 2
-    N12 = XX2R*WP12 + ZZ2R*WP12 + YZ2*DW232 + XZ2*DV122 - XY2*U312
-    N22 = XZ2*DW312 + XY2*U322 - (XX2R - ZZ2R)*WP22 - YZ2*DV122
+    N12 = XX2R*DV232 + ZZ2R*DV232 + YZ2*DW232 + XZ2*DV122 - XY2*U312
+    N22 = (XX2R - ZZ2R)*DV132 + XZ2*DW312 + XY2*U322 - YZ2*DV122
     N32 = XY2*DW122 + MX2*VP22 - XX2R*DV122 - MY2R*VP12
     NE12 = C3*NE13 + N12 - S3*NE23 - RL3*FDI33
     NE22 = N22 - NE33
@@ -1988,14 +2038,14 @@ def _gravity_block(q, GAM, X, g):
     VP12 = -g*S2
     VP22 = -g*C2
     # Link 3
-    VP13 = C3*VP12
-    VP23 = -S3*VP12
+    C3VP12 = C3*VP12
+    S3VP12 = S3*VP12
     # Link 4
-    VP14 = C4*VP13 - S4*VP22
-    VP24 = -C4*VP22 - S4*VP13
+    VP14 = C4*C3VP12 - S4*VP22
+    VP24 = -C4*VP22 - S4*C3VP12
     # Link 5
-    VP15 = C5*VP14 + S5*VP23
-    VP25 = C5*VP23 - S5*VP14
+    VP15 = C5*VP14 - S5*S3VP12
+    VP25 = -C5*S3VP12 - S5*VP14
     # Link 6
     VP16 = C6*VP15 + S6*VP24
     VP26 = C6*VP24 - S6*VP15
@@ -2021,8 +2071,8 @@ def _gravity_block(q, GAM, X, g):
     NE25 = N25 - NE36
     NE35 = S6*NE16 + C6*NE26 + N35
     # Joint 4
-    N14 = -MY4R*VP23
-    N24 = MX4R*VP23
+    N14 = MY4R*S3VP12
+    N24 = -MX4R*S3VP12
     N34 = MX4R*VP24 - MY4R*VP14
     NE14 = C5*NE15 + N14 - S5*NE25
     NE24 = NE35 + N24
@@ -2030,17 +2080,15 @@ def _gravity_block(q, GAM, X, g):
     # Joint 3
     N13 = -MY3R*VP22
     N23 = MX3R*VP22
-    N33 = MX3R*VP23 - MY3R*VP13
+    N33 = -MX3R*S3VP12 - MY3R*C3VP12
     NE13 = C4*NE14 + N13 - S4*NE24
     NE23 = N23 - NE34
     NE33 = S4*NE14 + C4*NE24 + N33
-    NE12 = C3*NE13 - S3*NE23
     # Joint 2
     N32 = MX2*VP22 - MY2R*VP12
     NE32 = S3*NE13 + C3*NE23 + N32
-    NE31 = C2*NE33 - S2*NE12
     # Torques
-    GAM[0] = OFFSET1 + NE31
+    GAM[0] = OFFSET1
     GAM[1] = OFFSET2 + NE32
     GAM[2] = OFFSET3 + NE33
     GAM[3] = OFFSET4 + NE34
@@ -2068,6 +2116,21 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     S6 = np.sin(q6)
     C7 = np.cos(q7)
     S7 = np.sin(q7)
+    # Joint axes Z and velocities V seen from link 3
+    Z131 = -S2*C3
+    Z231 = S2*S3
+    # Joint axes Z and velocities V seen from link 4
+    Z141 = C4*Z131 + C2*S4
+    Z241 = C2*C4 - S4*Z131
+    # Joint axes Z and velocities V seen from link 5
+    Z151 = C5*Z141 + S5*Z231
+    Z251 = C5*Z231 - S5*Z141
+    # Joint axes Z and velocities V seen from link 6
+    Z161 = C6*Z151 + S6*Z241
+    Z261 = C6*Z241 - S6*Z151
+    # Joint axes Z and velocities V seen from link 7
+    Z171 = C7*Z161 - S7*Z251
+    Z271 = -C7*Z251 - S7*Z161
     # Frame 2
     R112 = C1*C2
     R122 = -C1*S2
@@ -2078,8 +2141,6 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     R123 = -S1*C3 - S3*R112
     R213 = C3*R212 + C1*S3
     R223 = C1*C3 - S3*R212
-    R313 = -S2*C3
-    R323 = S2*S3
     P13 = -RL3*R122
     P23 = -RL3*R222
     P33 = RL1 + RL3*C2
@@ -2088,38 +2149,30 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     R124 = -C4*R122 - S4*R113
     R214 = C4*R213 - S4*R222
     R224 = -C4*R222 - S4*R213
-    R314 = C4*R313 + C2*S4
-    R324 = C2*C4 - S4*R313
     P14 = P13 + D4*R113
     P24 = P23 + D4*R213
-    P34 = P33 + D4*R313
+    P34 = P33 + D4*Z131
     # Frame 5
     R115 = C5*R114 + S5*R123
     R125 = C5*R123 - S5*R114
     R215 = C5*R214 + S5*R223
     R225 = C5*R223 - S5*R214
-    R315 = C5*R314 + S5*R323
-    R325 = C5*R323 - S5*R314
     P15 = P14 + RL5*R124 - D4*R114
     P25 = P24 + RL5*R224 - D4*R214
-    P35 = P34 + RL5*R324 - D4*R314
+    P35 = P34 + RL5*Z241 - D4*Z141
     # Frame 6
     R116 = C6*R115 + S6*R124
     R126 = C6*R124 - S6*R115
     R216 = C6*R215 + S6*R224
     R226 = C6*R224 - S6*R215
-    R316 = C6*R315 + S6*R324
-    R326 = C6*R324 - S6*R315
     # Frame 7
     R117 = C7*R116 - S7*R125
     R127 = -C7*R125 - S7*R116
     R217 = C7*R216 - S7*R225
     R227 = -C7*R225 - S7*R216
-    R317 = C7*R316 - S7*R325
-    R327 = -C7*R325 - S7*R316
     P17 = P15 + D7*R116
     P27 = P25 + D7*R216
-    P37 = P35 + D7*R316
+    P37 = P35 + D7*Z161
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
@@ -2143,8 +2196,8 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     T[2, 1, 1] = R223
     T[2, 1, 2] = -R222
     T[2, 1, 3] = P23
-    T[2, 2, 0] = R313
-    T[2, 2, 1] = R323
+    T[2, 2, 0] = Z131
+    T[2, 2, 1] = Z231
     T[2, 2, 2] = C2
     T[2, 2, 3] = P33
     T[3, 0, 0] = R114
@@ -2155,9 +2208,9 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
     T[3, 1, 3] = P24
-    T[3, 2, 0] = R314
-    T[3, 2, 1] = R324
-    T[3, 2, 2] = -R323
+    T[3, 2, 0] = Z141
+    T[3, 2, 1] = Z241
+    T[3, 2, 2] = -Z231
     T[3, 2, 3] = P34
     T[4, 0, 0] = R115
     T[4, 0, 1] = R125
@@ -2167,9 +2220,9 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     T[4, 1, 1] = R225
     T[4, 1, 2] = R224
     T[4, 1, 3] = P25
-    T[4, 2, 0] = R315
-    T[4, 2, 1] = R325
-    T[4, 2, 2] = R324
+    T[4, 2, 0] = Z151
+    T[4, 2, 1] = Z251
+    T[4, 2, 2] = Z241
     T[4, 2, 3] = P35
     T[5, 0, 0] = R116
     T[5, 0, 1] = R126
@@ -2179,9 +2232,9 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
     T[5, 1, 3] = P25
-    T[5, 2, 0] = R316
-    T[5, 2, 1] = R326
-    T[5, 2, 2] = -R325
+    T[5, 2, 0] = Z161
+    T[5, 2, 1] = Z261
+    T[5, 2, 2] = -Z251
     T[5, 2, 3] = P35
     T[6, 0, 0] = R117
     T[6, 0, 1] = R127
@@ -2191,7 +2244,22 @@ def _frame_poses_block(q, T, RL1, RL3, D4, RL5, D7):
     T[6, 1, 1] = R227
     T[6, 1, 2] = -R226
     T[6, 1, 3] = P27
-    T[6, 2, 0] = R317
-    T[6, 2, 1] = R327
-    T[6, 2, 2] = -R326
+    T[6, 2, 0] = Z171
+    T[6, 2, 1] = Z271
+    T[6, 2, 2] = -Z261
     T[6, 2, 3] = P37
+
+
+# Of the robot file: drives, limits and values, which no function above reads
+LINKS = (1, 2, 3, 4, 5, 6, 7)
+DRIVES = None
+LIMITS = {
+    'q': (
+        (-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698),
+        (-2.8973, 2.8973), (-0.0175, 3.7525), (-2.8973, 2.8973),
+    ),
+    'qd': (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
+    'qdd': (15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0),
+    'tau': (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
+}
+VALUES = {}

@@ -1,6 +1,15 @@
+# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+# with probability below 4e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian at random states,
+# parameters and random constants agree with Lagrange's equations and products of frames to 1e-09;
+# SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
+# FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
+# robot file.
+# sha256 of what follows: 2625aef415b13a6955b36029b6144e9716c8ecddfac71b9043fece9683638f8b
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
-GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0. Do not edit; symgen generate scara
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0.
+Do not edit; symgen generate scara
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
     j  ant  sigma  alpha   d  theta   r
@@ -9,26 +18,24 @@ Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JO
     3    2      0      0  D3     q3   0
     4    3      1      0   0      0  q4
 Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
-Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
-Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd +
+            FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
+            MZ first moments
 Element     Ia      inertia: along q1, q2, q3, q4
 Element     FV      viscous: along q1, q2, q3, q4
 Element     FS      coulomb: along q1, q2, q3, q4
 Element     OFFSET  offset: along q1, q2, q3, q4
 
-Base parameters, 22 of 56; Gautier and Khalil (1990), exact over F_p
-    ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
-    ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
-    MX2R = MX2 + D3*(M3 - Ia4)
-    ZZ3R = ZZ3 + ZZ4
-    MX3R = MX3 + MX4
-    MY3R = MY3 + MY4
-    M4R = M4 + Ia4
-    OFFSET4R = OFFSET4 - g*Ia4
-    as they are: FV1 FS1 OFFSET1 MY2 Ia2 FV2 FS2 OFFSET2 Ia3 FV3 FS3 OFFSET3 FV4 FS4
-No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 XX4 XY4 XZ4 YY4 YZ4 MZ4
+Base parameters, 22 of 56; Gautier and Khalil (1990)
+    exact over F_p
+    FORMULAS says what they are made of; what it leaves out is as it is
+    No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3
+        XX4 XY4 XZ4 YY4 YZ4 MZ4
 
-Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
+            part that several share, N16a of N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -51,14 +58,15 @@ Names       family, then component digits, then link: W12 is component 1 of link
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor         39 multiplications, 28 additions, 2 sin, 2 cos
-    inverse_dynamics  51 multiplications, 44 additions, 2 sin, 2 cos
-    inertia_matrix    29 multiplications, 27 additions, 2 sin, 2 cos
-    bias              38 multiplications, 29 additions, 2 sin, 2 cos
-    gravity           1 multiplications, 1 additions, 0 sin, 0 cos
-    frame_poses       4 multiplications, 4 additions, 3 sin, 3 cos
+    regressor          39 multiplications, 28 additions, 2 sin, 2 cos
+    inverse_dynamics   51 multiplications, 44 additions, 2 sin, 2 cos
+    inertia_matrix     29 multiplications, 27 additions, 2 sin, 2 cos
+    bias               38 multiplications, 29 additions, 2 sin, 2 cos
+    gravity            1 multiplications, 1 additions, 0 sin, 0 cos
+    frame_poses        4 multiplications, 4 additions, 3 sin, 3 cos
 
-Arguments   q, qd, qdd, tau of shape (N, 4), or (4,) for one state: results then have no axis of samples; rad or m and seconds
+Arguments   q, qd, qdd, tau of shape (N, 4), or (4,) for one state: results then have no axis
+            of samples; rad or m and seconds
             X of shape (22,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
@@ -69,41 +77,38 @@ NAME = 'scara'
 SOURCE_SHA256 = 'de085ba960d792c532df597174021ff49a1ac3e6792828ed279c37ecd08941b0'
 JOINTS = (1, 2, 3, 4)
 CONSTANTS = {'D2': 0.425, 'D3': 0.375, 'g': 9.81}
-BASE_PARAMETERS = (
-    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'ZZ2R', 'MX2R', 'MY2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'ZZ3R', 'MX3R', 'MY3R',
-    'Ia3', 'FV3', 'FS3', 'OFFSET3', 'M4R', 'FV4', 'FS4', 'OFFSET4R',
-)
-STANDARD_PARAMETERS = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
-    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
-    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'Ia3', 'FV3', 'FS3', 'OFFSET3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4',
-    'MX4', 'MY4', 'MZ4', 'M4', 'Ia4', 'FV4', 'FS4', 'OFFSET4',
-)
-UNITS = {
-    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m',
-    'MY2': 'kg*m', 'Ia2': 'kg*m**2', 'FV2': 'N*m*s/rad', 'FS2': 'N*m', 'OFFSET2': 'N*m', 'ZZ3R': 'kg*m**2',
-    'MX3R': 'kg*m', 'MY3R': 'kg*m', 'Ia3': 'kg*m**2', 'FV3': 'N*m*s/rad', 'FS3': 'N*m', 'OFFSET3': 'N*m', 'M4R': 'kg',
-    'FV4': 'N*s/m', 'FS4': 'N', 'OFFSET4R': 'N',
-}
+BASE_PARAMETERS = tuple("""
+ZZ1R FV1 FS1 OFFSET1 ZZ2R MX2R MY2 Ia2 FV2 FS2 OFFSET2 ZZ3R MX3R MY3R Ia3 FV3 FS3 OFFSET3 M4R FV4
+FS4 OFFSET4R
+""".split())
+STANDARD_PARAMETERS = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1 Ia1 FV1 FS1 OFFSET1 XX2 XY2 XZ2 YY2 YZ2 ZZ2 MX2 MY2 MZ2 M2
+Ia2 FV2 FS2 OFFSET2 XX3 XY3 XZ3 YY3 YZ3 ZZ3 MX3 MY3 MZ3 M3 Ia3 FV3 FS3 OFFSET3 XX4 XY4 XZ4 YY4 YZ4
+ZZ4 MX4 MY4 MZ4 M4 Ia4 FV4 FS4 OFFSET4
+""".split())
+NO_EFFECT = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 XX2 XY2 XZ2 YY2 YZ2 MZ2 XX3 XY3 XZ3 YY3 YZ3 MZ3 XX4 XY4 XZ4 YY4
+YZ4 MZ4
+""".split())
 FORMULAS = {
-    'ZZ1R': 'ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)', 'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1',
-    'ZZ2R': 'ZZ2 + D3**2*(M3 - Ia4)', 'MX2R': 'MX2 + D3*(M3 - Ia4)', 'MY2': 'MY2', 'Ia2': 'Ia2', 'FV2': 'FV2',
-    'FS2': 'FS2', 'OFFSET2': 'OFFSET2', 'ZZ3R': 'ZZ3 + ZZ4', 'MX3R': 'MX3 + MX4', 'MY3R': 'MY3 + MY4', 'Ia3': 'Ia3',
-    'FV3': 'FV3', 'FS3': 'FS3', 'OFFSET3': 'OFFSET3', 'M4R': 'M4 + Ia4', 'FV4': 'FV4', 'FS4': 'FS4',
+    'ZZ1R': 'ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)',
+    'ZZ2R': 'ZZ2 + D3**2*(M3 - Ia4)',
+    'MX2R': 'MX2 + D3*(M3 - Ia4)',
+    'ZZ3R': 'ZZ3 + ZZ4',
+    'MX3R': 'MX3 + MX4',
+    'MY3R': 'MY3 + MY4',
+    'M4R': 'M4 + Ia4',
     'OFFSET4R': 'OFFSET4 - g*Ia4',
 }
-NO_EFFECT = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'XX2', 'XY2', 'XZ2', 'YY2', 'YZ2', 'MZ2', 'XX3',
-    'XY3', 'XZ3', 'YY3', 'YZ3', 'MZ3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'MZ4',
-)
-STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
-    "x...", "x...", "x...", "x...", "xx..", "xx..", "xx..", ".x..", ".x..", ".x..", ".x..", "xxx.", "xxx.", "xxx.",
-    "..x.", "..x.", "..x.", "..x.", "xx.x", "...x", "...x", "...x",
+UNITS = dict(zip(BASE_PARAMETERS, tuple("""
+kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m kg*m kg*m**2
+N*m*s/rad N*m N*m kg N*s/m N N
+""".split())))
+# STRUCTURE[k, j]: whether base parameter k acts on joint j
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (
+    "x...", "x...", "x...", "x...", "xx..", "xx..", "xx..", ".x..", ".x..", ".x..", ".x..", "xxx.",
+    "xxx.", "xxx.", "..x.", "..x.", "..x.", "..x.", "xx.x", "...x", "...x", "...x",
 )])
-DRIVES = None
-LIMITS = {}
-VALUES = {}
-LINKS = (1, 2, 3, 4)
 
 
 class Store(np.ndarray):
@@ -116,28 +121,43 @@ class Store(np.ndarray):
 
 
 def store(N: int) -> Store:
-    """Room for N samples, shape (22, 4, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
-    S = np.zeros((22, 4, N)).view(Store)
-    S[3, 0] = S[10, 1] = S[17, 2] = S[21, 3] = 1.0
-    S.ready = True
-    return S
+    """Room for N samples, shape (22, 4, N): zeros and constants are written here, once.
+    Reuse it: a fresh one costs page faults.
+    """
+    zeros = np.zeros((22, 4, N)).view(Store)
+    zeros[3, 0] = zeros[10, 1] = zeros[17, 2] = zeros[21, 3] = 1.0
+    zeros.ready = True
+    return zeros
 
 
 def _states(*arrays):
-    """The states as rows of samples, shape (N, 4) each; ValueError unless all have shape (N, 4), or all (4,)."""
+    """The states as rows of samples, shape (N, 4) each; ValueError unless all have shape
+    (N, 4), or all (4,).
+    """
     states = [np.asarray(x, dtype=float) for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (4,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
-        raise ValueError(f"states of shape {shapes}; expected (N, 4) each, or (4,) each for one state")
+        raise ValueError(f"states of shape {shapes}; expected (N, 4) each, or (4,) each")
     return tuple([x.reshape(-1, 4) for x in states])
 
 
+def _parameters(X):
+    """X as an array; ValueError unless it has a value for each base parameter."""
+    X = np.asarray(X, dtype=float)
+    if X.shape != (22,):
+        raise ValueError(f"X of shape {X.shape}; expected (22,) in the order of BASE_PARAMETERS")
+    return X
+
+
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+    (..., B), result ends in samples.
+    """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
-        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
+        block(*rows, result[..., t:t + B], *arguments)
 
 
 def _by_sample(result, q):
@@ -147,28 +167,36 @@ def _by_sample(result, q):
 
 
 def elements(*, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> dict:
-    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
+    {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
+    """
     return {
-        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia3': ('inertia', 'both', {3: 1.0}),
-        'FV3': ('viscous', 'both', {3: 1.0}), 'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
-        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}),
-        'OFFSET4': ('offset', 'both', {4: 1.0}),
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
+        'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
+        'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+        'Ia3': ('inertia', 'both', {3: 1.0}), 'FV3': ('viscous', 'both', {3: 1.0}),
+        'FS3': ('coulomb', 'both', {3: 1.0}), 'OFFSET3': ('offset', 'both', {3: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
+        'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
     }
 
 
 ELEMENTS = elements()
 
 
-def base_parameters(standard: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """X, shape (22,), from the 56 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+def base_parameters(
+    standard: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """X, shape (22,), from the 56 standard parameters: a mapping by name, or a vector in the
+    order of STANDARD_PARAMETERS.
+    """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _, M2, Ia2, FV2, FS2,
-        OFFSET2, _, _, _, _, _, ZZ3, MX3, MY3, _, M3, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _, ZZ4, MX4, MY4, _, M4, Ia4,
-        FV4, FS4, OFFSET4
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2, MY2, _,
+        M2, Ia2, FV2, FS2, OFFSET2, _, _, _, _, _, ZZ3, MX3, MY3, _, M3, Ia3, FV3, FS3, OFFSET3,
+        _, _, _, _, _, ZZ4, MX4, MY4, _, M4, Ia4, FV4, FS4, OFFSET4
     ) = standard
     ZZ1R = ZZ1 + Ia1 + D2**2*(M2 + M3 - Ia4)
     ZZ2R = ZZ2 + D3**2*(M3 - Ia4)
@@ -179,102 +207,150 @@ def base_parameters(standard: np.ndarray, *, D2: float = 0.425, D3: float = 0.37
     M4R = M4 + Ia4
     OFFSET4R = OFFSET4 - g*Ia4
     return np.array([
-        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, M4R,
-        FV4, FS4, OFFSET4R,
+        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3,
+        FV3, FS3, OFFSET3, M4R, FV4, FS4, OFFSET4R,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.425, D3: float = 0.375,
-    g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D2: float = 0.425, D3: float = 0.375, g: float = 9.81
 ) -> np.ndarray:
     """D of Gamma = D X. Shape (N, 4, 22).
 
-    A view on one store of shape (22, 4, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
-    faults, up to several times the arithmetic for large N.
+    A view on one store of shape (22, 4, N). `out` is such a store, made by `store(N)` and
+    reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    D = _filled_store(q, qd, qdd, out, D2, D3, g).transpose(2, 1, 0)
-    return D[0] if np.ndim(q) == 1 else D
+    filled = _filled_store(q, qd, qdd, out, D2, D3, g).transpose(2, 1, 0)
+    return filled[0] if np.ndim(q) == 1 else filled
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.425, D3: float = 0.375,
-    g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D2: float = 0.425, D3: float = 0.375, g: float = 9.81
 ) -> np.ndarray:
-    """W of Y = W X + rho, shape (4*N, 22), Fortran order, rows joint-major: the same store, no copy."""
+    """W of Y = W X + rho, shape (4*N, 22), Fortran order, rows joint-major: the same
+    store, no copy.
+    """
     return _filled_store(q, qd, qdd, out, D2, D3, g).reshape(22, -1).T
+
+
+def _ready(out, N):
+    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+    out = store(N) if out is None else out
+    if not (isinstance(out, Store) and out.ready and out.shape == (22, 4, N)):
+        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        raise ValueError(f"out: expected store({N}) of shape {(22, 4, N)}, found {kind}")
+    return out.view(np.ndarray)
 
 
 def _filled_store(q, qd, qdd, out, D2, D3, g):
     """`out`, or a new store, filled."""
     states = _states(q, qd, qdd)
-    N = len(states[0])
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (22, 4, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(22, 4, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    D = out.view(np.ndarray)
-    _fill(_regressor_block, D, states, D2, D3, g)
-    return D
+    result = _ready(out, len(states[0]))
+    _fill(_regressor_block, result, states, D2, D3, g)
+    return result
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375,
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.425,
+    D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """Joint torques Gamma = A qdd + C qd + Q + friction.
+
+    Shape (N, 4).
+    """
+    X = _parameters(X)
+    states = _states(q, qd, qdd)
+    result = np.zeros((4, len(states[0])))
+    _fill(_inverse_dynamics_block, result, states, X, D2, D3, g)
+    return _by_sample(result, q)
+
+
+def inertia_matrix(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
+
+    Shape (N, 4, 4).
+    """
+    X = _parameters(X)
+    states = _states(q)
+    result = np.zeros((4, 4, len(states[0])))
+    _fill(_inertia_matrix_block, result, states, X, D2, D3)
+    return _by_sample(result, q)
+
+
+def bias(
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375,
     g: float = 9.81
 ) -> np.ndarray:
-    """Joint torques Gamma. Shape (N, 4)."""
-    states = _states(q, qd, qdd)
-    GAM = np.zeros((4, len(states[0])))
-    _fill(_inverse_dynamics_block, GAM, states, X, D2, D3, g)
-    return _by_sample(GAM, q)
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
-
-def inertia_matrix(q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 4, 4)."""
-    states = _states(q)
-    A = np.zeros((4, 4, len(states[0])))
-    _fill(_inertia_matrix_block, A, states, X, D2, D3)
-    return _by_sample(A, q)
-
-
-def bias(q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 4)."""
+    Shape (N, 4).
+    """
+    X = _parameters(X)
     states = _states(q, qd)
-    GAM = np.zeros((4, len(states[0])))
-    _fill(_bias_block, GAM, states, X, D2, D3, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((4, len(states[0])))
+    _fill(_bias_block, result, states, X, D2, D3, g)
+    return _by_sample(result, q)
 
 
-def gravity(q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 4)."""
+def gravity(
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
+
+    Shape (N, 4).
+    """
+    X = _parameters(X)
     states = _states(q)
-    GAM = np.zeros((4, len(states[0])))
-    _fill(_gravity_block, GAM, (), X, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((4, len(states[0])))
+    _fill(_gravity_block, result, (), X, g)
+    return _by_sample(result, q)
 
 
-def frame_poses(q: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 4, 4, 4)."""
+def frame_poses(
+    q: np.ndarray, *, D2: float = 0.425, D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """Homogeneous transform of every frame j in frame 0, at index j - 1.
+
+    Shape (N, 4, 4, 4).
+    """
     states = _states(q)
-    T = np.zeros((4, 4, 4, len(states[0])))
-    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = T[3, 3, 3] = 1.0
-    _fill(_frame_poses_block, T, states, D2, D3)
-    return _by_sample(T, q)
+    result = np.zeros((4, 4, 4, len(states[0])))
+    result[0, 2, 2] = result[0, 3, 3] = result[1, 2, 2] = result[1, 3, 3] = result[2, 2, 2] = 1.0
+    result[2, 3, 3] = result[3, 2, 2] = result[3, 3, 3] = 1.0
+    _fill(_frame_poses_block, result, states, D2, D3)
+    return _by_sample(result, q)
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.425, D3: float = 0.375,
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.425,
+    D3: float = 0.375, g: float = 9.81
+) -> np.ndarray:
+    """Qdd = A(q)**-1 (tau - bias). Shape (N, 4)."""
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D2=D2, D3=D3, g=g)
+    inertia = inertia_matrix(q, X, D2=D2, D3=D3)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+
+
+def jacobian(
+    q: np.ndarray, *, frame: int | None = None, D2: float = 0.425, D3: float = 0.375,
     g: float = 9.81
 ) -> np.ndarray:
-    """qdd = A(q)**-1 (tau - bias). Shape (N, 4)."""
-    A, H = inertia_matrix(q, X, D2=D2, D3=D3), bias(q, qd, X, D2=D2, D3=D3, g=g)
-    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
-
-
-def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.425, D3: float = 0.375, g: float = 9.81) -> np.ndarray:
-    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 4)."""
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
+    frame 0, per joint rate. Shape (N, 6, 4).
+    """
     frame = 4 if frame is None else frame
-    path, T = _paths()[frame], frame_poses(q, D2=D2, D3=D3).reshape(-1, 4, 4, 4)
+    poses = frame_poses(q, D2=D2, D3=D3).reshape(-1, 4, 4, 4)
+    result = _jacobian(_paths()[frame], poses, frame)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def _jacobian(path, T, frame):
+    """Columns of the joints on `path`, shape (N, 6, 4), from the poses T of all frames."""
     J, P = np.zeros((len(T), 6, 4)), T[:, frame - 1, :3, 3]
     for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
@@ -282,11 +358,13 @@ def jacobian(q: np.ndarray, *, frame: int | None = None, D2: float = 0.425, D3: 
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    return J[0] if np.ndim(q) == 1 else J
+    return J
 
 
 def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
+    how the joints in the columns move them.
+    """
     return {
         1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
         3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
@@ -376,8 +454,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, g):
     QP1, QP2, QP3, QP4 = qd
     QDP1, QDP2, QDP3, QDP4 = qdd
     (
-        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3, FV3, FS3, OFFSET3, M4R,
-        FV4, FS4, OFFSET4R
+        ZZ1R, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, Ia2, FV2, FS2, OFFSET2, ZZ3R, MX3R, MY3R, Ia3,
+        FV3, FS3, OFFSET3, M4R, FV4, FS4, OFFSET4R
     ) = X
     # Trigonometry
     C2 = np.cos(q2)
@@ -454,12 +532,12 @@ def _inertia_matrix_block(q, A, X, D2, D3):
     C3 = np.cos(q3)
     S3 = np.sin(q3)
     # Link 2
-    VP121 = D2*S2
-    VP221 = D2*C2
+    S2D2 = D2*S2
+    C2D2 = D2*C2
     # Link 3
-    VSP231 = D3 + VP221
-    VP131 = C3*VP121 + S3*VSP231
-    VP231 = C3*VSP231 - S3*VP121
+    VSP231 = D3 + C2D2
+    VP131 = C3*S2D2 + S3*VSP231
+    VP231 = C3*VSP231 - S3*S2D2
     # Joint 4
     F141 = M4R*VP131
     F241 = M4R*VP231
@@ -472,30 +550,30 @@ def _inertia_matrix_block(q, A, X, D2, D3):
     # Joint 2
     E121 = FDI131 - MY2
     E221 = MX2R + FDI231
-    N321 = ZZ2R + MX2R*VP221 - MY2*VP121
+    N321 = ZZ2R + MX2R*C2D2 - MY2*S2D2
     NE321 = N331 + D3*FDI231 + N321
     FDI221 = S2*E121 + C2*E221
     # Joint 1
     NE311 = ZZ1R + NE321 + D2*FDI221
     # Link 3
-    VP132 = D3*S3
-    VP232 = D3*C3
+    S3D3 = D3*S3
+    C3D3 = D3*C3
     # Joint 4
-    F142 = M4R*VP132
-    F242 = M4R*VP232
+    F142 = M4R*S3D3
+    F242 = M4R*C3D3
     # Joint 3
     E132 = F142 - MY3R
     E232 = MX3R + F242
-    N332 = ZZ3R + MX3R*VP232 - MY3R*VP132
+    N332 = ZZ3R + MX3R*C3D3 - MY3R*S3D3
     FDI232 = S3*E132 + C3*E232
     # Joint 2
     NE322 = ZZ2R + N332 + D3*FDI232
     # Inertia matrix
     A[0, 0] = NE311
-    A[1, 0] = A[0, 1] = NE321
-    A[2, 0] = A[0, 2] = N331
+    A[0, 1] = A[1, 0] = NE321
     A[1, 1] = Ia2 + NE322
-    A[2, 1] = A[1, 2] = N332
+    A[0, 2] = A[2, 0] = N331
+    A[1, 2] = A[2, 1] = N332
     A[2, 2] = ZZ3R + Ia3
     A[3, 3] = M4R
 
@@ -535,14 +613,14 @@ def _bias_block(q, qd, GAM, X, D2, D3, g):
     W32 = QP1 + QP2
     DV332 = W32**2
     VSP12 = -D2*DV331
-    VP12 = C2*VSP12
-    VP22 = -S2*VSP12
+    C2VSP12 = C2*VSP12
+    S2VSP12 = S2*VSP12
     # Link 3
     W33 = QP3 + W32
     DV333 = W33**2
-    VSP13 = VP12 - D3*DV332
-    VP13 = C3*VSP13 + S3*VP22
-    VP23 = C3*VP22 - S3*VSP13
+    VSP13 = C2VSP12 - D3*DV332
+    VP13 = C3*VSP13 - S3*S2VSP12
+    VP23 = -C3*S2VSP12 - S3*VSP13
     # Joint 4
     F14 = M4R*VP13
     F24 = M4R*VP23
@@ -559,7 +637,7 @@ def _bias_block(q, qd, GAM, X, D2, D3, g):
     F22 = -MY2*DV332
     E12 = FDI13 + F12
     E22 = FDI23 + F22
-    N32 = MX2R*VP22 - MY2*VP12
+    N32 = -MX2R*S2VSP12 - MY2*C2VSP12
     NE32 = N33 + D3*FDI23 + N32
     FDI22 = S2*E12 + C2*E22
     NE31 = NE32 + D2*FDI22
@@ -630,3 +708,10 @@ def _frame_poses_block(q, T, D2, D3):
     T[3, 1, 1] = C123
     T[3, 1, 3] = P23
     T[3, 2, 3] = q4
+
+
+# Of the robot file: drives, limits and values, which no function above reads
+LINKS = (1, 2, 3, 4)
+DRIVES = None
+LIMITS = {}
+VALUES = {}

@@ -1,6 +1,15 @@
+# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+# with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
+# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
+# states, parameters and random constants agree with Lagrange's equations and products of frames
+# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
+# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
+# VALUES, HEADER, DEFAULTS with the robot file.
+# sha256 of what follows: 5859b91d380ab1ad54b128818037f700224ca681227ed405a65bf8cbceaa4eb0
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0. Do not edit; symgen generate sr400
+GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0.
+Do not edit; symgen generate sr400
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
      j  ant  mu  sigma  gamma  alpha    d  theta    r
@@ -15,8 +24,10 @@ Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JO
      9    8   0      0      0      0   D3     q9    0
     10    3   0      2   pi/2      0  -D8      0    0
 Gravity     acceleration (0, 0, -g) in frame 0, m/s**2
-Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET
-Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments
+Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd +
+            FS*sign(qd) + OFFSET
+Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY
+            MZ first moments
 Element     Ia      inertia: along q1, q2, q4, q5, q6, q7
 Element     FV      viscous: along q1, q2, q4, q5, q6, q7
 Element     FS      coulomb: along q1, q2, q4, q5, q6, q7
@@ -26,35 +37,14 @@ Loop        q3 = pi/2 - q2 + q7
 Loop        q8 = q2 - q7
 Loop        q9 = pi - q2 + q7
 
-Base parameters, 60 of 104; Gautier and Khalil (1990), exact over F_p
-    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 +
-        M5 + M6)
-    XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
-    XY2R = XY2 + XY8
-    XZ2R = XZ2 + XZ8 - D3*MZ3
-    YZ2R = YZ2 + YZ8
-    ZZ2R = ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)
-    MX2R = MX2 + MX8 + D3*(M3 + M4 + M5 + M6)
-    XX3R = XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
-    XY3R = XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)
-    XZ3R = XZ3 + YZ7
-    YZ3R = YZ3 - XZ7 + D8*MZ8
-    ZZ3R = ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8
-    MX3R = MX3 + D4*(M4 + M5 + M6)
-    MY3R = MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8
-    XX4R = XX4 - YY4 + YY5
-    ZZ4R = ZZ4 + YY5
-    MY4R = MY4 - MZ5
-    XX5R = XX5 - YY5 + YY6
-    ZZ5R = ZZ5 + YY6
-    MY5R = MY5 + MZ6
-    XX6R = XX6 - YY6
-    MX7R = MX7 - D8/D3*MX8 + D8*M8
-    as they are: FV1 FS1 OFFSET1 MY2 FV2 FS2 OFFSET2 XY4 XZ4 YZ4 MX4 Ia4 FV4 FS4 OFFSET4 XY5 XZ5 YZ5 MX5 Ia5 FV5 FS5
-        OFFSET5 XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 MY7 FV7 FS7 OFFSET7 MY8
-No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
+Base parameters, 60 of 104; Gautier and Khalil (1990)
+    exact over F_p
+    FORMULAS says what they are made of; what it leaves out is as it is
+    No effect: XX1 XY1 XZ1 YY1 YZ1 MX1 MY1 MZ1 M1 MZ2 MZ7
 
-Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums
+Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3
+            column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end is a
+            part that several share, N16a of N16
     th   joint angle with its constant, rad
     C    cosine of a joint angle or of a sum of angles
     S    sine of a joint angle or of a sum of angles
@@ -77,18 +67,20 @@ Names       family, then component digits, then link: W12 is component 1 of link
     FDI  the transmitted force, in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
+    DN   the part of DG that turns: axis times moment
     R    orientation of a frame in frame 0
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor         392 multiplications, 290 additions, 6 sin, 6 cos
-    inverse_dynamics  300 multiplications, 285 additions, 6 sin, 6 cos
-    inertia_matrix    328 multiplications, 231 additions, 6 sin, 6 cos
-    bias              283 multiplications, 248 additions, 6 sin, 6 cos
-    gravity           57 multiplications, 42 additions, 6 sin, 6 cos
-    frame_poses       56 multiplications, 31 additions, 6 sin, 6 cos
+    regressor          392 multiplications, 290 additions, 6 sin, 6 cos
+    inverse_dynamics   300 multiplications, 281 additions, 6 sin, 6 cos
+    inertia_matrix     284 multiplications, 201 additions, 6 sin, 6 cos
+    bias               283 multiplications, 248 additions, 6 sin, 6 cos
+    gravity            45 multiplications, 36 additions, 5 sin, 5 cos
+    frame_poses        56 multiplications, 29 additions, 6 sin, 6 cos
 
-Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis of samples; rad or m and seconds
+Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis
+            of samples; rad or m and seconds
             X of shape (60,) in the order of BASE_PARAMETERS; constants of the robot by keyword
 """
 
@@ -100,64 +92,62 @@ SOURCE_SHA256 = '52f8fa1fb7bcb34e02e1d13b0386d4ccebf82b01028f393f42dd79d54ad69a8
 JOINTS = (1, 2, 4, 5, 6, 7)
 PASSIVE = (3, 8, 9)
 CONSTANTS = {'D2': 0.25, 'D3': 0.6, 'D4': 0.15, 'RL4': 0.7, 'D8': 0.3, 'g': 9.81}
-BASE_PARAMETERS = (
-    'ZZ1R', 'FV1', 'FS1', 'OFFSET1', 'XX2R', 'XY2R', 'XZ2R', 'YZ2R', 'ZZ2R', 'MX2R', 'MY2', 'FV2', 'FS2', 'OFFSET2',
-    'XX3R', 'XY3R', 'XZ3R', 'YZ3R', 'ZZ3R', 'MX3R', 'MY3R', 'XX4R', 'XY4', 'XZ4', 'YZ4', 'ZZ4R', 'MX4', 'MY4R', 'Ia4',
-    'FV4', 'FS4', 'OFFSET4', 'XX5R', 'XY5', 'XZ5', 'YZ5', 'ZZ5R', 'MX5', 'MY5R', 'Ia5', 'FV5', 'FS5', 'OFFSET5', 'XX6R',
-    'XY6', 'XZ6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'Ia6', 'FV6', 'FS6', 'OFFSET6', 'MX7R', 'MY7', 'FV7', 'FS7', 'OFFSET7',
-    'MY8',
-)
-STANDARD_PARAMETERS = (
-    'XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'ZZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'Ia1', 'FV1', 'FS1', 'OFFSET1', 'XX2', 'XY2',
-    'XZ2', 'YY2', 'YZ2', 'ZZ2', 'MX2', 'MY2', 'MZ2', 'M2', 'Ia2', 'FV2', 'FS2', 'OFFSET2', 'XX3', 'XY3', 'XZ3', 'YY3',
-    'YZ3', 'ZZ3', 'MX3', 'MY3', 'MZ3', 'M3', 'XX4', 'XY4', 'XZ4', 'YY4', 'YZ4', 'ZZ4', 'MX4', 'MY4', 'MZ4', 'M4', 'Ia4',
-    'FV4', 'FS4', 'OFFSET4', 'XX5', 'XY5', 'XZ5', 'YY5', 'YZ5', 'ZZ5', 'MX5', 'MY5', 'MZ5', 'M5', 'Ia5', 'FV5', 'FS5',
-    'OFFSET5', 'XX6', 'XY6', 'XZ6', 'YY6', 'YZ6', 'ZZ6', 'MX6', 'MY6', 'MZ6', 'M6', 'Ia6', 'FV6', 'FS6', 'OFFSET6',
-    'XX7', 'XY7', 'XZ7', 'YY7', 'YZ7', 'ZZ7', 'MX7', 'MY7', 'MZ7', 'M7', 'Ia7', 'FV7', 'FS7', 'OFFSET7', 'XX8', 'XY8',
-    'XZ8', 'YY8', 'YZ8', 'ZZ8', 'MX8', 'MY8', 'MZ8', 'M8',
-)
-UNITS = {
-    'ZZ1R': 'kg*m**2', 'FV1': 'N*m*s/rad', 'FS1': 'N*m', 'OFFSET1': 'N*m', 'XX2R': 'kg*m**2', 'XY2R': 'kg*m**2',
-    'XZ2R': 'kg*m**2', 'YZ2R': 'kg*m**2', 'ZZ2R': 'kg*m**2', 'MX2R': 'kg*m', 'MY2': 'kg*m', 'FV2': 'N*m*s/rad',
-    'FS2': 'N*m', 'OFFSET2': 'N*m', 'XX3R': 'kg*m**2', 'XY3R': 'kg*m**2', 'XZ3R': 'kg*m**2', 'YZ3R': 'kg*m**2',
-    'ZZ3R': 'kg*m**2', 'MX3R': 'kg*m', 'MY3R': 'kg*m', 'XX4R': 'kg*m**2', 'XY4': 'kg*m**2', 'XZ4': 'kg*m**2',
-    'YZ4': 'kg*m**2', 'ZZ4R': 'kg*m**2', 'MX4': 'kg*m', 'MY4R': 'kg*m', 'Ia4': 'kg*m**2', 'FV4': 'N*m*s/rad',
-    'FS4': 'N*m', 'OFFSET4': 'N*m', 'XX5R': 'kg*m**2', 'XY5': 'kg*m**2', 'XZ5': 'kg*m**2', 'YZ5': 'kg*m**2',
-    'ZZ5R': 'kg*m**2', 'MX5': 'kg*m', 'MY5R': 'kg*m', 'Ia5': 'kg*m**2', 'FV5': 'N*m*s/rad', 'FS5': 'N*m',
-    'OFFSET5': 'N*m', 'XX6R': 'kg*m**2', 'XY6': 'kg*m**2', 'XZ6': 'kg*m**2', 'YZ6': 'kg*m**2', 'ZZ6': 'kg*m**2',
-    'MX6': 'kg*m', 'MY6': 'kg*m', 'Ia6': 'kg*m**2', 'FV6': 'N*m*s/rad', 'FS6': 'N*m', 'OFFSET6': 'N*m', 'MX7R': 'kg*m',
-    'MY7': 'kg*m', 'FV7': 'N*m*s/rad', 'FS7': 'N*m', 'OFFSET7': 'N*m', 'MY8': 'kg*m',
-}
-FORMULAS = {
-    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)',
-    'FV1': 'FV1', 'FS1': 'FS1', 'OFFSET1': 'OFFSET1', 'XX2R': 'XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)',
-    'XY2R': 'XY2 + XY8', 'XZ2R': 'XZ2 + XZ8 - D3*MZ3', 'YZ2R': 'YZ2 + YZ8',
-    'ZZ2R': 'ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)', 'MX2R': 'MX2 + MX8 + D3*(M3 + M4 + M5 + M6)', 'MY2': 'MY2',
-    'FV2': 'FV2', 'FS2': 'FS2', 'OFFSET2': 'OFFSET2',
-    'XX3R': 'XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8',
-    'XY3R': 'XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)', 'XZ3R': 'XZ3 + YZ7', 'YZ3R': 'YZ3 - XZ7 + D8*MZ8',
-    'ZZ3R': 'ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8',
-    'MX3R': 'MX3 + D4*(M4 + M5 + M6)', 'MY3R': 'MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8', 'XX4R': 'XX4 - YY4 + YY5',
-    'XY4': 'XY4', 'XZ4': 'XZ4', 'YZ4': 'YZ4', 'ZZ4R': 'ZZ4 + YY5', 'MX4': 'MX4', 'MY4R': 'MY4 - MZ5', 'Ia4': 'Ia4',
-    'FV4': 'FV4', 'FS4': 'FS4', 'OFFSET4': 'OFFSET4', 'XX5R': 'XX5 - YY5 + YY6', 'XY5': 'XY5', 'XZ5': 'XZ5',
-    'YZ5': 'YZ5', 'ZZ5R': 'ZZ5 + YY6', 'MX5': 'MX5', 'MY5R': 'MY5 + MZ6', 'Ia5': 'Ia5', 'FV5': 'FV5', 'FS5': 'FS5',
-    'OFFSET5': 'OFFSET5', 'XX6R': 'XX6 - YY6', 'XY6': 'XY6', 'XZ6': 'XZ6', 'YZ6': 'YZ6', 'ZZ6': 'ZZ6', 'MX6': 'MX6',
-    'MY6': 'MY6', 'Ia6': 'Ia6', 'FV6': 'FV6', 'FS6': 'FS6', 'OFFSET6': 'OFFSET6', 'MX7R': 'MX7 - D8/D3*MX8 + D8*M8',
-    'MY7': 'MY7', 'FV7': 'FV7', 'FS7': 'FS7', 'OFFSET7': 'OFFSET7', 'MY8': 'MY8',
-}
+BASE_PARAMETERS = tuple("""
+ZZ1R FV1 FS1 OFFSET1 XX2R XY2R XZ2R YZ2R ZZ2R MX2R MY2 FV2 FS2 OFFSET2 XX3R XY3R XZ3R YZ3R ZZ3R MX3R
+MY3R XX4R XY4 XZ4 YZ4 ZZ4R MX4 MY4R Ia4 FV4 FS4 OFFSET4 XX5R XY5 XZ5 YZ5 ZZ5R MX5 MY5R Ia5 FV5 FS5
+OFFSET5 XX6R XY6 XZ6 YZ6 ZZ6 MX6 MY6 Ia6 FV6 FS6 OFFSET6 MX7R MY7 FV7 FS7 OFFSET7 MY8
+""".split())
+STANDARD_PARAMETERS = tuple("""
+XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1 Ia1 FV1 FS1 OFFSET1 XX2 XY2 XZ2 YY2 YZ2 ZZ2 MX2 MY2 MZ2 M2
+Ia2 FV2 FS2 OFFSET2 XX3 XY3 XZ3 YY3 YZ3 ZZ3 MX3 MY3 MZ3 M3 XX4 XY4 XZ4 YY4 YZ4 ZZ4 MX4 MY4 MZ4 M4
+Ia4 FV4 FS4 OFFSET4 XX5 XY5 XZ5 YY5 YZ5 ZZ5 MX5 MY5 MZ5 M5 Ia5 FV5 FS5 OFFSET5 XX6 XY6 XZ6 YY6 YZ6
+ZZ6 MX6 MY6 MZ6 M6 Ia6 FV6 FS6 OFFSET6 XX7 XY7 XZ7 YY7 YZ7 ZZ7 MX7 MY7 MZ7 M7 Ia7 FV7 FS7 OFFSET7
+XX8 XY8 XZ8 YY8 YZ8 ZZ8 MX8 MY8 MZ8 M8
+""".split())
 NO_EFFECT = ('XX1', 'XY1', 'XZ1', 'YY1', 'YZ1', 'MX1', 'MY1', 'MZ1', 'M1', 'MZ2', 'MZ7')
-STRUCTURE = np.array([[mark == "x" for mark in row] for row in (  # [k, j]: whether base parameter k acts on joint j
-    "x.....", "x.....", "x.....", "x.....", "xx....", "xx....", "xx....", "xx....", ".x....", "xx....", "xx....",
-    ".x....", ".x....", ".x....", "x....x", "x....x", "x....x", "x....x", ".....x", "xx...x", "xx...x", "x.x..x",
-    "x.x..x", "x.x..x", "x.x..x", "x.x..x", "xxx..x", "xxx..x", "..x...", "..x...", "..x...", "..x...", "x.xx.x",
-    "x.xx.x", "x.xx.x", "x.xx.x", "x.xx.x", "xxxx.x", "xxxx.x", "...x..", "...x..", "...x..", "...x..", "x.xxxx",
-    "x.xxxx", "x.xxxx", "x.xxxx", "x.xxxx", "xxxxxx", "xxxxxx", "....x.", "....x.", "....x.", "....x.", "x....x",
-    "x....x", ".....x", ".....x", ".....x", "xx...x",
+FORMULAS = {
+    'ZZ1R': 'ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 +'
+        ' (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)',
+    'XX2R': 'XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)',
+    'XY2R': 'XY2 + XY8',
+    'XZ2R': 'XZ2 + XZ8 - D3*MZ3',
+    'YZ2R': 'YZ2 + YZ8',
+    'ZZ2R': 'ZZ2 + Ia2 + ZZ8 + D3**2*(M3 + M4 + M5 + M6)',
+    'MX2R': 'MX2 + MX8 + D3*(M3 + M4 + M5 + M6)',
+    'XX3R': 'XX3 - YY3 + YY4 - XX7 + YY7 + 2*RL4*MZ4 + (-D4**2 + RL4**2)*(M4 + M5 + M6) +'
+        ' D8**2*M8',
+    'XY3R': 'XY3 - XY7 - D4*MZ4 - D4*RL4*(M4 + M5 + M6)',
+    'XZ3R': 'XZ3 + YZ7',
+    'YZ3R': 'YZ3 - XZ7 + D8*MZ8',
+    'ZZ3R': 'ZZ3 + YY4 + ZZ7 + Ia7 + 2*RL4*MZ4 + (D4**2 + RL4**2)*(M4 + M5 + M6) + D8**2*M8',
+    'MX3R': 'MX3 + D4*(M4 + M5 + M6)',
+    'MY3R': 'MY3 + MZ4 + RL4*(M4 + M5 + M6) - D8/D3*MX8',
+    'XX4R': 'XX4 - YY4 + YY5',
+    'ZZ4R': 'ZZ4 + YY5',
+    'MY4R': 'MY4 - MZ5',
+    'XX5R': 'XX5 - YY5 + YY6',
+    'ZZ5R': 'ZZ5 + YY6',
+    'MY5R': 'MY5 + MZ6',
+    'XX6R': 'XX6 - YY6',
+    'MX7R': 'MX7 - D8/D3*MX8 + D8*M8',
+}
+UNITS = dict(zip(BASE_PARAMETERS, tuple("""
+kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m N*m*s/rad N*m N*m
+kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m
+kg*m**2 N*m*s/rad N*m N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m
+N*m kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m**2 kg*m kg*m kg*m**2 N*m*s/rad N*m N*m kg*m kg*m N*m*s/rad
+N*m N*m kg*m
+""".split())))
+# STRUCTURE[k, j]: whether base parameter k acts on joint j
+STRUCTURE = np.array([[mark == "x" for mark in row] for row in (
+    "x.....", "x.....", "x.....", "x.....", "xx....", "xx....", "xx....", "xx....", ".x....",
+    "xx....", "xx....", ".x....", ".x....", ".x....", "x....x", "x....x", "x....x", "x....x",
+    ".....x", "xx...x", "xx...x", "x.x..x", "x.x..x", "x.x..x", "x.x..x", "x.x..x", "xxx..x",
+    "xxx..x", "..x...", "..x...", "..x...", "..x...", "x.xx.x", "x.xx.x", "x.xx.x", "x.xx.x",
+    "x.xx.x", "xxxx.x", "xxxx.x", "...x..", "...x..", "...x..", "...x..", "x.xxxx", "x.xxxx",
+    "x.xxxx", "x.xxxx", "x.xxxx", "xxxxxx", "xxxxxx", "....x.", "....x.", "....x.", "....x.",
+    "x....x", "x....x", ".....x", ".....x", ".....x", "xx...x",
 )])
-DRIVES = None
-LIMITS = {}
-VALUES = {}
-LINKS = (1, 2, 3, 4, 5, 6, 7, 8)
 
 
 class Store(np.ndarray):
@@ -170,28 +160,43 @@ class Store(np.ndarray):
 
 
 def store(N: int) -> Store:
-    """Room for N samples, shape (60, 6, N): zeros and constants are written here, once. Reuse it: a fresh one costs page faults."""
-    S = np.zeros((60, 6, N)).view(Store)
-    S[3, 0] = S[13, 1] = S[31, 2] = S[42, 3] = S[53, 4] = S[58, 5] = 1.0
-    S.ready = True
-    return S
+    """Room for N samples, shape (60, 6, N): zeros and constants are written here, once.
+    Reuse it: a fresh one costs page faults.
+    """
+    zeros = np.zeros((60, 6, N)).view(Store)
+    zeros[3, 0] = zeros[13, 1] = zeros[31, 2] = zeros[42, 3] = zeros[53, 4] = zeros[58, 5] = 1.0
+    zeros.ready = True
+    return zeros
 
 
 def _states(*arrays):
-    """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape (N, 6), or all (6,)."""
+    """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape
+    (N, 6), or all (6,).
+    """
     states = [np.asarray(x, dtype=float) for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (6,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
-        raise ValueError(f"states of shape {shapes}; expected (N, 6) each, or (6,) each for one state")
+        raise ValueError(f"states of shape {shapes}; expected (N, 6) each, or (6,) each")
     return tuple([x.reshape(-1, 6) for x in states])
 
 
+def _parameters(X):
+    """X as an array; ValueError unless it has a value for each base parameter."""
+    X = np.asarray(X, dtype=float)
+    if X.shape != (60,):
+        raise ValueError(f"X of shape {X.shape}; expected (60,) in the order of BASE_PARAMETERS")
+    return X
+
+
 def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows (..., B), result ends in samples."""
+    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+    (..., B), result ends in samples.
+    """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
-        block(*(np.ascontiguousarray(x[t:t + B].T) for x in states), result[..., t:t + B], *arguments)
+        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
+        block(*rows, result[..., t:t + B], *arguments)
 
 
 def _by_sample(result, q):
@@ -201,18 +206,25 @@ def _by_sample(result, q):
 
 
 def elements(
-    *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
 ) -> dict:
-    """{parameter: (kind, direction of motion, row G of s = G q as {j: G_j} or form q'Bq as {(i, j): B_ij}, i <= j)} of the elements."""
+    """{parameter: (kind, direction of motion, row or form)} of the elements: row G of s = G q as
+    {j: G_j}, form q'Bq as {(i, j): B_ij}, i <= j.
+    """
     return {
-        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}), 'FS1': ('coulomb', 'both', {1: 1.0}),
-        'OFFSET1': ('offset', 'both', {1: 1.0}), 'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
-        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}), 'Ia4': ('inertia', 'both', {4: 1.0}),
-        'FV4': ('viscous', 'both', {4: 1.0}), 'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
-        'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}), 'FS5': ('coulomb', 'both', {5: 1.0}),
-        'OFFSET5': ('offset', 'both', {5: 1.0}), 'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
-        'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}), 'Ia7': ('inertia', 'both', {7: 1.0}),
-        'FV7': ('viscous', 'both', {7: 1.0}), 'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
+        'Ia1': ('inertia', 'both', {1: 1.0}), 'FV1': ('viscous', 'both', {1: 1.0}),
+        'FS1': ('coulomb', 'both', {1: 1.0}), 'OFFSET1': ('offset', 'both', {1: 1.0}),
+        'Ia2': ('inertia', 'both', {2: 1.0}), 'FV2': ('viscous', 'both', {2: 1.0}),
+        'FS2': ('coulomb', 'both', {2: 1.0}), 'OFFSET2': ('offset', 'both', {2: 1.0}),
+        'Ia4': ('inertia', 'both', {4: 1.0}), 'FV4': ('viscous', 'both', {4: 1.0}),
+        'FS4': ('coulomb', 'both', {4: 1.0}), 'OFFSET4': ('offset', 'both', {4: 1.0}),
+        'Ia5': ('inertia', 'both', {5: 1.0}), 'FV5': ('viscous', 'both', {5: 1.0}),
+        'FS5': ('coulomb', 'both', {5: 1.0}), 'OFFSET5': ('offset', 'both', {5: 1.0}),
+        'Ia6': ('inertia', 'both', {6: 1.0}), 'FV6': ('viscous', 'both', {6: 1.0}),
+        'FS6': ('coulomb', 'both', {6: 1.0}), 'OFFSET6': ('offset', 'both', {6: 1.0}),
+        'Ia7': ('inertia', 'both', {7: 1.0}), 'FV7': ('viscous', 'both', {7: 1.0}),
+        'FS7': ('coulomb', 'both', {7: 1.0}), 'OFFSET7': ('offset', 'both', {7: 1.0}),
     }
 
 
@@ -220,20 +232,24 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
-    g: float = 9.81
+    standard: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """X, shape (60,), from the 104 standard parameters: a mapping by name, or a vector in the order of STANDARD_PARAMETERS."""
+    """X, shape (60,), from the 104 standard parameters: a mapping by name, or a vector in the
+    order of STANDARD_PARAMETERS.
+    """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
     (
-        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2, MX2, MY2, _, M2, Ia2, FV2,
-        FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4,
-        Ia4, FV4, FS4, OFFSET4, XX5, XY5, XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6,
-        YY6, YZ6, ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7, MY7, _, M7, Ia7,
-        FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
+        _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
+        MX2, MY2, _, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3,
+        M3, XX4, XY4, XZ4, YY4, YZ4, ZZ4, MX4, MY4, MZ4, M4, Ia4, FV4, FS4, OFFSET4, XX5, XY5,
+        XZ5, YY5, YZ5, ZZ5, MX5, MY5, MZ5, M5, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6,
+        ZZ6, MX6, MY6, MZ6, M6, Ia6, FV6, FS6, OFFSET6, XX7, XY7, XZ7, YY7, YZ7, ZZ7, MX7, MY7,
+        _, M7, Ia7, FV7, FS7, OFFSET7, XX8, XY8, XZ8, YY8, YZ8, ZZ8, MX8, MY8, MZ8, M8
     ) = standard
-    ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 + D3**2 + D4**2)*(M4 + M5 + M6)
+    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + XX7 + YY8 + D2**2*(M2 + M7 + M8) + (D2**2 + D3**2)*M3 + (D2**2 +
+        D3**2 + D4**2)*(M4 + M5 + M6))
     XX2R = XX2 - YY2 + XX8 - YY8 - D3**2*(M3 + M4 + M5 + M6)
     XY2R = XY2 + XY8
     XZ2R = XZ2 + XZ8 - D3*MZ3
@@ -256,119 +272,158 @@ def base_parameters(
     XX6R = XX6 - YY6
     MX7R = MX7 - D8/D3*MX8 + D8*M8
     return np.array([
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R,
-        MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5,
-        FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8,
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R,
+        XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4,
+        OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6,
+        ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
 ) -> np.ndarray:
     """D of Gamma = D X. Shape (N, 6, 60).
 
-    A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and reused: a fresh one costs page
-    faults, up to several times the arithmetic for large N.
+    A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and
+    reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    D = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).transpose(2, 1, 0)
-    return D[0] if np.ndim(q) == 1 else D
+    filled = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).transpose(2, 1, 0)
+    return filled[0] if np.ndim(q) == 1 else filled
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
+    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
 ) -> np.ndarray:
-    """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same store, no copy."""
+    """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same
+    store, no copy.
+    """
     return _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).reshape(60, -1).T
+
+
+def _ready(out, N):
+    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+    out = store(N) if out is None else out
+    if not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
+        kind = f"{type(out).__name__} of shape {np.shape(out)}"
+        raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {kind}")
+    return out.view(np.ndarray)
 
 
 def _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g):
     """`out`, or a new store, filled."""
     states = _states(q, qd, qdd)
-    N = len(states[0])
-    if out is None:
-        out = store(N)
-    elif not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
-        raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {type(out).__name__} of shape {np.shape(out)}")
-    D = out.view(np.ndarray)
-    _fill(_regressor_block, D, states, D2, D3, D4, RL4, D8, g)
-    return D
+    result = _ready(out, len(states[0]))
+    _fill(_regressor_block, result, states, D2, D3, D4, RL4, D8, g)
+    return result
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.25,
+    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """Joint torques Gamma. Shape (N, 6)."""
+    """Joint torques Gamma = A qdd + C qd + Q + friction.
+
+    Shape (N, 6).
+    """
+    X = _parameters(X)
     states = _states(q, qd, qdd)
-    GAM = np.zeros((6, len(states[0])))
-    _fill(_inverse_dynamics_block, GAM, states, X, D2, D3, D4, RL4, D8, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((6, len(states[0])))
+    _fill(_inverse_dynamics_block, result, states, X, D2, D3, D4, RL4, D8, g)
+    return _by_sample(result, q)
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
-    D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest. Shape (N, 6, 6)."""
+    """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
+
+    Shape (N, 6, 6).
+    """
+    X = _parameters(X)
     states = _states(q)
-    A = np.zeros((6, 6, len(states[0])))
-    _fill(_inertia_matrix_block, A, states, X, D2, D3, D4, RL4, D8)
-    return _by_sample(A, q)
+    result = np.zeros((6, 6, len(states[0])))
+    _fill(_inertia_matrix_block, result, states, X, D2, D3, D4, RL4, D8)
+    return _by_sample(result, q)
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
-    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset. Shape (N, 6)."""
+    """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
+
+    Shape (N, 6).
+    """
+    X = _parameters(X)
     states = _states(q, qd)
-    GAM = np.zeros((6, len(states[0])))
-    _fill(_bias_block, GAM, states, X, D2, D3, D4, RL4, D8, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((6, len(states[0])))
+    _fill(_bias_block, result, states, X, D2, D3, D4, RL4, D8, g)
+    return _by_sample(result, q)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
-    D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them). Shape (N, 6)."""
+    """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
+
+    Shape (N, 6).
+    """
+    X = _parameters(X)
     states = _states(q)
-    GAM = np.zeros((6, len(states[0])))
-    _fill(_gravity_block, GAM, states, X, g)
-    return _by_sample(GAM, q)
+    result = np.zeros((6, len(states[0])))
+    _fill(_gravity_block, result, states, X, g)
+    return _by_sample(result, q)
 
 
 def frame_poses(
-    q: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
-    g: float = 9.81
+    q: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """Homogeneous transform of every frame j in frame 0, at index j - 1. Shape (N, 10, 4, 4)."""
+    """Homogeneous transform of every frame j in frame 0, at index j - 1.
+
+    Shape (N, 10, 4, 4).
+    """
     states = _states(q)
-    T = np.zeros((10, 4, 4, len(states[0])))
-    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = T[6, 3, 3] = 1.0
-    T[7, 3, 3] = T[8, 3, 3] = T[9, 3, 3] = 1.0
-    _fill(_frame_poses_block, T, states, D2, D3, D4, RL4, D8)
-    return _by_sample(T, q)
+    result = np.zeros((10, 4, 4, len(states[0])))
+    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
+    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = result[7, 3, 3] = result[8, 3, 3] = 1.0
+    result[9, 3, 3] = 1.0
+    _fill(_frame_poses_block, result, states, D2, D3, D4, RL4, D8)
+    return _by_sample(result, q)
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.25,
+    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
-    A, H = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8), bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
-    return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
+    """Qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+    inertia = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
-    D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, *, frame: int | None = None, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
 ) -> np.ndarray:
-    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in frame 0. Shape (N, 6, 6)."""
+    """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
+    frame 0, per joint rate. Shape (N, 6, 6).
+    """
     frame = 10 if frame is None else frame
-    path, T = _paths()[frame], frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
+    poses = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
+    result = _jacobian(_paths()[frame], poses, frame)
+    return result[0] if np.ndim(q) == 1 else result
+
+
+def _jacobian(path, T, frame):
+    """Columns of the joints on `path`, shape (N, 6, 6), from the poses T of all frames."""
     J, P = np.zeros((len(T), 6, 6)), T[:, frame - 1, :3, 3]
     for j, sigma, rates in path:
         z = T[:, j - 1, :3, 2]
@@ -376,29 +431,38 @@ def jacobian(
         for k, rate in rates:
             J[:, :3, k] += rate * v
             J[:, 3:, k] += rate * w
-    return J[0] if np.ndim(q) == 1 else J
+    return J
 
 
 def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and how the joints in the columns move them."""
+    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
+    how the joints in the columns move them.
+    """
     return {
         1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
         3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2, 1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),)),),
+        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
+            1.0),)),),
+        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
+            1.0),)), (5, 0, ((3, 1.0),)),),
+        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
+            1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),)),),
         7: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)),),
         8: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)),),
-        9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)), (9, 0, ((1, -1.0), (5, 1.0),)),),
+        9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)), (9, 0, ((1,
+            -1.0), (5, 1.0),)),),
         10: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
+    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
+    g: float = 9.81
 ) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also their accelerations."""
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also
+    their accelerations.
+    """
     rates = np.zeros((3, 6))
     rates[0, 1] = -1.0
     rates[0, 5] = 1.0
@@ -406,12 +470,17 @@ def passive_joints(
     rates[1, 5] = -1.0
     rates[2, 1] = -1.0
     rates[2, 5] = 1.0
-    offsets = np.array([np.pi/2, 0.0, np.pi])
-    given = [x is not None for x in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
-    found = [(x @ rates.T).reshape(*np.shape(q)[:-1], 3) for x, wanted in zip(states, given) if wanted]
-    found[0] += offsets
-    return found[0] if len(found) == 1 else tuple(found)
+    origin = np.array([
+        np.pi/2,
+        0.0,
+        np.pi,
+    ])
+    given = [state is not None for state in (q, qd, qdd)]
+    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
+    shape = (*np.shape(q)[:-1], 3)
+    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
+    results[0] += origin
+    return results[0] if len(results) == 1 else tuple(results)
 
 
 def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
@@ -800,10 +869,10 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
     (
-        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R, XY3R, XZ3R, YZ3R,
-        ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5,
-        MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7,
-        OFFSET7, MY8
+        ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2,
+        XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4,
+        FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R,
+        XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8
     ) = X
     # Trigonometry
     C2 = np.cos(q2)
@@ -824,10 +893,12 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     # Link 2
     W1_2 = -S2*QP1
     W2_2 = -C2*QP1
+    S2QDP1 = S2*QDP1
+    C2QDP1 = C2*QDP1
     DV2_3_2 = QP2*W2_2
-    WP1_2 = DV2_3_2 - S2*QDP1
+    WP1_2 = DV2_3_2 - S2QDP1
     DV1_3_2 = QP2*W1_2
-    WP2_2 = -C2*QDP1 - DV1_3_2
+    WP2_2 = -C2QDP1 - DV1_3_2
     DV1_1_2 = W1_2**2
     DV1_2_2 = W1_2*W2_2
     DV2_2_2 = W2_2**2
@@ -837,10 +908,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     DW1_2_2 = DV1_1_2 - DV2_2_2
     U1_1_2 = -DV2_2_2 - DV3_3_2
     U1_2_2 = DV1_2_2 - QDP2
-    U1_3_2 = DV1_3_2 + WP2_2
     U2_1_2 = QDP2 + DV1_2_2
     U2_2_2 = -DV1_1_2 - DV3_3_2
-    U2_3_2 = DV2_3_2 - WP1_2
     U3_1_2 = DV1_3_2 - WP2_2
     U3_2_2 = DV2_3_2 + WP1_2
     VSP1_2 = -D2*DV3_3_1
@@ -850,10 +919,12 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     # Link 3
     W1_3 = -C7*QP1
     W2_3 = S7*QP1
+    C7QDP1 = C7*QDP1
+    S7QDP1 = S7*QDP1
     DV2_3_3 = QP7*W2_3
-    WP1_3 = DV2_3_3 - C7*QDP1
+    WP1_3 = DV2_3_3 - C7QDP1
     DV1_3_3 = QP7*W1_3
-    WP2_3 = S7*QDP1 - DV1_3_3
+    WP2_3 = S7QDP1 - DV1_3_3
     DV1_1_3 = W1_3**2
     DV1_2_3 = W1_3*W2_3
     DV2_2_3 = W2_3**2
@@ -863,10 +934,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     DW1_2_3 = DV1_1_3 - DV2_2_3
     U1_1_3 = -DV2_2_3 - DV3_3_3
     U1_2_3 = DV1_2_3 - QDP7
-    U1_3_3 = DV1_3_3 + WP2_3
     U2_1_3 = QDP7 + DV1_2_3
     U2_2_3 = -DV1_1_3 - DV3_3_3
-    U2_3_3 = DV2_3_3 - WP1_3
     U3_1_3 = DV1_3_3 - WP2_3
     U3_2_3 = DV2_3_3 + WP1_3
     VSP1_3 = VP1_2 + D3*U1_1_2
@@ -997,7 +1066,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_5 = FDI3_6 + F3_5
     N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
     N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
-    N3_5 = ZZ5R*WP3_5 + XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - XX5R*DV1_2_5 - XZ5*U2_3_5 - MY5R*VP1_5
+    N3_5 = (ZZ5R*WP3_5 + XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - XX5R*DV1_2_5 - XZ5*U2_3_5 -
+        MY5R*VP1_5)
     NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
     NE2_5 = N3_6 + N2_5
     NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
@@ -1012,7 +1082,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_4 = FDI3_5 + F3_4
     N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
     N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
-    N3_4 = ZZ4R*WP3_4 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 - MY4R*VP1_4
+    N3_4 = (ZZ4R*WP3_4 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 -
+        MY4R*VP1_4)
     NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
     NE2_4 = N2_4 - NE3_5
     NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
@@ -1027,7 +1098,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_3 = FDI3_4 + F3_3
     N1_3 = XX3R*WP1_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*U2_1_3 + MY3R*VSP3_3 - XY3R*U3_1_3
     N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*U1_2_3 - MX3R*VSP3_3
-    N3_3 = ZZ3R*QDP7 + XY3R*DW1_2_3 + YZ3R*U1_3_3 + MX3R*VP2_3 - XX3R*DV1_2_3 - XZ3R*U2_3_3 - MY3R*VP1_3
+    N3_3 = (ZZ3R*QDP7 + XY3R*DW1_2_3 + YZ3R*S7QDP1 + MX3R*VP2_3 - XX3R*DV1_2_3 - XZ3R*C7QDP1 -
+        MY3R*VP1_3)
     NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
     NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
     NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
@@ -1037,7 +1109,8 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_2 = E3_3 + F3_2
     N1_2 = XX2R*WP1_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*U2_1_2 + MY2*VSP2_2 - XY2R*U3_1_2
     N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*U1_2_2 - MX2R*VSP2_2
-    N3_2 = ZZ2R*QDP2 + XY2R*DW1_2_2 + YZ2R*U1_3_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - XZ2R*U2_3_2 - MY2*VP1_2
+    N3_2 = (ZZ2R*QDP2 + XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - YZ2R*C2QDP1 - XZ2R*S2QDP1 -
+        MY2*VP1_2)
     NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
     NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
     NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
@@ -1100,8 +1173,8 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     MY7 = X[55]
     MY8 = X[59]
     # Constants
-    N1_7_1 = MY7*D2
-    N2_7_1 = -MX7R*D2
+    N1_7_1 = D2*MY7
+    N2_7_1 = -D2*MX7R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -1119,21 +1192,21 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     # Link 3
     VSP3_3_1 = D2 + D3*C2
     # Link 4
-    WP1_4_1 = -C7*C4
-    WP2_4_1 = C7*S4
+    C7C4 = C7*C4
+    C7S4 = C7*S4
     VSP3_4_1 = VSP3_3_1 - D4*S7 - RL4*C7
-    VP1_4_1 = -S4*VSP3_4_1
-    VP2_4_1 = -C4*VSP3_4_1
+    S4VSP3_4_1 = S4*VSP3_4_1
+    C4VSP3_4_1 = C4*VSP3_4_1
     # Link 5
-    WP1_5_1 = C5*WP1_4_1 + S7*S5
-    WP2_5_1 = S7*C5 - S5*WP1_4_1
-    VP1_5_1 = C5*VP1_4_1
-    VP2_5_1 = -S5*VP1_4_1
+    F3_6_1a = C5*C7C4 - S7*S5
+    F1_6_1a = S7*C5 + S5*C7C4
+    C5S4VSP3_4_1 = C5*S4VSP3_4_1
+    S5S4VSP3_4_1 = S5*S4VSP3_4_1
     # Link 6
-    WP1_6_1 = C6*WP1_5_1 + S6*WP2_4_1
-    WP2_6_1 = C6*WP2_4_1 - S6*WP1_5_1
-    VP1_6_1 = C6*VP1_5_1 + S6*VP2_4_1
-    VP2_6_1 = C6*VP2_4_1 - S6*VP1_5_1
+    F3_6_1b = C6*F3_6_1a - S6*C7S4
+    F3_6_1c = C6*C7S4 + S6*F3_6_1a
+    VP1_6_1 = -C6*C5S4VSP3_4_1 - S6*C4VSP3_4_1
+    VP2_6_1 = S6*C5S4VSP3_4_1 - C6*C4VSP3_4_1
     # Link 8
     VSP3_8_1 = D2 + D8*C7
     # Joint 8
@@ -1145,24 +1218,24 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     NE1_7_1 = C2m7*N1_8_1 + N1_7_1
     NE2_7_1 = S2m7*N1_8_1 + N2_7_1 - D8*F3_8_1
     # Joint 6
-    F1_6_1 = -MY6*WP2_5_1
-    F2_6_1 = MX6*WP2_5_1
-    F3_6_1 = MY6*WP1_6_1 - MX6*WP2_6_1
-    N1_6_1 = XX6R*WP1_6_1 + XZ6*WP2_5_1 + XY6*WP2_6_1 + MY6*VP2_5_1
-    N2_6_1 = XY6*WP1_6_1 + YZ6*WP2_5_1 - MX6*VP2_5_1
-    N3_6_1 = ZZ6*WP2_5_1 + YZ6*WP2_6_1 + XZ6*WP1_6_1 + MX6*VP2_6_1 - MY6*VP1_6_1
+    F1_6_1 = -MY6*F1_6_1a
+    F2_6_1 = MX6*F1_6_1a
+    F3_6_1 = -MX6*F3_6_1c - MY6*F3_6_1b
+    N1_6_1 = XZ6*F1_6_1a + XY6*F3_6_1c + MY6*S5S4VSP3_4_1 - XX6R*F3_6_1b
+    N2_6_1 = YZ6*F1_6_1a - XY6*F3_6_1b - MX6*S5S4VSP3_4_1
+    N3_6_1 = ZZ6*F1_6_1a + YZ6*F3_6_1c + MX6*VP2_6_1 - XZ6*F3_6_1b - MY6*VP1_6_1
     FDI1_6_1 = C6*F1_6_1 - S6*F2_6_1
     FDI3_6_1 = -S6*F1_6_1 - C6*F2_6_1
     # Joint 5
-    F1_5_1 = MY5R*WP2_4_1
-    F2_5_1 = -MX5*WP2_4_1
-    F3_5_1 = MY5R*WP1_5_1 - MX5*WP2_5_1
+    F1_5_1 = MY5R*C7S4
+    F2_5_1 = -MX5*C7S4
+    F3_5_1 = -MX5*F1_6_1a - MY5R*F3_6_1a
     E1_5_1 = FDI1_6_1 + F1_5_1
     E2_5_1 = F3_6_1 + F2_5_1
     E3_5_1 = FDI3_6_1 + F3_5_1
-    N1_5_1 = XX5R*WP1_5_1 + XY5*WP2_5_1 - XZ5*WP2_4_1 - MY5R*VP2_4_1
-    N2_5_1 = XY5*WP1_5_1 + MX5*VP2_4_1 - YZ5*WP2_4_1
-    N3_5_1 = YZ5*WP2_5_1 + XZ5*WP1_5_1 + MX5*VP2_5_1 - ZZ5R*WP2_4_1 - MY5R*VP1_5_1
+    N1_5_1 = XY5*F1_6_1a + MY5R*C4VSP3_4_1 - XX5R*F3_6_1a - XZ5*C7S4
+    N2_5_1 = -XY5*F3_6_1a - YZ5*C7S4 - MX5*C4VSP3_4_1
+    N3_5_1 = YZ5*F1_6_1a + MX5*S5S4VSP3_4_1 + MY5R*C5S4VSP3_4_1 - ZZ5R*C7S4 - XZ5*F3_6_1a
     NE1_5_1 = C6*N1_6_1 + N1_5_1 - S6*N2_6_1
     NE2_5_1 = N3_6_1 + N2_5_1
     NE3_5_1 = N3_5_1 - S6*N1_6_1 - C6*N2_6_1
@@ -1171,13 +1244,13 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     # Joint 4
     F1_4_1 = -MY4R*S7
     F2_4_1 = MX4*S7
-    F3_4_1 = MY4R*WP1_4_1 - MX4*WP2_4_1
+    F3_4_1 = -MX4*C7S4 - MY4R*C7C4
     E1_4_1 = FDI1_5_1 + F1_4_1
     E2_4_1 = F2_4_1 - E3_5_1
     E3_4_1 = FDI3_5_1 + F3_4_1
-    N1_4_1 = XX4R*WP1_4_1 + XZ4*S7 + XY4*WP2_4_1
-    N2_4_1 = XY4*WP1_4_1 + YZ4*S7
-    N3_4_1 = ZZ4R*S7 + YZ4*WP2_4_1 + XZ4*WP1_4_1 + MX4*VP2_4_1 - MY4R*VP1_4_1
+    N1_4_1 = XZ4*S7 + XY4*C7S4 - XX4R*C7C4
+    N2_4_1 = YZ4*S7 - XY4*C7C4
+    N3_4_1 = ZZ4R*S7 + YZ4*C7S4 + MY4R*S4VSP3_4_1 - XZ4*C7C4 - MX4*C4VSP3_4_1
     NE1_4_1 = C5*NE1_5_1 + N1_4_1 - S5*NE2_5_1
     NE2_4_1 = N2_4_1 - NE3_5_1
     NE3_4_1 = S5*NE1_5_1 + C5*NE2_5_1 + N3_4_1
@@ -1197,25 +1270,27 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     F3_2_1 = MX2R*C2 - MY2*S2
     E3_2_1 = E3_3_1 + F3_2_1
     N3_2_1 = -YZ2R*C2 - XZ2R*S2
-    N1_2_1 = MY2*D2 - XX2R*S2 - XY2R*C2
-    N2_2_1 = -XY2R*S2 - MX2R*D2
+    N1_2_1 = D2*MY2 - XX2R*S2 - XY2R*C2
+    N2_2_1 = -XY2R*S2 - D2*MX2R
     NE1_2_1 = S2m7*NE1_3_1 + N1_2_1 - C2m7*NE2_3_1
     NE2_2_1 = C2m7*NE1_3_1 + S2m7*NE2_3_1 + N2_2_1 - D3*E3_3_1
     NE3_2_1 = NE3_3_1 + D3*FDI2_3_1 + N3_2_1
     # Joint 1
     NE3_1_1 = ZZ1R + D2*E3_7_1 + D2*E3_2_1 - S7*NE1_7_1 - C7*NE2_7_1 - S2*NE1_2_1 - C2*NE2_2_1
+    # Friction, actuators
+    NE3_1_2 = NE3_2_1 - NE3_3_1
     # Link 3
-    VP1_3_2 = D3*C2m7
-    VP2_3_2 = D3*S2m7
+    C2m7D3 = D3*C2m7
+    S2m7D3 = D3*S2m7
     # Link 4
-    VP1_4_2 = C4*VP1_3_2
-    VP2_4_2 = -S4*VP1_3_2
+    C4C2m7D3 = C4*C2m7D3
+    S4C2m7D3 = S4*C2m7D3
     # Link 5
-    VP1_5_2 = C5*VP1_4_2 + S5*VP2_3_2
-    VP2_5_2 = C5*VP2_3_2 - S5*VP1_4_2
+    VP1_5_2 = C5*C4C2m7D3 + S5*S2m7D3
+    VP2_5_2 = C5*S2m7D3 - S5*C4C2m7D3
     # Link 6
-    VP1_6_2 = C6*VP1_5_2 + S6*VP2_4_2
-    VP2_6_2 = C6*VP2_4_2 - S6*VP1_5_2
+    VP1_6_2 = C6*VP1_5_2 - S6*S4C2m7D3
+    VP2_6_2 = -C6*S4C2m7D3 - S6*VP1_5_2
     # Joint 8
     FDI2_8_2 = -MY8*S2m7
     NE3_7_2 = D8*FDI2_8_2
@@ -1224,39 +1299,36 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     N2_6_2 = -MX6*VP2_5_2
     N3_6_2 = MX6*VP2_6_2 - MY6*VP1_6_2
     # Joint 5
-    N1_5_2 = -MY5R*VP2_4_2
-    N2_5_2 = MX5*VP2_4_2
+    N1_5_2 = MY5R*S4C2m7D3
+    N2_5_2 = -MX5*S4C2m7D3
     N3_5_2 = MX5*VP2_5_2 - MY5R*VP1_5_2
     NE1_5_2 = C6*N1_6_2 + N1_5_2 - S6*N2_6_2
     NE2_5_2 = N3_6_2 + N2_5_2
     NE3_5_2 = N3_5_2 - S6*N1_6_2 - C6*N2_6_2
     # Joint 4
-    N1_4_2 = MY4R*VP2_3_2
-    N2_4_2 = -MX4*VP2_3_2
-    N3_4_2 = MX4*VP2_4_2 - MY4R*VP1_4_2
+    N1_4_2 = MY4R*S2m7D3
+    N2_4_2 = -MX4*S2m7D3
+    N3_4_2 = -MX4*S4C2m7D3 - MY4R*C4C2m7D3
     NE1_4_2 = C5*NE1_5_2 + N1_4_2 - S5*NE2_5_2
     NE2_4_2 = N2_4_2 - NE3_5_2
     NE3_4_2 = S5*NE1_5_2 + C5*NE2_5_2 + N3_4_2
     # Joint 3
-    N3_3_2 = MX3R*VP2_3_2 - MY3R*VP1_3_2
+    N3_3_2 = MX3R*S2m7D3 - MY3R*C2m7D3
     NE3_3_2 = N3_3_2 - S4*NE1_4_2 - C4*NE2_4_2
-    # Joint 2
-    NE3_2_2 = ZZ2R + NE3_3_2
     # Link 6
-    WP1_6_4 = S5*C6
-    WP2_6_4 = -S5*S6
+    S5C6 = S5*C6
+    S5S6 = S5*S6
     # Joint 6
     F1_6_4 = -MY6*C5
     F2_6_4 = MX6*C5
-    F3_6_4 = MY6*WP1_6_4 - MX6*WP2_6_4
-    N1_6_4 = XX6R*WP1_6_4 + XZ6*C5 + XY6*WP2_6_4
-    N2_6_4 = XY6*WP1_6_4 + YZ6*C5
-    N3_6_4 = ZZ6*C5 + YZ6*WP2_6_4 + XZ6*WP1_6_4
+    F3_6_4 = MX6*S5S6 + MY6*S5C6
+    N1_6_4 = XX6R*S5C6 + XZ6*C5 - XY6*S5S6
+    N2_6_4 = XY6*S5C6 + YZ6*C5
+    N3_6_4 = ZZ6*C5 + XZ6*S5C6 - YZ6*S5S6
     FDI1_6_4 = C6*F1_6_4 - S6*F2_6_4
     FDI3_6_4 = -S6*F1_6_4 - C6*F2_6_4
     # Joint 5
-    MY5RS5 = MY5R*S5
-    F3_5_4 = MY5RS5 - MX5*C5
+    F3_5_4 = MY5R*S5 - MX5*C5
     E3_5_4 = FDI3_6_4 + F3_5_4
     N1_5_4 = XX5R*S5 + XY5*C5
     N2_5_4 = XY5*S5
@@ -1265,7 +1337,6 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     NE2_5_4 = N3_6_4 + N2_5_4
     NE3_5_4 = N3_5_4 - S6*N1_6_4 - C6*N2_6_4
     FDI1_5_4 = C5*FDI1_6_4 - S5*F3_6_4
-    FDI3_5_4 = S5*FDI1_6_4 + C5*F3_6_4
     # Joint 4
     E1_4_4 = FDI1_5_4 - MY4R
     E2_4_4 = MX4 - E3_5_4
@@ -1273,7 +1344,8 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     NE2_4_4 = YZ4 - NE3_5_4
     NE3_4_4 = ZZ4R + S5*NE1_5_4 + C5*NE2_5_4
     FDI1_4_4 = C4*E1_4_4 - S4*E2_4_4
-    NE3_3_4 = D4*FDI3_5_4 - S4*NE1_4_4 - C4*NE2_4_4 - RL4*FDI1_4_4
+    FDI3_4_4 = -S4*E1_4_4 - C4*E2_4_4
+    NE3_3_4 = -S4*NE1_4_4 - C4*NE2_4_4 - RL4*FDI1_4_4
     # Joint 6
     F3_6_5 = MX6*C6 - MY6*S6
     N1_6_5 = -XX6R*S6 - XY6*C6
@@ -1285,89 +1357,61 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     NE2_5_5 = YZ5 + N3_6_5
     NE3_5_5 = ZZ5R - S6*N1_6_5 - C6*N2_6_5
     FDI1_5_5 = -MY5R*C5 - S5*E2_5_5
-    FDI3_5_5 = C5*E2_5_5 - MY5RS5
     NE1_4_5 = C5*NE1_5_5 - S5*NE2_5_5
     # Joint 4
     FDI1_4_5 = C4*FDI1_5_5
-    NE3_3_5 = C4*NE3_5_5 + D4*FDI3_5_5 - S4*NE1_4_5 - RL4*FDI1_4_5
+    NE3_3_5 = C4*NE3_5_5 - S4*NE1_4_5 - D4*E3_5_4 - RL4*FDI1_4_5
     # Joint 6
-    FDI1_6_6 = -MY6*C6 - MX6*S6
     NE1_5_6 = XZ6*C6 - YZ6*S6
     # Joint 5
-    FDI1_5_6 = C5*FDI1_6_6
-    FDI3_5_6 = S5*FDI1_6_6
     NE1_4_6 = C5*NE1_5_6 - ZZ6*S5
     # Joint 4
-    FDI1_4_6 = C4*FDI1_5_6 - S4*F3_6_5
-    NE3_3_6 = C4*N3_6_5 + D4*FDI3_5_6 - S4*NE1_4_6 - RL4*FDI1_4_6
+    FDI1_4_6 = C4*FDI1_6_4 - S4*F3_6_5
+    NE3_3_6 = C4*N3_6_5 - S4*NE1_4_6 - D4*F3_6_4 - RL4*FDI1_4_6
     # Link 4
-    VP1_4_7 = -RL4*C4
-    VP2_4_7 = RL4*S4
+    S4RL4 = RL4*S4
     # Link 5
-    WP1_5_7 = -S4*C5
-    WP2_5_7 = S4*S5
-    VP1_5_7 = C5*VP1_4_7 + D4*S5
-    VP2_5_7 = D4*C5 - S5*VP1_4_7
+    S4C5 = S4*C5
+    S4S5 = S4*S5
+    VP2_5_7 = D4*C5 + S5*RL4*C4
     # Link 6
-    WP1_6_7 = C6*WP1_5_7 - C4*S6
-    WP2_6_7 = -C4*C6 - S6*WP1_5_7
-    VP1_6_7 = C6*VP1_5_7 + S6*VP2_4_7
-    VP2_6_7 = C6*VP2_4_7 - S6*VP1_5_7
+    N1_6_7a = C6*S4C5 + C4*S6
     # Joint 6
-    F1_6_7 = -MY6*WP2_5_7
-    F2_6_7 = MX6*WP2_5_7
-    F3_6_7 = MY6*WP1_6_7 - MX6*WP2_6_7
-    N1_6_7 = XX6R*WP1_6_7 + XZ6*WP2_5_7 + XY6*WP2_6_7 + MY6*VP2_5_7
-    N2_6_7 = XY6*WP1_6_7 + YZ6*WP2_5_7 - MX6*VP2_5_7
-    N3_6_7 = ZZ6*WP2_5_7 + YZ6*WP2_6_7 + XZ6*WP1_6_7 + MX6*VP2_6_7 - MY6*VP1_6_7
-    FDI1_6_7 = C6*F1_6_7 - S6*F2_6_7
-    FDI3_6_7 = -S6*F1_6_7 - C6*F2_6_7
+    N1_6_7 = XZ6*S4S5 + MY6*VP2_5_7 - XX6R*N1_6_7a - XY6*(C4*C6 - S6*S4C5)
+    N2_6_7 = YZ6*S4S5 - XY6*N1_6_7a - MX6*VP2_5_7
     # Joint 5
-    F1_5_7 = -MY5R*C4
-    F2_5_7 = MX5*C4
-    F3_5_7 = MY5R*WP1_5_7 - MX5*WP2_5_7
-    E1_5_7 = FDI1_6_7 + F1_5_7
-    E2_5_7 = F3_6_7 + F2_5_7
-    E3_5_7 = FDI3_6_7 + F3_5_7
-    N1_5_7 = XX5R*WP1_5_7 + XZ5*C4 + XY5*WP2_5_7 - MY5R*VP2_4_7
-    N2_5_7 = XY5*WP1_5_7 + YZ5*C4 + MX5*VP2_4_7
-    N3_5_7 = ZZ5R*C4 + YZ5*WP2_5_7 + XZ5*WP1_5_7 + MX5*VP2_5_7 - MY5R*VP1_5_7
+    N1_5_7 = XZ5*C4 + XY5*S4S5 - XX5R*S4C5 - MY5R*S4RL4
+    N2_5_7 = YZ5*C4 + MX5*S4RL4 - XY5*S4C5
     NE1_5_7 = C6*N1_6_7 + N1_5_7 - S6*N2_6_7
-    NE2_5_7 = N3_6_7 + N2_5_7
-    NE3_5_7 = N3_5_7 - S6*N1_6_7 - C6*N2_6_7
-    FDI1_5_7 = C5*E1_5_7 - S5*E2_5_7
-    FDI3_5_7 = S5*E1_5_7 + C5*E2_5_7
+    NE2_5_7 = NE3_3_6 + N2_5_7
     # Joint 4
-    F3_4_7 = MX4*C4 - MY4R*S4
-    E3_4_7 = FDI3_5_7 + F3_4_7
-    N1_4_7 = MY4R*D4 - XX4R*S4 - XY4*C4
-    N2_4_7 = -XY4*S4 - MX4*D4
+    N1_4_7 = D4*MY4R - XX4R*S4 - XY4*C4
+    N2_4_7 = -XY4*S4 - D4*MX4
     NE1_4_7 = C5*NE1_5_7 + N1_4_7 - S5*NE2_5_7
-    NE2_4_7 = N2_4_7 - NE3_5_7
-    FDI1_4_7 = C4*FDI1_5_7 + S4*E3_5_7
+    NE2_4_7 = N2_4_7 - NE3_3_5
     # Joint 3
-    NE3_3_7 = ZZ3R + D4*E3_4_7 - S4*NE1_4_7 - C4*NE2_4_7 - RL4*FDI1_4_7
+    NE3_3_7 = ZZ3R - S4*NE1_4_7 - C4*NE2_4_7 - D4*FDI3_4_4 - RL4*FDI1_5_5
     # Inertia matrix
     A[0, 0] = NE3_1_1
-    A[1, 0] = A[0, 1] = NE3_2_1 - NE3_3_1
-    A[2, 0] = A[0, 2] = NE3_4_1
-    A[3, 0] = A[0, 3] = NE3_5_1
-    A[4, 0] = A[0, 4] = N3_6_1
-    A[5, 0] = A[0, 5] = NE3_3_1
-    A[1, 1] = NE3_2_2 - NE3_3_2
-    A[2, 1] = A[1, 2] = NE3_4_2
-    A[3, 1] = A[1, 3] = NE3_5_2
-    A[4, 1] = A[1, 4] = N3_6_2
-    A[5, 1] = A[1, 5] = NE3_7_2 + NE3_3_2
+    A[0, 1] = A[1, 0] = NE3_1_2
+    A[1, 1] = ZZ2R
+    A[0, 2] = A[2, 0] = NE3_4_1
+    A[1, 2] = A[2, 1] = NE3_4_2
     A[2, 2] = Ia4 + NE3_4_4
-    A[3, 2] = A[2, 3] = NE3_5_4
-    A[4, 2] = A[2, 4] = N3_6_4
-    A[5, 2] = A[2, 5] = NE3_3_4
+    A[0, 3] = A[3, 0] = NE3_5_1
+    A[1, 3] = A[3, 1] = NE3_5_2
+    A[2, 3] = A[3, 2] = NE3_5_4
     A[3, 3] = Ia5 + NE3_5_5
-    A[4, 3] = A[3, 4] = N3_6_5
-    A[5, 3] = A[3, 5] = NE3_3_5
+    A[0, 4] = A[4, 0] = N3_6_1
+    A[1, 4] = A[4, 1] = N3_6_2
+    A[2, 4] = A[4, 2] = N3_6_4
+    A[3, 4] = A[4, 3] = N3_6_5
     A[4, 4] = ZZ6 + Ia6
-    A[5, 4] = A[4, 5] = NE3_3_6
+    A[0, 5] = A[5, 0] = NE3_3_1
+    A[1, 5] = A[5, 1] = NE3_7_2 + NE3_3_2
+    A[2, 5] = A[5, 2] = NE3_3_4
+    A[3, 5] = A[5, 3] = NE3_3_5
+    A[4, 5] = A[5, 4] = NE3_3_6
     A[5, 5] = NE3_3_7
 
 
@@ -1451,8 +1495,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     # Link 2
     W1_2 = -S2*QP1
     W2_2 = -C2*QP1
-    WP1_2 = QP2*W2_2
-    WP2_2 = -QP2*W1_2
+    DV2_3_2 = QP2*W2_2
+    DV1_3_2 = QP2*W1_2
     DV1_1_2 = W1_2**2
     DV1_2_2 = W1_2*W2_2
     DV2_2_2 = W2_2**2
@@ -1462,16 +1506,16 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     DW1_2_2 = DV1_1_2 - DV2_2_2
     U1_1_2 = -DV2_2_2 - DV3_3_2
     U2_2_2 = -DV1_1_2 - DV3_3_2
-    U3_1_2 = -2*WP2_2
-    U3_2_2 = 2*WP1_2
+    U3_1_2 = 2*DV1_3_2
+    U3_2_2 = 2*DV2_3_2
     VSP1_2 = -D2*DV3_3_1
     VP1_2 = C2*VSP1_2 - g*S2
     VP2_2 = -g*C2 - S2*VSP1_2
     # Link 3
     W1_3 = -C7*QP1
     W2_3 = S7*QP1
-    WP1_3 = QP7*W2_3
-    WP2_3 = -QP7*W1_3
+    DV2_3_3 = QP7*W2_3
+    DV1_3_3 = QP7*W1_3
     DV1_1_3 = W1_3**2
     DV1_2_3 = W1_3*W2_3
     DV2_2_3 = W2_3**2
@@ -1481,9 +1525,9 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     DW1_2_3 = DV1_1_3 - DV2_2_3
     U1_1_3 = -DV2_2_3 - DV3_3_3
     U2_2_3 = -DV1_1_3 - DV3_3_3
-    U3_1_3 = -2*WP2_3
-    U3_2_3 = 2*WP1_3
-    VSP3_3 = D3*U3_1_2
+    U3_1_3 = 2*DV1_3_3
+    U3_2_3 = 2*DV2_3_3
+    D3U3_1_2 = D3*U3_1_2
     VSP1_3 = VP1_2 + D3*U1_1_2
     VSP2_3 = VP2_2 + D3*DV1_2_2
     VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
@@ -1492,8 +1536,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     W1_4 = C4*W1_3 - S4*QP7
     W2_4 = -C4*QP7 - S4*W1_3
     W3_4 = QP4 + W2_3
-    WP1_4 = C4*WP1_3 + QP4*W2_4
-    WP2_4 = -S4*WP1_3 - QP4*W1_4
+    WP1_4 = C4*DV2_3_3 + QP4*W2_4
+    WP2_4 = -S4*DV2_3_3 - QP4*W1_4
     DV1_1_4 = W1_4**2
     DV1_2_4 = W1_4*W2_4
     DV1_3_4 = W1_4*W3_4
@@ -1504,24 +1548,24 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     DW3_1_4 = DV3_3_4 - DV1_1_4
     DW1_2_4 = DV1_1_4 - DV2_2_4
     U1_1_4 = -DV2_2_4 - DV3_3_4
-    U1_2_4 = DV1_2_4 - WP2_3
+    U1_2_4 = DV1_3_3 + DV1_2_4
     U1_3_4 = WP2_4 + DV1_3_4
-    U2_1_4 = WP2_3 + DV1_2_4
+    U2_1_4 = DV1_2_4 - DV1_3_3
     U2_2_4 = -DV1_1_4 - DV3_3_4
     U2_3_4 = DV2_3_4 - WP1_4
     U3_1_4 = DV1_3_4 - WP2_4
     U3_2_4 = WP1_4 + DV2_3_4
     VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*DV1_2_3
     VSP2_4 = VP2_3 + D4*DV1_2_3 + RL4*U2_2_3
-    VSP3_4 = VSP3_3 + D4*U3_1_3 + RL4*U3_2_3
+    VSP3_4 = D3U3_1_2 + D4*U3_1_3 + RL4*U3_2_3
     VP1_4 = C4*VSP1_4 - S4*VSP3_4
     VP2_4 = -C4*VSP3_4 - S4*VSP1_4
     # Link 5
     W1_5 = C5*W1_4 + S5*W3_4
     W2_5 = C5*W3_4 - S5*W1_4
     W3_5 = QP5 - W2_4
-    WP1_5 = C5*WP1_4 + S5*WP2_3 + QP5*W2_5
-    WP2_5 = C5*WP2_3 - S5*WP1_4 - QP5*W1_5
+    WP1_5 = C5*WP1_4 + QP5*W2_5 - S5*DV1_3_3
+    WP2_5 = -C5*DV1_3_3 - S5*WP1_4 - QP5*W1_5
     DV1_1_5 = W1_5**2
     DV1_2_5 = W1_5*W2_5
     DV1_3_5 = W1_5*W3_5
@@ -1570,7 +1614,6 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     VP1_7 = C7*VSP1_2 - g*S7
     VP2_7 = -g*C7 - S7*VSP1_2
     # Link 8
-    VSP3_8 = -D8*U3_2_3
     VSP1_8 = VP1_7 + D8*U2_2_3
     VSP2_8 = VP2_7 - D8*DV1_2_3
     VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
@@ -1578,7 +1621,7 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     F1_8 = MY8*DV1_2_2
     F2_8 = MY8*U2_2_2
     F3_8 = MY8*U3_2_2
-    N1_8 = MY8*VSP3_8
+    N1_8 = -MY8*D8*U3_2_3
     N3_8 = -MY8*VP1_8
     FDI2_8 = S2m7*F1_8 + C2m7*F2_8
     NE1_7 = C2m7*N1_8
@@ -1606,7 +1649,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_5 = FDI3_6 + F3_5
     N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
     N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
-    N3_5 = XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - ZZ5R*WP2_4 - XX5R*DV1_2_5 - XZ5*U2_3_5 - MY5R*VP1_5
+    N3_5 = (XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - ZZ5R*WP2_4 - XX5R*DV1_2_5 - XZ5*U2_3_5 -
+        MY5R*VP1_5)
     NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
     NE2_5 = N3_6 + N2_5
     NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
@@ -1621,7 +1665,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     E3_4 = FDI3_5 + F3_4
     N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
     N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
-    N3_4 = ZZ4R*WP2_3 + XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - XX4R*DV1_2_4 - XZ4*U2_3_4 - MY4R*VP1_4
+    N3_4 = (XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - ZZ4R*DV1_3_3 - XX4R*DV1_2_4 - XZ4*U2_3_4 -
+        MY4R*VP1_4)
     NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
     NE2_4 = N2_4 - NE3_5
     NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
@@ -1634,8 +1679,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     E1_3 = FDI1_4 + F1_3
     E2_3 = E3_4 + F2_3
     E3_3 = FDI3_4 + F3_3
-    N1_3 = XX3R*WP1_3 + ZZ3R*WP1_3 + YZ3R*DW2_3_3 + XZ3R*DV1_2_3 + MY3R*VSP3_3 - XY3R*U3_1_3
-    N2_3 = XZ3R*DW3_1_3 + XY3R*U3_2_3 - (XX3R - ZZ3R)*WP2_3 - YZ3R*DV1_2_3 - MX3R*VSP3_3
+    N1_3 = XX3R*DV2_3_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*DV1_2_3 + MY3R*D3U3_1_2 - XY3R*U3_1_3
+    N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*DV1_2_3 - MX3R*D3U3_1_2
     N3_3 = XY3R*DW1_2_3 + MX3R*VP2_3 - XX3R*DV1_2_3 - MY3R*VP1_3
     NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
     NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
@@ -1644,8 +1689,8 @@ def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
     # Joint 2
     F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
     E3_2 = E3_3 + F3_2
-    N1_2 = XX2R*WP1_2 + ZZ2R*WP1_2 + YZ2R*DW2_3_2 + XZ2R*DV1_2_2 - XY2R*U3_1_2
-    N2_2 = XZ2R*DW3_1_2 + XY2R*U3_2_2 - (XX2R - ZZ2R)*WP2_2 - YZ2R*DV1_2_2
+    N1_2 = XX2R*DV2_3_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*DV1_2_2 - XY2R*U3_1_2
+    N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*DV1_2_2
     N3_2 = XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - MY2*VP1_2
     NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
     NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
@@ -1689,8 +1734,6 @@ def _gravity_block(q, GAM, X, g):
     th2m7 = q2 - q7
     C2m7 = np.cos(th2m7)
     S2m7 = np.sin(th2m7)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
     C4 = np.cos(q4)
     S4 = np.sin(q4)
     C5 = np.cos(q5)
@@ -1698,37 +1741,32 @@ def _gravity_block(q, GAM, X, g):
     C6 = np.cos(q6)
     S6 = np.sin(q6)
     # Link 2
-    VP1_2 = -g*S2
-    VP2_2 = -g*C2
+    S2g = g*S2
+    C2g = g*C2
     # Link 3
-    VP1_3 = S2m7*VP1_2 + C2m7*VP2_2
-    VP2_3 = S2m7*VP2_2 - C2m7*VP1_2
+    VP1_3 = -S2m7*S2g - C2m7*C2g
+    VP2_3 = C2m7*S2g - S2m7*C2g
     # Link 4
-    VP1_4 = C4*VP1_3
-    VP2_4 = -S4*VP1_3
+    C4VP1_3 = C4*VP1_3
+    S4VP1_3 = S4*VP1_3
     # Link 5
-    VP1_5 = C5*VP1_4 + S5*VP2_3
-    VP2_5 = C5*VP2_3 - S5*VP1_4
+    VP1_5 = C5*C4VP1_3 + S5*VP2_3
+    VP2_5 = C5*VP2_3 - S5*C4VP1_3
     # Link 6
-    VP1_6 = C6*VP1_5 + S6*VP2_4
-    VP2_6 = C6*VP2_4 - S6*VP1_5
-    # Link 7
-    VP1_7 = -g*S7
-    VP2_7 = -g*C7
-    # Link 8
-    VP1_8 = C2m7*VP1_7 + S2m7*VP2_7
+    VP1_6 = C6*VP1_5 - S6*S4VP1_3
+    VP2_6 = -C6*S4VP1_3 - S6*VP1_5
     # Joint 8
-    N3_8 = -MY8*VP1_8
+    N3_8 = MY8*S2g
     # Joint 7
-    N3_7 = MX7R*VP2_7 - MY7*VP1_7
+    N3_7 = MX7R*VP1_3 + MY7*VP2_3
     NE3_7 = N3_8 + N3_7
     # Joint 6
     N1_6 = MY6*VP2_5
     N2_6 = -MX6*VP2_5
     N3_6 = MX6*VP2_6 - MY6*VP1_6
     # Joint 5
-    N1_5 = -MY5R*VP2_4
-    N2_5 = MX5*VP2_4
+    N1_5 = MY5R*S4VP1_3
+    N2_5 = -MX5*S4VP1_3
     N3_5 = MX5*VP2_5 - MY5R*VP1_5
     NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
     NE2_5 = N3_6 + N2_5
@@ -1736,22 +1774,18 @@ def _gravity_block(q, GAM, X, g):
     # Joint 4
     N1_4 = MY4R*VP2_3
     N2_4 = -MX4*VP2_3
-    N3_4 = MX4*VP2_4 - MY4R*VP1_4
+    N3_4 = -MX4*S4VP1_3 - MY4R*C4VP1_3
     NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
     NE2_4 = N2_4 - NE3_5
     NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
-    NE1_3 = C4*NE1_4 - S4*NE2_4
     # Joint 3
     N3_3 = MX3R*VP2_3 - MY3R*VP1_3
     NE3_3 = N3_3 - S4*NE1_4 - C4*NE2_4
-    NE1_2 = S2m7*NE1_3 - C2m7*NE3_4
-    NE2_2 = C2m7*NE1_3 + S2m7*NE3_4
     # Joint 2
-    N3_2 = MX2R*VP2_2 - MY2*VP1_2
+    N3_2 = MY2*S2g - MX2R*C2g
     NE3_2 = NE3_3 + N3_2
-    NE3_1 = -S2*NE1_2 - C2*NE2_2
     # Torques
-    GAM[0] = OFFSET1 + NE3_1
+    GAM[0] = OFFSET1
     GAM[1] = OFFSET2 + NE3_2 + N3_8 - NE3_3
     GAM[2] = OFFSET4 + NE3_4
     GAM[3] = OFFSET5 + NE3_5
@@ -1776,6 +1810,15 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     S5 = np.sin(q5)
     C6 = np.cos(q6)
     S6 = np.sin(q6)
+    # Joint axes Z and velocities V seen from link 4
+    Z1_4_1 = -C7*C4
+    Z2_4_1 = C7*S4
+    # Joint axes Z and velocities V seen from link 5
+    Z1_5_1 = C5*Z1_4_1 + S7*S5
+    Z2_5_1 = S7*C5 - S5*Z1_4_1
+    # Joint axes Z and velocities V seen from link 6
+    Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
+    Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
     # Frame 2
     R1_1_2 = C1*C2
     R1_2_2 = -C1*S2
@@ -1798,8 +1841,6 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     R1_2_4 = S1*C4 - S4*R1_1_3
     R2_1_4 = C4*R2_1_3 - C1*S4
     R2_2_4 = -C1*C4 - S4*R2_1_3
-    R3_1_4 = -C7*C4
-    R3_2_4 = C7*S4
     P1_4 = P1_3 + D4*R1_1_3 + RL4*R1_2_3
     P2_4 = P2_3 + D4*R2_1_3 + RL4*R2_2_3
     P3_4 = P3_3 + RL4*S7 - D4*C7
@@ -1808,28 +1849,19 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     R1_2_5 = C5*R1_2_3 - S5*R1_1_4
     R2_1_5 = C5*R2_1_4 + S5*R2_2_3
     R2_2_5 = C5*R2_2_3 - S5*R2_1_4
-    R3_1_5 = C5*R3_1_4 + S7*S5
-    R3_2_5 = S7*C5 - S5*R3_1_4
     # Frame 6
     R1_1_6 = C6*R1_1_5 + S6*R1_2_4
     R1_2_6 = C6*R1_2_4 - S6*R1_1_5
     R2_1_6 = C6*R2_1_5 + S6*R2_2_4
     R2_2_6 = C6*R2_2_4 - S6*R2_1_5
-    R3_1_6 = C6*R3_1_5 + S6*R3_2_4
-    R3_2_6 = C6*R3_2_4 - S6*R3_1_5
     # Frame 8
-    D8R1_2_3 = D8*R1_2_3
-    P1_8 = P1_2 - D8R1_2_3
-    D8R2_2_3 = D8*R2_2_3
-    P2_8 = P2_2 - D8R2_2_3
+    P1_8 = P1_2 - D8*R1_2_3
+    P2_8 = P2_2 - D8*R2_2_3
     P3_8 = -D8*S7
     # Frame 9
     P1_9 = D3R1_1_2 + P1_8
     P2_9 = D3R2_1_2 + P2_8
     P3_9 = P3_3 + P3_8
-    # Frame 10
-    P1_10 = P1_3 - D8R1_2_3
-    P2_10 = P2_3 - D8R2_2_3
     # Poses
     T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
@@ -1864,8 +1896,8 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     T[3, 1, 1] = R2_2_4
     T[3, 1, 2] = R2_2_3
     T[3, 1, 3] = P2_4
-    T[3, 2, 0] = R3_1_4
-    T[3, 2, 1] = R3_2_4
+    T[3, 2, 0] = Z1_4_1
+    T[3, 2, 1] = Z2_4_1
     T[3, 2, 2] = S7
     T[3, 2, 3] = P3_4
     T[4, 0, 0] = R1_1_5
@@ -1876,9 +1908,9 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     T[4, 1, 1] = R2_2_5
     T[4, 1, 2] = -R2_2_4
     T[4, 1, 3] = P2_4
-    T[4, 2, 0] = R3_1_5
-    T[4, 2, 1] = R3_2_5
-    T[4, 2, 2] = -R3_2_4
+    T[4, 2, 0] = Z1_5_1
+    T[4, 2, 1] = Z2_5_1
+    T[4, 2, 2] = -Z2_4_1
     T[4, 2, 3] = P3_4
     T[5, 0, 0] = R1_1_6
     T[5, 0, 1] = R1_2_6
@@ -1888,9 +1920,9 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     T[5, 1, 1] = R2_2_6
     T[5, 1, 2] = R2_2_5
     T[5, 1, 3] = P2_4
-    T[5, 2, 0] = R3_1_6
-    T[5, 2, 1] = R3_2_6
-    T[5, 2, 2] = R3_2_5
+    T[5, 2, 0] = Z1_6_1
+    T[5, 2, 1] = Z2_6_1
+    T[5, 2, 2] = Z2_5_1
     T[5, 2, 3] = P3_4
     T[6, 0, 0] = -R1_2_3
     T[6, 0, 1] = R1_1_3
@@ -1927,11 +1959,18 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     T[9, 0, 0] = R1_2_3
     T[9, 0, 1] = -R1_1_3
     T[9, 0, 2] = -S1
-    T[9, 0, 3] = P1_10
+    T[9, 0, 3] = P1_9
     T[9, 1, 0] = R2_2_3
     T[9, 1, 1] = -R2_1_3
     T[9, 1, 2] = C1
-    T[9, 1, 3] = P2_10
+    T[9, 1, 3] = P2_9
     T[9, 2, 0] = S7
     T[9, 2, 1] = C7
     T[9, 2, 3] = P3_9
+
+
+# Of the robot file: drives, limits and values, which no function above reads
+LINKS = (1, 2, 3, 4, 5, 6, 7, 8)
+DRIVES = None
+LIMITS = {}
+VALUES = {}

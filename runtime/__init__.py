@@ -1,31 +1,33 @@
 """From a measured record to parameters, and how far to trust them.
 
-    model = runtime.load_model("tx40")              # an emitted module: by name, by path, or the module itself
+    model = runtime.load_model("tx40")
+            # an emitted module: by name, by path, or the module itself
     record = runtime.Record(t, q, tau)              # joint side, SI, shapes (N,), (N, n), (N, n)
-    result = runtime.identify(model, record)        # every function: model, record or records, study
+    result = runtime.identify(model, record)
+            # every function: model, record or records, study
     result.estimate, result.checklist
     runtime.report(result, "out")                   # the page and the files of `symgen identify -o`
 
-Names are loaded when they are first used, so that `import runtime` is light. NumPy and SciPy serve every function but `simulate`, `excite` and
-the estimators that simulate the closed loop (CasADi), the estimator of feasible parameters (Clarabel) and `report` (Matplotlib, Jinja2).
+Names are loaded when they are first used, so that `import runtime` is light. NumPy and SciPy serve
+every function but `simulate`, `excite` and
+the estimators that simulate the closed loop (CasADi), the estimator of feasible parameters
+(Clarabel) and `report` (Matplotlib, Jinja2).
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from runtime.checks.delay import delay
+    from runtime.checks.plausibility import plausibility
     from runtime.errors import InputError
-    from runtime.estimators.essential import essential
     from runtime.estimators.estimate import Estimate
-    from runtime.estimators.methods import estimate
     from runtime.excitation.search import excite
     from runtime.identification.compare import compare
     from runtime.identification.identification import Identification, identify
-    from runtime.identification.plausibility.delay import delay
-    from runtime.identification.plausibility.plausibility import plausibility
+    from runtime.loop.methods import essential, estimate
+    from runtime.loop.simulation import simulate
     from runtime.model.generated import load_model
-    from runtime.motion.simulation import simulate
-    from runtime.observation.observation import Observation, observe
     from runtime.records.reading import read_record
     from runtime.records.record import Record
     from runtime.records.resampling import resample
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
     from runtime.resolution.advisor import advise
     from runtime.resolution.cestac import cestac
     from runtime.resolution.result import Cestac
+    from runtime.rows.observation import Observation
+    from runtime.rows.observe import observe
     from runtime.settings.files import load_study
     from runtime.settings.study import Study
 
@@ -66,17 +70,17 @@ __all__ = [
 
 _MODULES = {
     "runtime.errors": ("InputError",),
-    "runtime.estimators.essential": ("essential",),
     "runtime.estimators.estimate": ("Estimate",),
-    "runtime.estimators.methods": ("estimate",),
+    "runtime.loop.methods": ("essential", "estimate"),
     "runtime.excitation.search": ("excite",),
     "runtime.identification.compare": ("compare",),
     "runtime.identification.identification": ("Identification", "identify"),
-    "runtime.identification.plausibility.delay": ("delay",),
-    "runtime.identification.plausibility.plausibility": ("plausibility",),
+    "runtime.checks.delay": ("delay",),
+    "runtime.checks.plausibility": ("plausibility",),
     "runtime.model.generated": ("load_model",),
-    "runtime.motion.simulation": ("simulate",),
-    "runtime.observation.observation": ("Observation", "observe"),
+    "runtime.loop.simulation": ("simulate",),
+    "runtime.rows.observation": ("Observation",),
+    "runtime.rows.observe": ("observe",),
     "runtime.records.reading": ("read_record",),
     "runtime.records.record": ("Record",),
     "runtime.records.resampling": ("resample",),

@@ -1,4 +1,6 @@
-"""BLAS with one thread: several would fight for the cores, and their number could change the last bit of a sum."""
+"""BLAS with one thread: several would fight for the cores, and their number could change the last
+bit of a sum.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +13,19 @@ from typing import Any, ParamSpec, TypeVar
 P = ParamSpec("P")
 R = TypeVar("R")
 
-BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS")
+BLAS_THREADS = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "BLIS_NUM_THREADS",
+)
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
-    """The function with one BLAS thread while it runs: its matrices are small, and several threads wait for each other ten times as long as they compute."""
+    """The function with one BLAS thread while it runs: its matrices are small, and several threads
+    wait for each other ten times as long as they compute.
+    """
 
     @wraps(function)
     def alone(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -26,7 +36,9 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def single_thread() -> Callable[[], AbstractContextManager[Any]]:
-    """What gives a context with one BLAS thread; the libraries are sought here, once, which takes a sixth of the time of a short run."""
+    """What gives a context with one BLAS thread; the libraries are sought here, once, which takes a
+    sixth of the time of a short run.
+    """
     from threadpoolctl import ThreadpoolController
 
     return partial(ThreadpoolController().limit, limits=1, user_api="blas")
@@ -34,7 +46,9 @@ def single_thread() -> Callable[[], AbstractContextManager[Any]]:
 
 @contextmanager
 def inherited_single_thread() -> Iterator[None]:
-    """The environment of processes that are started meanwhile, whose BLAS then has one thread; as before afterwards."""
+    """The environment of processes that are started meanwhile, whose BLAS then has one thread; as
+    before afterwards.
+    """
     before = {name: os.environ.get(name) for name in BLAS_THREADS}
     os.environ.update(dict.fromkeys(BLAS_THREADS, "1"))
     try:

@@ -1,6 +1,8 @@
-"""What `runtime` raises on bad input: one root, a ValueError, with the offending place as attributes.
+"""What `runtime` raises on bad input: one root, a ValueError, with the offending place as
+attributes.
 
-A message says what was given, where, what was expected and what to do. Numerical outcomes (rank loss, no convergence) are not errors:
+A message says what was given, where, what was expected and what to do. Numerical outcomes (rank
+loss, no convergence) are not errors:
 they are a status of the Estimate.
 """
 
@@ -33,13 +35,22 @@ EXPECTED = {  # by the type of an error of pydantic
 
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: control characters spelled out, the middle of a long text left out."""
+    """`text` as a terminal may show it: control characters spelled out, the middle of a long text
+    left out.
+    """
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
         if not text.isprintable():
             text = "".join(c if c.isprintable() or c == "\n" else f"\\x{ord(c):02x}" for c in text)
     return text
+
+
+def encodable(text: str) -> str:
+    """`text` with the bytes of file names that are no UTF-8 (lone surrogates) as escapes of
+    JSON.
+    """
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def first_line(error: BaseException) -> str:
@@ -62,9 +73,18 @@ class InputError(ValueError):
         Place in the file, such as "line 12" or "sample 40".
     """
 
-    def __init__(self, message: str, *, file: str | None = None, column: str | None = None, row: str | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | None = None,
+        column: str | None = None,
+        row: str | None = None,
+    ) -> None:
         self.message, self.file, self.column, self.row = message, file, column, row
-        place = ", ".join(part for part in (file, None if column is None else f"column {column!r}", row) if part)
+        place = ", ".join(
+            part for part in (file, None if column is None else f"column {column!r}", row) if part
+        )
         super().__init__(printable(f"{place}: {message}" if place else message))
 
 
@@ -83,10 +103,21 @@ class SettingsError(InputError):
         Line of the setting in that file, from 1.
     """
 
-    def __init__(self, message: str, *, path: tuple[str | int, ...] = (), file: str | None = None, line: int | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: tuple[str | int, ...] = (),
+        file: str | None = None,
+        line: int | None = None,
+    ) -> None:
         self.path, self.line, self.reason = path, line, message
         key = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in path).lstrip(".")
-        super().__init__(f"{key}: {message}" if key else message, file=file, row=None if line is None else f"line {line}")
+        super().__init__(
+            f"{key}: {message}" if key else message,
+            file=file,
+            row=None if line is None else f"line {line}",
+        )
 
 
 class ModelError(InputError):
@@ -94,17 +125,22 @@ class ModelError(InputError):
 
 
 class DataUnavailableError(InputError):
-    """A dataset that is neither on this machine nor at its source; `tried` lists the places and what went wrong in each."""
+    """A dataset that is neither on this machine nor at its source; `tried` lists the places and
+    what went wrong in each.
+    """
 
     def __init__(self, message: str, *, tried: tuple[str, ...] = ()) -> None:
         self.tried = tried
         super().__init__(message)
 
 
-def settings_error(error: ValidationError, given: Any, path: tuple[str | int, ...] = ()) -> SettingsError:
+def settings_error(
+    error: ValidationError, given: Any, path: tuple[str | int, ...] = ()
+) -> SettingsError:
     """The first problem of a pydantic validation as one SettingsError.
 
-    Every member of a union has its own error. The member that took most of the value knows best; members that took equally much
+    Every member of a union has its own error. The member that took most of the value knows best;
+    members that took equally much
     are named together.
 
     Parameters
@@ -120,8 +156,15 @@ def settings_error(error: ValidationError, given: Any, path: tuple[str | int, ..
     deepest = max((place for place, _ in alike), key=len)
     reasons = [reason for place, reason in alike if place == deepest]
     value, _, told = reasons[0].partition("; expected ")
-    others = [reason.removeprefix(f"{value}; expected ") for reason in reasons[1:] if reason.startswith(f"{value}; expected ")]
-    return SettingsError(" or ".join([reasons[0], *(other for other in dict.fromkeys(others) if other != told)]), path=(*path, *deepest))
+    others = [
+        reason.removeprefix(f"{value}; expected ")
+        for reason in reasons[1:]
+        if reason.startswith(f"{value}; expected ")
+    ]
+    return SettingsError(
+        " or ".join([reasons[0], *(other for other in dict.fromkeys(others) if other != told)]),
+        path=(*path, *deepest),
+    )
 
 
 def shown(value: Any) -> str:
@@ -130,11 +173,17 @@ def shown(value: Any) -> str:
 
 
 def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...], str]:
-    """Path and reason of one error of pydantic; `loc` also names members of unions, which are no keys."""
+    """Path and reason of one error of pydantic; `loc` also names members of unions, which are no
+    keys.
+    """
     path: list[str | int] = []
     for key in error["loc"]:
         try:
-            given = given[key] if isinstance(given, Mapping | Sequence) and not isinstance(given, str) else getattr(given, key)
+            given = (
+                given[key]
+                if isinstance(given, Mapping | Sequence) and not isinstance(given, str)
+                else getattr(given, key)
+            )
             path.append(key)
         except (LookupError, TypeError, AttributeError):
             continue
@@ -142,7 +191,11 @@ def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...
     reason = f"{shown(error['input'])}; expected {EXPECTED.get(kind, '').format(**context)}"
     if kind == "missing":
         key = error["loc"][-1]
-        reason = f"no key {key}; add it" if isinstance(key, str) else f"{len(given)} values; expected at least {key + 1}"
+        reason = (
+            f"no key {key}; add it"
+            if isinstance(key, str)
+            else f"{len(given)} values; expected at least {key + 1}"
+        )
     elif kind == "too_long":
         reason = f"{context['actual_length']} values; expected {context['max_length']}"
     elif kind == "literal_error":
@@ -157,5 +210,7 @@ def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...
 
 
 def instant(t: float) -> str:
-    """A time, s, for messages: six digits; to the millisecond where it counts from an epoch, or two instants of a record would read alike."""
+    """A time, s, for messages: six digits; to the millisecond where it counts from an epoch, or two
+    instants of a record would read alike.
+    """
     return f"{t:g}" if abs(t) < 1e5 else f"{t:.3f}"

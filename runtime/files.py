@@ -1,4 +1,6 @@
-"""Bytes of a measured file, plain or compressed by gzip, their hash, and how much a file may unpack to."""
+"""Bytes of a measured file, plain or compressed by gzip, their hash, and how much a file may unpack
+to.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,20 @@ def is_file(path: Path) -> bool:
 
 
 def require_file(path: Path) -> int:
-    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
+    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never
+    answer or never end.
+    """
     try:
         status = path.stat()
     except (OSError, ValueError) as e:
-        raise InputError(f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)) from e
+        raise InputError(
+            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+        ) from e
     if not S_ISREG(status.st_mode):
         what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
-        raise InputError(f"cannot be read: {what}; expected a file, copy its content into one", file=str(path))
+        raise InputError(
+            f"cannot be read: {what}; expected a file, copy its content into one", file=str(path)
+        )
     return status.st_size
 
 
@@ -46,10 +54,13 @@ def allowed(size: int) -> int:
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:
-    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a
+    measured record ever does.
+    """
     if unpacked > allowed(size):
         raise InputError(
-            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB "
+            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record "
+            f"may be {ALWAYS // 2**20} MiB "
             f"or {RATIO} times the size of its file: store it without compression if it is genuine",
             file=file,
         )
@@ -85,12 +96,21 @@ def is_packed(path: Path) -> bool:
 def read_bytes(path: Path) -> bytes:
     """The uncompressed bytes of a file."""
     if require_file(path) > WHOLE:
-        raise InputError(f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study file, or --block)", file=str(path))
+        raise InputError(
+            (
+                f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study "
+                "file, "
+                "or --block)"
+            ),
+            file=str(path),
+        )
     return b"".join(_parts(path))
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of the uncompressed bytes of a file, 64 hexadecimal digits. A file that unpacks to more than `allowed` is refused, part by part."""
+    """SHA-256 of the uncompressed bytes of a file, 64 hexadecimal digits. A file that unpacks to
+    more than `allowed` is refused, part by part.
+    """
     digest = hashlib.sha256()
     for part in _parts(path):
         digest.update(part)

@@ -1,6 +1,8 @@
-"""Names, formulas and numbers as people write them: ZZ1R is ZZ with the index 1R, `D3**2*(M3 + M4)` has a square and no star.
+"""Names, formulas and numbers as people write them: ZZ1R is ZZ with the index 1R, `D3**2*(M3 + M4)`
+has a square and no star.
 
-Every piece is made by `element`, which escapes whatever is not Markup already: no name and no formula can bring in markup.
+Every piece is made by `element`, which escapes whatever is not Markup already: no name and no
+formula can bring in markup.
 """
 
 from __future__ import annotations
@@ -9,8 +11,17 @@ import math
 import re
 from html import escape
 
-FAMILIES = {"Ia": ("I", "a"), "FV": ("F", "v"), "FS": ("F", "s"), "FVM": ("F", "vm"), "FSM": ("F", "sm")}
-TOKEN = re.compile(r"\*\*(?P<power>\d+)|(?P<times>\*)|(?P<sign>\s[+-]\s|-)|(?P<name>[A-Za-z]\w*)|(?P<other>.)", re.DOTALL)
+FAMILIES = {
+    "Ia": ("I", "a"),
+    "FV": ("F", "v"),
+    "FS": ("F", "s"),
+    "FVM": ("F", "vm"),
+    "FSM": ("F", "sm"),
+}
+TOKEN = re.compile(
+    r"\*\*(?P<power>\d+)|(?P<times>\*)|(?P<sign>\s[+-]\s|-)|(?P<name>[A-Za-z]\w*)|(?P<other>.)",
+    re.DOTALL,
+)
 UPRIGHT = {"sin", "cos", "tan", "sqrt", "pi"}
 
 
@@ -24,9 +35,14 @@ class Markup(str):
 
 
 def element(tag: str, *children: str, **attributes: str) -> Markup:
-    """<tag attributes>children</tag>; text children and attribute values are escaped; `class_` is written class, `aria_label` aria-label."""
+    """<tag attributes>children</tag>; text children and attribute values are escaped; `class_` is
+    written class, `aria_label` aria-label.
+    """
     inside = "".join(child if isinstance(child, Markup) else escape(child) for child in children)
-    given = "".join(f' {name.rstrip("_").replace("_", "-")}="{escape(value)}"' for name, value in attributes.items())
+    given = "".join(
+        f' {name.rstrip("_").replace("_", "-")}="{escape(value)}"'
+        for name, value in attributes.items()
+    )
     return Markup(f"<{tag}{given}>{inside}</{tag}>")
 
 
@@ -46,7 +62,9 @@ def symbol(name: str) -> Markup:
 
 
 def formula(text: str) -> Markup:
-    """A flat formula over + - * ** ( ) and functions: subscripts, exponents, thin spaces for products."""
+    """A flat formula over + - * ** ( ) and functions: subscripts, exponents, thin spaces for
+    products.
+    """
     pieces: list[str] = []
     for token in TOKEN.finditer(text):
         kind, piece = token.lastgroup, token[0]

@@ -1,11 +1,13 @@
-"""Many independent tasks, in this process, in several, or on several machines, with the same results.
+"""Many independent tasks, in this process, in several, or on several machines, with the same
+results.
 
-A task is a pure function of its key and of one context. Of several processes this one is the first; each takes the next key when it is free. The
-context travels once to each of the others. These are spawned, never forked (a fork after BLAS has started its threads may hang). BLAS has one thread
-in all of them: several would fight for the cores, and their number could change the last bit of a sum. A process that dies takes nothing with it:
-its key is given to a new one.
-
-Several machines are a Dask cluster (`runtime.cluster`).
+A task is a pure function of its key and of one context. The engine is `concurrent.futures`: an
+executor for each further process, or that of a Dask cluster (`runtime.cluster`). Of several
+processes
+this one is the first; each takes the next key when it is free. The context travels once to each of
+the others. These are spawned, never forked (a fork after BLAS has started its threads may hang).
+BLAS has one thread in all of them: several would fight for the cores, and their number could change
+the last bit of a sum. A process that dies takes nothing with it: its keys are given to a new one.
 """
 
 from __future__ import annotations
@@ -15,31 +17,94 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from runtime.blas import inherited_single_thread, single_thread
-from runtime.cluster import PATIENCE, TIMEOUT, died, on_cluster
+from runtime.cluster import TIMEOUT, Cluster, connected, packed, unpacked
 from runtime.errors import InputError
 
 K = TypeVar("K")
 C = TypeVar("C")
 R = TypeVar("R")
-Item = tuple[int, Any]  # number of a key, and the key
 
-_worker: dict[str, Any] = {}  # of a spawned process: the task and its context
+PATIENCE = 3  # times in a row that workers may die before any task is done
+AHEAD = 2  # tasks of another process, the next one waiting where many are left
+
+_worker: dict[str, bytes] = {}  # of a spawned process: the task and its context
+
+
+class OtherProcess:
+    """A spawned process; a new one where it has ended.
+
+    Attributes
+    ----------
+    who : str
+        In messages.
+    most : int
+        Tasks that it may hold.
+    lost : tuple of type
+        Errors that say that it died.
+    """
+
+    who, most, lost = "processes", AHEAD, (BrokenProcessPool,)
+
+    def __init__(self) -> None:
+        self.pool: ProcessPoolExecutor | None = None
+
+    def start(self, *modules: str) -> ProcessPoolExecutor:
+        """Spawn it, unless it is there; it loads these modules first."""
+        if self.pool is None:
+            spawn = get_context("spawn")
+            watched, self.held = spawn.Pipe(duplex=False)
+            self.pool = ProcessPoolExecutor(
+                1, mp_context=spawn, initializer=_start, initargs=(watched,)
+            )
+            with inherited_single_thread():
+                self.pool.submit(_load, modules)
+            watched.close()
+        return self.pool
+
+    def prepare(self, task: Callable[..., Any], context: Any) -> None:
+        """Send what every key needs."""
+        self._submitted(_prepare, packed(task, context))
+
+    def submit(self, key: Any) -> Future[Any]:
+        """The task of a key."""
+        return self._submitted(_run, key)
+
+    def _submitted(self, function: Callable[..., Any], given: Any) -> Future[Any]:
+        """A task of the process; one that has failed where the process has died."""
+        try:
+            return self.start().submit(function, given)
+        except BrokenProcessPool as e:
+            future: Future[Any] = Future()
+            future.set_exception(e)
+            return future
+
+    def end(self) -> None:
+        """End it at once, whatever it does."""
+        if self.pool is not None:
+            self.held.close()
+            self.pool.shutdown()
+            self.pool = None
 
 
 class Workers:
     """So many processes, this one among them.
 
-    The others are spawned when they are first needed, or by `start`; they serve all tasks until the context ends, and end with this process.
+    The others are spawned when they are first needed, or by `start`; they serve all tasks until the
+    context ends, and end with this process.
 
         with Workers(2) as workers:
             workers.start("numpy")
@@ -63,8 +128,10 @@ class Workers:
             other.start(*modules)
 
     def meanwhile(self, function: Callable[[], R]) -> Callable[[], R]:
-        """What gives the value of a function, which is pickled: another process, if one has been started, computes it before the tasks that come later;
-        where there is none, or it dies, this process does when it is asked."""
+        """Evaluate a pickled function in another process, before later tasks; here, when its value
+        is
+        asked for, where no other process has been started, or it dies.
+        """
         running = [other.pool for other in self.others if other.pool is not None]
         try:
             future = running[-1].submit(function)
@@ -85,47 +152,6 @@ class Workers:
     def __exit__(self, *_: object) -> None:
         for other in self.others:
             other.end()
-
-
-class OtherProcess:
-    """A spawned process; a new one where it has ended."""
-
-    def __init__(self) -> None:
-        self.pool: ProcessPoolExecutor | None = None
-        self.deaths = 0  # in a row
-
-    def start(self, *modules: str) -> ProcessPoolExecutor:
-        """Spawn it, unless it is there; it loads these modules first."""
-        if self.pool is None:
-            spawn = get_context("spawn")
-            watched, self.held = spawn.Pipe(duplex=False)
-            self.pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_start, initargs=(watched,))
-            with inherited_single_thread():
-                self.pool.submit(_load, modules)
-            watched.close()
-        return self.pool
-
-    def end(self) -> None:
-        """End it at once, whatever it does."""
-        if self.pool is not None:
-            self.held.close()
-            self.pool.shutdown()
-            self.pool = None
-
-    def work(self, task: Callable[[C, K], R], context: C, waiting: Sequence[deque[Item]], done: SimpleQueue[Any]) -> None:
-        """Ask it for one task after the other until none waits, in a thread; `done` gets this process, the item, and the result or what went wrong."""
-        pool = self.start()
-
-        def ask() -> None:
-            item = None
-            try:
-                pool.submit(_prepare, task, context).result()
-                while (item := _next(*waiting)) is not None:
-                    done.put((self, item, pool.submit(_run, item[1]).result(), None))
-            except BaseException as e:
-                done.put((self, item, None, e))
-
-        threading.Thread(target=ask, daemon=True).start()
 
 
 def results(
@@ -157,20 +183,26 @@ def results(
     InputError
         Processes that always die; no answer from the scheduler; workers of other versions.
     """
-    if scheduler is not None:
-        yield from on_cluster(task, context, list(keys), scheduler, timeout)
-        return
-    with started(workers) as processes:
-        for _, result in _shared(task, context, keys, processes):
-            yield result
+    keys = list(keys)
+    if scheduler is None:
+        with started(workers) as processes:
+            yield from (result for _, result in _shared(task, context, keys, processes.others))
+    elif keys:
+        with connected(scheduler, timeout) as cluster:
+            shared = _shared(task, context, keys, [cluster], here=False)
+            yield from (result for _, result in shared)
 
 
-def in_order(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: int | Workers = 0) -> Iterator[R]:
-    """task(context, key) in the order of the keys, by so many processes; results that come early wait."""
+def in_order(
+    task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: int | Workers = 0
+) -> Iterator[R]:
+    """task(context, key) in the order of the keys, by so many processes; results that come early
+    wait.
+    """
     waiting: dict[int, R] = {}
     following = 0
     with started(workers) as processes:
-        for number, result in _shared(task, context, keys, processes):
+        for number, result in _shared(task, context, keys, processes.others):
             waiting[number] = result
             while following in waiting:
                 yield waiting.pop(following)
@@ -187,51 +219,68 @@ def started(workers: int | Workers) -> Iterator[Workers]:
             yield own
 
 
-def _shared(task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: Workers) -> Iterator[tuple[int, R]]:
-    """Number and result of every key as they finish. A key whose process died is left to the other ones: it might end this one too."""
-    left: deque[Item] = deque(enumerate(keys))
-    lost: deque[Item] = deque()
-    done: SimpleQueue[tuple[OtherProcess, Item | None, Any, BaseException | None]] = SimpleQueue()
-    others, unfinished = workers.others[: max(len(left) - 1, 0)], len(left)
-    single = single_thread()
+def _shared(
+    task: Callable[[C, K], R],
+    context: C,
+    keys: Iterable[K],
+    workers: Sequence[OtherProcess | Cluster],
+    *,
+    here: bool = True,
+) -> Iterator[tuple[int, R]]:
+    """Number and result of every key as they finish.
+
+    A key whose worker died is left to the others: it might end this process too.
+    here : whether this process works as well.
+    """
+    left, lost = deque(enumerate(keys)), deque[tuple[int, K]]()
+    workers, busy = (
+        workers[: max(len(left) - here, 0)],
+        dict[Future[R], tuple[OtherProcess | Cluster, int, K]](),
+    )
+    single, deaths = single_thread(), 0
     try:
-        for other in others:
-            other.work(task, context, (lost, left), done)
-        while unfinished:
-            if done.empty() and (item := _next(left)) is not None:
+        for worker in workers:
+            worker.prepare(task, context)
+        while left or lost or busy:
+            own = here and left and not any(future.done() for future in busy) and left.popleft()
+            for worker in workers:
+                held = sum(other is worker for other, *_ in busy.values())
+                while (lost or left) and held < (worker.most if len(left) > len(workers) else 1):
+                    number, key = (lost or left).popleft()
+                    busy[worker.submit(key)] = worker, number, key
+                    held += 1
+            if own:
                 with single():
-                    result = task(context, item[1])
-            else:
-                other, item, result, error = done.get()
-                if isinstance(error, BrokenProcessPool):
-                    lost.extend([item] if item else [])
-                    other.deaths += 1
-                    if other.deaths == PATIENCE:
-                        raise died("processes", len(left) + len(lost), 'use fewer workers; a script needs `if __name__ == "__main__":`')
-                    other.end()
-                    if left or lost:
-                        other.work(task, context, (lost, left), done)
+                    result = task(context, own[1])
+                yield own[0], result
+                continue
+            for future in wait(busy, return_when=FIRST_COMPLETED).done:
+                worker, number, key = busy.pop(future)
+                try:
+                    result = future.result()
+                except Exception as e:
+                    if not isinstance(e, worker.lost):
+                        raise
+                    lost.append((number, key))
                     continue
-                if error is not None:
-                    raise error
-                assert item is not None
-                other.deaths = 0
-            unfinished -= 1
-            yield item[0], result
+                deaths = 0
+                yield number, result
+            if lost:
+                deaths += 1
+                if deaths == PATIENCE:
+                    raise InputError(
+                        f"{workers[0].who} died {PATIENCE} times before any of "
+                        f"{len(left) + len(lost) + len(busy)} tasks was done: no memory left, or a "
+                        'script without `if __name__ == "__main__":`'
+                    )
+                for worker in workers:
+                    if not any(other is worker for other, *_ in busy.values()):
+                        worker.end()
+                        worker.prepare(task, context)
     finally:  # also when the caller stops early or a task fails: what still runs is of no use then
-        left.clear()
-        lost.clear()
-        if unfinished:
-            for other in others:
-                other.end()
-
-
-def _next(*waiting: deque[Item]) -> Item | None:
-    """The next item of the first queue that has one."""
-    for queue in waiting:
-        with suppress(IndexError):
-            return queue.popleft()
-    return None
+        if left or lost or busy:
+            for worker in workers:
+                worker.end()
 
 
 def _start(watched: Connection) -> None:
@@ -240,7 +289,9 @@ def _start(watched: Connection) -> None:
 
 
 def _end_with(watched: Connection) -> None:
-    """End this process when the other end of the pipe is closed: by the process that asked, or because that one ended."""
+    """End this process when the other end of the pipe is closed: by the process that asked, or
+    because that one ended.
+    """
     with suppress(OSError):
         watched.poll(None)
     os._exit(1)
@@ -251,9 +302,10 @@ def _load(modules: Iterable[str]) -> None:
         import_module(module)
 
 
-def _prepare(task: Callable[..., Any], context: Any) -> None:
-    _worker.update(task=task, context=context)
+def _prepare(job: bytes) -> None:
+    _worker["job"] = job
 
 
 def _run(key: Any) -> Any:
-    return _worker["task"](_worker["context"], key)
+    task, context = unpacked(_worker["job"])
+    return task(context, key)

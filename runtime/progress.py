@@ -1,6 +1,9 @@
-"""What long work is at: sentences for whoever asked, by `logging`, logger "runtime.progress", level INFO.
+"""What long work is at: sentences for whoever asked, by `logging`, logger "runtime.progress", level
+INFO.
 
-logging.getLogger("runtime.progress").setLevel(logging.INFO)        # and a handler: `symgen` prints them after two seconds
+logging.getLogger("runtime.progress").setLevel(logging.INFO)
+
+and a handler: `symgen` prints them after two seconds
 """
 
 from __future__ import annotations

@@ -1,12 +1,20 @@
-"""Results of one command in one folder: every file whole, the set of one run, never of two, whatever interrupts.
+"""Results of one command in one folder: every file whole, the set of one run, never of two,
+whatever interrupts.
 
-    FOLDER/.symgen-lock         the process that writes here: number, host, since when; locked as long as it lives
-    FOLDER/.symgen-unfinished/  files being written; what a killed run left is deleted by the next one
-    FOLDER/.symgen-finished/    all of them written and on disk, being moved up; what a killed run left is moved by the next one
+    FOLDER/.symgen-lock
+            the process that writes here: number, host, since when; locked as long as it lives
+    FOLDER/.symgen-unfinished/  files being written; what a killed run left is deleted by the next
+    one
+    FOLDER/.symgen-finished/
+            all of them written and on disk, being moved up; what a killed run left is moved by the
+            next one
 
-The set becomes valid by one act, the renaming of .symgen-unfinished to .symgen-finished: a run killed before it has changed nothing, one killed
-after it is completed by the next command that writes into FOLDER. Other files in FOLDER are never touched. The lock is one of the system and
-ends with its process, so what a killed process left of it is no obstacle; where a file system knows no locks, and on Windows, there is none.
+The set becomes valid by one act, the renaming of .symgen-unfinished to .symgen-finished: a run
+killed before it has changed nothing, one killed
+after it is completed by the next command that writes into FOLDER. Other files in FOLDER are never
+touched. The lock is one of the system and
+ends with its process, so what a killed process left of it is no obstacle; where a file system knows
+no locks, and on Windows, there is none.
 """
 
 from __future__ import annotations
@@ -21,7 +29,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from pathlib import Path
 from typing import overload
 
-from runtime.errors import InputError
+from runtime.errors import InputError, encodable
 
 try:
     import fcntl
@@ -55,19 +63,29 @@ class Results:
         self.folder = folder
 
     def write_all(self, contents: Mapping[str, str | bytes]) -> list[Path]:
-        """Write every file, or none; raises OutputError where one cannot be written, FOLDER being as it was."""
+        """Write every file, or none; raises OutputError where one cannot be written, FOLDER being
+        as it was.
+        """
         unfinished = self.folder / UNFINISHED
         with _clear_errors(self.folder):
             self.recover()
             for name in contents:
                 path = self.folder / name
-                if path.exists() and not path.is_file():  # a device would be replaced by a file, for every program
+                if (
+                    path.exists() and not path.is_file()
+                ):  # a device would be replaced by a file, for every program
                     what = "a folder" if path.is_dir() else "a pipe or a device"
-                    raise OutputError(f"{path}: {what} is where a file is to be written; rename it, or choose another place")
+                    raise OutputError(
+                        f"{path}: {what} is where a file is to be written; rename it, or choose "
+                        "another place"
+                    )
             unfinished.mkdir()
             try:
                 for name, content in contents.items():
-                    _write_durably(unfinished / name, content.encode("utf-8") if isinstance(content, str) else content)
+                    _write_durably(
+                        unfinished / name,
+                        encodable(content).encode("utf-8") if isinstance(content, str) else content,
+                    )
                 _sync(unfinished)
                 unfinished.rename(self.folder / FINISHED)
             except BaseException:
@@ -100,9 +118,11 @@ def reserved(folder: str | Path) -> AbstractContextManager[Results]: ...
 @overload
 def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]: ...
 def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]:
-    """Keep other commands out of `folder`, made where it is missing, as long as the block lasts; None: nothing is to be written.
+    """Keep other commands out of `folder`, made where it is missing, as long as the block lasts;
+    None: nothing is to be written.
 
-    Raises OutputError at once where another command holds the folder, or nothing can be written there.
+    Raises OutputError at once where another command holds the folder, or nothing can be written
+    there.
     """
     return nullcontext() if folder is None else _reserved(Path(folder))
 
@@ -131,9 +151,11 @@ def _made(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _locked(folder: Path, patience: float) -> Iterator[None]:
-    """The lock file is ours and says so; OutputError where it is another's for longer than `patience`, s.
+    """The lock file is ours and says so; OutputError where it is another's for longer than
+    `patience`, s.
 
-    A lock of `fcntl` belongs to a process, not to its children, and is known to network file systems.
+    A lock of `fcntl` belongs to a process, not to its children, and is known to network file
+    systems.
     """
     path, end = folder / LOCK, time.monotonic() + patience
     while True:
@@ -157,8 +179,14 @@ def _locked(folder: Path, patience: float) -> Iterator[None]:
         finally:
             os.close(descriptor)
         if time.monotonic() >= end:
-            who = "".join(c if c.isprintable() else " " for c in holder) or "it does not say who it is"
-            raise OutputError(f"{folder}: another command is writing here ({who}); wait until it ends, or choose another folder")
+            who = (
+                "".join(c if c.isprintable() else " " for c in holder)
+                or "it does not say who it is"
+            )
+            raise OutputError(
+                f"{folder}: another command is writing here ({who}); wait until it ends, or choose "
+                "another folder"
+            )
         time.sleep(0.02)
 
 
@@ -178,7 +206,9 @@ def _taken(descriptor: int) -> bool:
 
 
 def _is(path: Path, descriptor: int) -> bool:
-    """The file of that name is the one that is open, not one that its holder has deleted meanwhile."""
+    """The file of that name is the one that is open, not one that its holder has deleted
+    meanwhile.
+    """
     try:
         return os.path.samestat(path.stat(), os.fstat(descriptor))
     except FileNotFoundError:
@@ -186,7 +216,10 @@ def _is(path: Path, descriptor: int) -> bool:
 
 
 def _holder() -> str:
-    return f"process {os.getpid()} on {socket.gethostname()} since {time.strftime('%Y-%m-%d %H:%M:%S UTC', time.gmtime())}"
+    return (
+        f"process {os.getpid()} on {socket.gethostname()} since "
+        f"{time.strftime('%Y-%m-%d %H:%M:%S UTC', time.gmtime())}"
+    )
 
 
 def _write_durably(path: Path, data: bytes) -> None:
@@ -215,7 +248,14 @@ def _clear_errors(folder: Path) -> Iterator[None]:
         place, reason = "this folder" if folder == Path() else str(folder), e.strerror or e
         with suppress(OSError):
             if (folder / FINISHED).is_dir():
-                left = f"the new files are whole in {folder / FINISHED} and the next command that writes here moves them up"
-                raise OutputError(f"{place}: not all files could be replaced: {reason} ({e.filename}); {left}") from e
+                left = (
+                    f"the new files are whole in {folder / FINISHED} and the next command that "
+                    "writes here moves them up"
+                )
+                raise OutputError(
+                    f"{place}: not all files could be replaced: {reason} ({e.filename}); {left}"
+                ) from e
         advice = ADVICE.get(e.errno or 0, "choose another place, or mend this one")
-        raise OutputError(f"{place}: cannot be written: {reason}; nothing was changed; {advice}") from e
+        raise OutputError(
+            f"{place}: cannot be written: {reason}; nothing was changed; {advice}"
+        ) from e

@@ -1,4 +1,6 @@
-"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on the page of a report."""
+"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on
+the page of a report.
+"""
 
 from __future__ import annotations
 
@@ -49,10 +51,14 @@ class Table:
         wrong = [row for row in self.rows if len(row) != len(self.header)]
         if wrong:
             raise ValueError(
-                f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected {len(self.header)}, {self.header}"
+                f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected "
+                f"{len(self.header)}, {self.header}"
             )
         if self.kinds and len(self.kinds) != len(self.rows):
-            raise ValueError(f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one per row")
+            raise ValueError(
+                f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one "
+                "per row"
+            )
 
     def to_text(self) -> str:
         """Columns of text under the header, without the caption."""
@@ -60,14 +66,29 @@ class Table:
 
     def to_html(self) -> Markup:
         """A table element that needs no style sheet."""
-        written = [symbol if k == 0 and self.symbols else unit if name == "unit" else str for k, name in enumerate(self.header)]
-        body = [[write(cell) if type(cell) is str else cell for write, cell in zip(written, row, strict=True)] for row in self.rows]
+        written = [
+            symbol if k == 0 and self.symbols else unit if name == "unit" else str
+            for k, name in enumerate(self.header)
+        ]
+        body = [
+            [
+                write(cell) if type(cell) is str else cell
+                for write, cell in zip(written, row, strict=True)
+            ]
+            for row in self.rows
+        ]
         head = element("thead", self._row("th", self.header))
         return element("table", head, element("tbody", *(self._row("td", row) for row in body)))
 
     def _row(self, tag: str, cells: Sequence[str]) -> Markup:
         sides = ("left" if k == 0 or k in self.wide else "right" for k in range(len(cells)))
-        return element("tr", *(element(tag, c, style=f"padding:0 0.6em;text-align:{side}") for c, side in zip(cells, sides, strict=True)))
+        return element(
+            "tr",
+            *(
+                element(tag, c, style=f"padding:0 0.6em;text-align:{side}")
+                for c, side in zip(cells, sides, strict=True)
+            ),
+        )
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:
@@ -75,12 +96,25 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
     widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
     text = []
     for line in lines:
-        cells = [line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True))]
+        cells = [
+            line[0].ljust(widths[0]),
+            *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)),
+        ]
         text.append("  ".join(cells).rstrip())
     return "\n".join(text)
 
 
 def notebook(paragraphs: Sequence[str], *tables: Table) -> Markup:
-    """Paragraphs, the first table, and further ones behind a fold with their captions: a result in a notebook. Every text is escaped."""
-    folds = [element("details", element("summary", table.caption), table.to_html()) for table in tables[1:]]
-    return element("div", *(element("p", text) for text in paragraphs), *(table.to_html() for table in tables[:1]), *folds)
+    """Paragraphs, the first table, and further ones behind a fold with their captions: a result in
+    a notebook. Every text is escaped.
+    """
+    folds = [
+        element("details", element("summary", table.caption), table.to_html())
+        for table in tables[1:]
+    ]
+    return element(
+        "div",
+        *(element("p", text) for text in paragraphs),
+        *(table.to_html() for table in tables[:1]),
+        *folds,
+    )

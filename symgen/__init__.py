@@ -1,11 +1,15 @@
-"""From a robot file to base parameters with their formulas, and to a module that evaluates its models.
+"""From a robot file to base parameters with their formulas, and to a module that evaluates its
+models.
 
-    model = symgen.model("arm.urdf")                  # the module: derived, emitted, certified, imported
+    model = symgen.model("arm.urdf")
+            # the module: derived, emitted, certified, imported
     base = symgen.regrouping(symgen.load_robot("tx40"))   # base parameters, each with its formula
-    symgen.certify(base).valid                        # exact rank and identities, independent dynamics, emitted module
-    symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own URDF or MJCF
+    symgen.certificate(base).valid                    # exact formulas; the module by other dynamics
+    symgen.apply("results", "arm.urdf").write("new.urdf")  # identified values into the user's own
+    URDF or MJCF
     symgen.symbolic("tx40").inertia_matrix()          # any model as SymPy objects
-    symgen.variants("arm.urdf")                       # the module with its table of frames as constants
+    symgen.variants("arm.urdf")
+            # the module with its table of frames as constants
 
 Names are loaded when they are first used.
 """
@@ -16,11 +20,12 @@ from typing import TYPE_CHECKING, Any
 from symgen.errors import SymgenError
 
 if TYPE_CHECKING:
+    from symgen.certify.certificate import Certificate
+    from symgen.certify.modules import certify as certificate
+    from symgen.certify.modules import model
+    from symgen.certify.variants import variants
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
-    from symgen.emit.certified import certify, model
     from symgen.emit.generate import generate_module
-    from symgen.emit.variants import variants
-    from symgen.regroup.certificate import Certificate
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping
     from symgen.symbols.symbolic import SymbolicRobot, symbolic
@@ -36,7 +41,7 @@ __all__ = [
     "SymbolicRobot",
     "SymgenError",
     "apply",
-    "certify",
+    "certificate",
     "generate_module",
     "load_robot",
     "model",
@@ -48,24 +53,25 @@ __all__ = [
 ]
 
 _HOME = {
-    **dict.fromkeys(("Robot", "load_robot", "packaged_robots", "parse_robot"), "symgen.description"),
-    **dict.fromkeys(("BaseParameter", "Regrouping"), "symgen.regroup.regrouping"),
-    **dict.fromkeys(("certify", "model"), "symgen.emit.certified"),
+    **dict.fromkeys(
+        ("Robot", "load_robot", "packaged_robots", "parse_robot"), "symgen.description"
+    ),
+    **dict.fromkeys(("BaseParameter", "Regrouping", "regrouping"), "symgen.regroup.regrouping"),
+    **dict.fromkeys(("certificate", "model"), "symgen.certify.modules"),
     **dict.fromkeys(("SymbolicRobot", "symbolic"), "symgen.symbols.symbolic"),
-    "Certificate": "symgen.regroup.certificate",
+    "Certificate": "symgen.certify.certificate",
     "generate_module": "symgen.emit.generate",
     "Applied": "symgen.update.applied",
     "apply": "symgen.update.apply",
-    "variants": "symgen.emit.variants",
+    "variants": "symgen.certify.variants",
 }
+_OWN = {"regrouping": "regroup", "certificate": "certify"}  # names of rooms, at home
 
 
 def __getattr__(name: str) -> Any:
-    if name == "regrouping":
-        return import_module("symgen.regroup.regrouping").regroup
     if name not in _HOME:
         raise AttributeError(f"module 'symgen' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    return getattr(import_module(_HOME[name]), _OWN.get(name, name))
 
 
 def __dir__() -> list[str]:

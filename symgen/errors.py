@@ -1,9 +1,13 @@
 """One root for every error symgen raises on purpose.
 
-A message says what was given, what was expected, where, and what to do; the offending values are attributes.
+A message says what was given, what was expected, where, and what to do; the offending values are
+attributes.
 """
 
 from __future__ import annotations
+
+import copyreg
+from typing import Any
 
 LONGEST = 2000  # characters of a message: a file may hold names of any length
 
@@ -14,9 +18,15 @@ class SymgenError(Exception):
     def __init__(self, message: str = "") -> None:
         super().__init__(printable(message))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Without __init__: the classes below take more than the message."""
+        return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
+
 
 def printable(text: str) -> str:
-    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction) spelled out, the middle of a long one left out."""
+    """`text` as a terminal may show it: what controls one (escape sequences, changes of direction)
+    spelled out, the middle of a long one left out.
+    """
     for _ in range(2):  # spelled out, a text may be too long again
         if len(text) > LONGEST:
             text = f"{text[: LONGEST - 400]} ... {text[-300:]}"
@@ -49,14 +59,22 @@ class DescriptionError(SymgenError):
     message : str
         What was given, what was expected and what to do.
     path : tuple of str or int
-        Keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them into a line.
+        Keys that lead to the offending field, e.g. ("frames", 4, "sigma"); a file reader turns them
+        into a line.
     file : str, optional
         Name of the file.
     line : int, optional
         Its line, from 1.
     """
 
-    def __init__(self, message: str, *, path: tuple[str | int, ...] = (), file: str | None = None, line: int | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: tuple[str | int, ...] = (),
+        file: str | None = None,
+        line: int | None = None,
+    ) -> None:
         self.message, self.path, self.file, self.line = message, path, file, line
         place = "" if file is None else f" ({file}{'' if line is None else f', line {line}'})"
         super().__init__(message + place)
@@ -77,7 +95,9 @@ class ExpressionError(SymgenError):
         What to write instead; ends the message.
     """
 
-    def __init__(self, message: str, *, text: str, column: int | None = None, advice: str = "") -> None:
+    def __init__(
+        self, message: str, *, text: str, column: int | None = None, advice: str = ""
+    ) -> None:
         self.text, self.column = text, column
         place = "" if column is None else f" at column {column}"
         super().__init__(f"{message}{place} in {text[:80]!r}{advice}")

@@ -1,6 +1,8 @@
-"""Headless Chromium for tests, driven by its DevTools protocol over a pipe: the standard library only, no driver, no network port.
+"""Headless Chromium for tests, driven by its DevTools protocol over a pipe: the standard library
+only, no driver, no network port.
 
-A page's uncaught errors, console errors, refused policies and requests are collected in `complaints` and `requests`.
+A page's uncaught errors, console errors, refused policies and requests are collected in
+`complaints` and `requests`.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ FLAGS = (
     "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--mute-audio", "--remote-debugging-pipe",
 )  # fmt: skip
 PIPES = (  # Chromium reads commands on descriptor 3 and writes answers on 4
-    "import fcntl, os, sys; r, w = (fcntl.fcntl(int(n), fcntl.F_DUPFD, 64) for n in sys.argv[1:3]); "
+    "import fcntl, os, sys; r, w = (fcntl.fcntl(int(n), fcntl.F_DUPFD, 64) for n in "
+    "sys.argv[1:3]); "
     "os.dup2(r, 3); os.dup2(w, 4); os.execvp(sys.argv[3], sys.argv[3:])"
 )
 
@@ -56,7 +59,9 @@ def find_browser() -> str:
 
 
 def started_browser() -> Browser:
-    """A browser; without one the test is skipped, or fails where SYMGEN_REQUIRE_BROWSER=1 says that it must run."""
+    """A browser; without one the test is skipped, or fails where SYMGEN_REQUIRE_BROWSER=1 says that
+    it must run.
+    """
     try:
         return Browser(find_browser())
     except BrowserError as e:
@@ -89,7 +94,9 @@ class Browser:
 
     def _attach(self) -> None:
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
 
@@ -109,7 +116,9 @@ class Browser:
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Send a command and wait for its answer; events on the way are kept."""
         self._id += 1
-        message = {"id": self._id, "method": method, "params": parameters} | ({"sessionId": self._session} if self._session else {})
+        message = {"id": self._id, "method": method, "params": parameters} | (
+            {"sessionId": self._session} if self._session else {}
+        )
         try:
             os.write(self._send, json.dumps(message).encode() + b"\0")
         except BrokenPipeError as e:
@@ -143,21 +152,38 @@ class Browser:
             self.events.append(self._next())
 
     def resize(self, width: int, height: int) -> None:
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=width < 600,
+        )
 
     def run(self, script: str) -> Any:
         """Value of a JavaScript expression, as JSON."""
-        result = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        result = self.call(
+            "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
+        )
         if "exceptionDetails" in result:
             raise BrowserError(result["exceptionDetails"])
         return result["result"].get("value")
 
     def centre(self, selector: str) -> tuple[float, float]:
-        """Middle of an element, scrolled into view and drawn there: a finger meets what was drawn last."""
-        self.run(f"document.querySelector({json.dumps(selector)}).scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        """Middle of an element, scrolled into view and drawn there: a finger meets what was drawn
+        last.
+        """
+        self.run(
+            f"document.querySelector({json.dumps(selector)}).scrollIntoView({{block: 'center', "
+            f"behavior: 'instant'}})"
+        )
         self.run(FRAME)
         box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
-        return tuple(self.run(f"(() => {{ const b = {box}; return [b.x + b.width / 2, b.y + b.height / 2]; }})()"))
+        return tuple(
+            self.run(
+                f"(() => {{ const b = {box}; return [b.x + b.width / 2, b.y + b.height / 2]; }})()"
+            )
+        )
 
     def hover(self, selector: str) -> None:
         x, y = self.centre(selector)
@@ -165,9 +191,31 @@ class Browser:
 
     def drag(self, selector: str, dx: float, dy: float) -> None:
         x, y = self.centre(selector)
-        self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
-        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + dx, y=y + dy, button="left", buttons=1)
-        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
+        self.call(
+            "Input.dispatchMouseEvent",
+            type="mousePressed",
+            x=x,
+            y=y,
+            button="left",
+            buttons=1,
+            clickCount=1,
+        )
+        self.call(
+            "Input.dispatchMouseEvent",
+            type="mouseMoved",
+            x=x + dx,
+            y=y + dy,
+            button="left",
+            buttons=1,
+        )
+        self.call(
+            "Input.dispatchMouseEvent",
+            type="mouseReleased",
+            x=x + dx,
+            y=y + dy,
+            button="left",
+            clickCount=1,
+        )
 
     def click(self, selector: str) -> None:
         x, y = self.centre(selector)
@@ -188,12 +236,25 @@ class Browser:
             "Enter": 13,
         }
         text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=codes.get(key, ord(key[0])), **text)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=codes.get(key, ord(key[0])))
+        self.call(
+            "Input.dispatchKeyEvent",
+            type="keyDown",
+            key=key,
+            windowsVirtualKeyCode=codes.get(key, ord(key[0])),
+            **text,
+        )
+        self.call(
+            "Input.dispatchKeyEvent",
+            type="keyUp",
+            key=key,
+            windowsVirtualKeyCode=codes.get(key, ord(key[0])),
+        )
 
     def screenshot(self, *, whole: bool = False) -> bytes:
         """PNG of the window, or of the whole page."""
-        return base64.b64decode(self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)["data"])
+        return base64.b64decode(
+            self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)["data"]
+        )
 
     @property
     def complaints(self) -> list[str]:
@@ -206,11 +267,19 @@ class Browser:
                 found.append(json.dumps(p["exceptionDetails"]))
             elif method == "Log.entryAdded" and p["entry"]["level"] in ("error", "warning"):
                 found.append(p["entry"]["text"])
-            elif method == "Runtime.consoleAPICalled" and p["type"] in ("error", "warning", "assert"):
+            elif method == "Runtime.consoleAPICalled" and p["type"] in (
+                "error",
+                "warning",
+                "assert",
+            ):
                 found.append(json.dumps(p["args"]))
         return found
 
     @property
     def requests(self) -> list[str]:
         """Addresses that the page asked for."""
-        return [e["params"]["request"]["url"] for e in self.events if e.get("method") == "Network.requestWillBeSent"]
+        return [
+            e["params"]["request"]["url"]
+            for e in self.events
+            if e.get("method") == "Network.requestWillBeSent"
+        ]

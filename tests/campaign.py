@@ -1,6 +1,8 @@
-"""Campaigns: checks over hundreds of cases. The default run takes a seeded sample of each; `pytest -m campaign` runs the rest.
+"""Campaigns: checks over hundreds of cases. The default run takes a seeded sample of each; `pytest
+-m campaign` runs the rest.
 
-SYMGEN_FULL=1 multiplies what a campaign draws anew (fuzz cases, seeds); CONTRIBUTING.md says what each costs.
+SYMGEN_FULL=1 multiplies what a campaign draws anew (fuzz cases, seeds); CONTRIBUTING.md says what
+each costs.
 """
 
 from __future__ import annotations
@@ -16,14 +18,24 @@ FULL = os.environ.get("SYMGEN_FULL") == "1"
 campaign = pytest.mark.campaign
 
 
-def sampled(cases: Iterable[Any], count: int, *, always: Iterable[Any] = (), more: int | None = None) -> list[Any]:
-    """Parameters of a test: `count` cases drawn with a fixed seed, and those of `always`, run by default; the others are a campaign.
+def sampled(
+    cases: Iterable[Any], count: int, *, always: Iterable[Any] = (), more: int | None = None
+) -> list[Any]:
+    """Parameters of a test: `count` cases drawn with a fixed seed, and those of `always`, run by
+    default; the others are a campaign.
 
     more : how many others are one; all of them where left out, or with SYMGEN_FULL=1.
     """
     listed = list(cases)
-    kept = {*random.Random(0).sample(range(len(listed)), count), *(listed.index(case) for case in always)}
+    kept = {
+        *random.Random(0).sample(range(len(listed)), count),
+        *(listed.index(case) for case in always),
+    }
     others = [k for k in range(len(listed)) if k not in kept]
     if more is not None and not FULL:
         others = random.Random(1).sample(others, more)
-    return [case if k in kept else pytest.param(case, marks=campaign) for k, case in enumerate(listed) if k in {*kept, *others}]
+    return [
+        case if k in kept else pytest.param(case, marks=campaign)
+        for k, case in enumerate(listed)
+        if k in {*kept, *others}
+    ]

@@ -1,12 +1,17 @@
-"""Puts tests/ on the import path (`from oracles... import ...`), makes hypothesis reproducible, finds the measured records.
+"""Puts tests/ on the import path (`from oracles... import ...`), makes hypothesis reproducible,
+finds the measured records.
 
-Records: SYMGEN_DATA, the cache, then ../shared/data beside the repository; else the test is skipped, or fails where they are required.
+Records: SYMGEN_DATA, the cache, then ../shared/data beside the repository; else the test is
+skipped, or fails where they are required.
 """
 
 import gc
 import os
+from hashlib import sha256
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy loads: test processes would fight for the cores
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # before numpy loads: test processes would fight for the cores
 
 from pathlib import Path
 
@@ -14,12 +19,19 @@ import pytest
 from hypothesis import settings
 
 from runtime.errors import DataUnavailableError
+from runtime.model.loading import KEY, cache_folder
 from runtime.records.datasets import DATASETS, fetch, locate
 
-# Expressions and syntax trees stay alive by the hundred thousand: looking at them again and again costs a tenth of the time.
+# Expressions and syntax trees stay alive by the hundred thousand: looking at them again and again
+# costs a tenth of the time.
 gc.set_threshold(200_000, 50, 100)
 settings.register_profile("symgen", derandomize=True, deadline=None)
 settings.load_profile("symgen")
+
+ROOT = Path(__file__).resolve().parents[1]
+for emitted in (ROOT / "generated").glob("*.*"):  # as `symgen generate all` leaves them
+    key = sha256(emitted.read_bytes()).hexdigest()[:KEY]
+    (cache_folder("modules") / key).mkdir(parents=True, exist_ok=True, mode=0o700)
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -36,7 +48,10 @@ def _provide(name, patch):
             pytest.fail(f"SYMGEN_REQUIRE_DATA=1 but {e}")
     paths = {file: locate(name, file) for file in files}
     if None in paths.values():
-        pytest.skip(f"the {name} record is not on this machine: set SYMGEN_DATA to a folder that holds {name}/{', '.join(files)}")
+        pytest.skip(
+            f"the {name} record is not on this machine: set SYMGEN_DATA to a folder that holds "
+            f"{name}/{', '.join(files)}"
+        )
     return paths
 
 
@@ -60,5 +75,12 @@ def pytest_terminal_summary(terminalreporter, config):
         return
     from oracles.random_robots import describe_mix, random_robot
 
-    shares = {name: share for name, share in describe_mix(random_robot(seed) for seed in range(250)).items() if name != "robots"}
-    terminalreporter.write_line("250 random robots: " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items()))
+    shares = {
+        name: share
+        for name, share in describe_mix(random_robot(seed) for seed in range(250)).items()
+        if name != "robots"
+    }
+    terminalreporter.write_line(
+        "250 random robots: "
+        + ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items())
+    )

@@ -1,9 +1,12 @@
-"""Seeded faults: each is put into a copy of the checkout, the default tests of its subject run there, and a table says which test catches it.
+"""Seeded faults: each is put into a copy of the checkout, the default tests of its subject run
+there, and a table says which test catches it.
 
     python tests/mutations.py [NUMBER ...]        all faults, or those of these numbers; some 20 s each
 
-A fault is a file, a text that stands in it once, the text in its place, and what it means. A fault that no test catches ends the script with code 1; so does
-a text that is no longer there: then choose the fault anew. Golden files stand last among the tests, since they notice any change.
+A fault is a file, a text that stands in it once, the text in its place, and what it means. A fault
+that no test catches ends the script with code 1; so does
+a text that is no longer there: then choose the fault anew. Golden files stand last among the tests,
+since they notice any change.
 """
 
 from __future__ import annotations
@@ -20,7 +23,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("symgen", "runtime", "generated", "tests", "docs", "pyproject.toml", "README.md")
 EMITTED = ("oracles/test_emitted_agree.py", "oracles/test_loops_agree.py", "cli/test_generate.py")
-REGROUPED = ("regroup/test_certificate.py", "regroup/test_formulas.py", "regroup/test_loops.py", "cli/test_generate.py")
+REGROUPED = (
+    "certify/test_certificate.py",
+    "regroup/test_formulas.py",
+    "regroup/test_loops.py",
+    "cli/test_generate.py",
+)
 SIGNALS = ("numeric/test_signals.py", "numeric/test_decimation.py", "numeric/test_observation.py")
 ESTIMATES = ("numeric/test_estimators.py", "numeric/test_estimate.py")
 
@@ -51,7 +59,7 @@ FAULTS = (
     Fault("symgen/regroup/rules.py", "f.d * sg + f.r0 * A[1][2]", "f.d * sg - f.r0 * A[1][2]", "y of P_ij with the wrong sign", REGROUPED),
     Fault("symgen/regroup/finite_field.py", "r = rank + int(below[0])", "r = rank + int(below[-1]) * 0", "a zero pivot is taken", REGROUPED),
     Fault("symgen/regroup/regrouping.py", 'FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")', 'FIRST_CHOICE = ("XX", "ZZ", "XY", "XZ", "YZ", "MY", "MX")', "another order of preference: other base parameters", REGROUPED),
-    Fault("symgen/regroup/certificate.py", "return not self.failures and self.numeric_valid", "return True or self.numeric_valid", "the certificate says yes to everything", REGROUPED),
+    Fault("symgen/certify/certificate.py", "return not self.failures and self.numeric_valid", "return True or self.numeric_valid", "the certificate says yes to everything", REGROUPED),
     # emit
     Fault("symgen/emit/templates/functions.py.jinja", ".reshape({{ b }}, -1).T", ".transpose(0, 2, 1).reshape({{ b }}, -1).T", "rows of W sample by sample instead of joint by joint", EMITTED),
     Fault("symgen/emit/printers.py", '("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called', '("-" if s.sign < 0 else "") + self.called', "the sign of a name is forgotten where the name is used", EMITTED),
@@ -59,14 +67,14 @@ FAULTS = (
     Fault("symgen/emit/c_printer.py", "'above' if bound == 'maximum' else 'below'", "'below' if bound == 'maximum' else 'above'", "one-sided friction of C in the other direction", ("emit/test_c_target.py",)),
     Fault("symgen/emit/models.py", "D[own[k]][robot.joints[row]]", "D[own[k]][robot.joints[0] if robot.joints[0] in D[own[k]] else robot.joints[row]]", "an entry of another joint in a row of D", EMITTED),
     # observation
-    Fault("runtime/observation/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
-    Fault("runtime/observation/filters.py", "floor(CUTOFF * rate / (2 * signals.lowpass.cutoff) + 1e-9)", "floor(CUTOFF * rate / signals.lowpass.cutoff + 1e-9)", "decimation by twice the factor of eq. (13)", SIGNALS),
-    Fault("runtime/observation/filters.py", "np.minimum(a, b), np.minimum(np.maximum(a, b), c)", "np.minimum(a, b), np.minimum(np.minimum(a, b), c)", "the running median is the smaller of two", SIGNALS),
-    Fault("runtime/observation/rows.py", "np.abs(qd[instants].T) >= per_joint", "np.abs(qd[instants]).max(axis=1) >= per_joint", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
-    Fault("runtime/observation/rows.py", 'record.t, t1, side="right"', 'record.t, t1, side="left"', "the last sample of a window is lost", ("numeric/test_observation.py",)),
-    Fault("runtime/observation/observation.py", "median_filtered(tau, selection.signals.median)[selection.samples]", "tau[selection.samples]", "torques without their median filter", ("numeric/test_observation.py", "numeric/test_cestac.py")),
-    Fault("runtime/observation/qr_factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
-    Fault("runtime/observation/system.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("numeric/test_observation.py", *ESTIMATES)),
+    Fault("runtime/signals/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
+    Fault("runtime/signals/filters.py", "CUTOFF * rate / (2 * signals.lowpass.cutoff)", "CUTOFF * rate / signals.lowpass.cutoff", "decimation by twice the factor of eq. (13)", SIGNALS),
+    Fault("runtime/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
+    Fault("runtime/rows/selection.py", "            np.abs(qd[instants].T)", "            np.abs(qd[instants]).max(axis=1)", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
+    Fault("runtime/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("numeric/test_observation.py",)),
+    Fault("runtime/rows/prepared.py", "median_filtered(tau, selection.signals.median)[selection.samples]", "tau[selection.samples]", "torques without their median filter", ("numeric/test_observation.py", "numeric/test_cestac.py")),
+    Fault("runtime/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
+    Fault("runtime/rows/observation.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("numeric/test_observation.py", *ESTIMATES)),
     # model: units and drives
     Fault("runtime/model/drives.py", "* self.torque_constant) @ self._matrix", "/ self.torque_constant) @ self._matrix", "divided by torque constants", ("numeric/test_drives.py",)),
     Fault("runtime/model/drives.py", "self._checked(qm).T).T + self.offset", "self._checked(qm).T).T - self.offset", "offset of the joints with the wrong sign", ("numeric/test_drives.py",)),
@@ -82,7 +90,9 @@ FAULTS = (
 
 
 def caught_by(fault: Fault, copy: Path) -> str:
-    """The first test that fails with the fault in the copy, and passes without it; empty where all pass."""
+    """The first test that fails with the fault in the copy, and passes without it; empty where all
+    pass.
+    """
     path = copy / fault.file
     right = path.read_text(encoding="utf-8")
     if right.count(fault.old) != 1:
@@ -96,7 +106,11 @@ def caught_by(fault: Fault, copy: Path) -> str:
         forget(path)
     found = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
     if not found:
-        return "" if done.returncode == 0 else f"? pytest ended with {done.returncode}: {done.stdout[-300:]}"
+        return (
+            ""
+            if done.returncode == 0
+            else f"? pytest ended with {done.returncode}: {done.stdout[-300:]}"
+        )
     if tested(copy, [found[1]]).returncode != 0:
         return f"? {found[1]} fails without the fault, too"
     return found[1].removeprefix("tests/")
@@ -104,9 +118,27 @@ def caught_by(fault: Fault, copy: Path) -> str:
 
 def tested(copy: Path, tests: list[str]) -> subprocess.CompletedProcess[str]:
     """A run of pytest in the copy, up to the first failure."""
-    environment = {**os.environ, "PYTHONPATH": str(copy), "SYMGEN_CACHE": str(copy / "cache"), "MPLBACKEND": "Agg"}
-    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    return subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(copy),
+        "SYMGEN_CACHE": str(copy / "cache"),
+        "MPLBACKEND": "Agg",
+    }
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-n",
+        "0",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        *tests,
+    ]
+    return subprocess.run(
+        command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False
+    )
 
 
 def forget(path: Path) -> None:
@@ -123,9 +155,9 @@ def main() -> None:
         copy = Path(folder) / "checkout"
         for name in COPIED:
             source = ROOT / name
-            shutil.copytree(source, copy / name, ignore=shutil.ignore_patterns("__pycache__")) if source.is_dir() else shutil.copy(
-                source, copy / name
-            )
+            shutil.copytree(
+                source, copy / name, ignore=shutil.ignore_patterns("__pycache__")
+            ) if source.is_dir() else shutil.copy(source, copy / name)
         if not os.environ.get("SYMGEN_DATA") and (ROOT.parent / "shared" / "data").is_dir():
             os.environ["SYMGEN_DATA"] = str(ROOT.parent / "shared" / "data")
         for number in numbers:
@@ -133,7 +165,10 @@ def main() -> None:
             test = caught_by(fault, copy)
             missed += not test or test.startswith("?")
             print(
-                f"| {number} | {fault.meaning} | `{fault.file}` | {f'`{test}`' if test and test[0] != '?' else f'**none** {test}'} |",
+                (
+                    f"| {number} | {fault.meaning} | `{fault.file}` | "
+                    f"{f'`{test}`' if test and test[0] != '?' else f'**none** {test}'} |"
+                ),
                 flush=True,
             )
     if missed:

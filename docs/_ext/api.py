@@ -1,4 +1,6 @@
-"""Pages of docs/api: the public names of both packages, and room by room what other rooms use, with signatures and docstrings."""
+"""Pages of docs/api: the public names of both packages, and room by room what other rooms use, with
+signatures and docstrings.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ from docstrings import first_line, markdown
 from reference import table
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = {"symgen.cli", "symgen.demo"}  # what they do is described under Commands
+LEFT_OUT = {"symgen.cli"}  # what they do is described under Commands
 WIDTH = 100  # of a signature on one line
 
 
@@ -38,7 +40,9 @@ def rooms() -> list[str]:
     """Packages with a page: the rooms, and `runtime` for the files of the ground."""
     found = ["runtime"]
     for package in ("symgen", "runtime"):
-        found += [f"{package}.{m.name}" for m in iter_modules(import_module(package).__path__) if m.ispkg]
+        found += [
+            f"{package}.{m.name}" for m in iter_modules(import_module(package).__path__) if m.ispkg
+        ]
     return [name for name in found if name not in LEFT_OUT]
 
 
@@ -48,7 +52,9 @@ def page_of(package: str) -> str:
 
 
 def modules(package: str) -> Iterator[ModuleType]:
-    """The package and its public modules, those within packages of its own included; of `runtime`, its files alone."""
+    """The package and its public modules, those within packages of its own included; of `runtime`,
+    its files alone.
+    """
     yield import_module(package)
     for m in iter_modules(import_module(package).__path__):
         if m.name.startswith("_") or (package == "runtime" and m.ispkg):
@@ -61,40 +67,65 @@ def modules(package: str) -> Iterator[ModuleType]:
 
 @cache
 def used() -> frozenset[str]:
-    """Dotted names that a module of another room, an example or a page's script imports, or reaches through their module."""
+    """Dotted names that a module of another room, an example or a page's script imports, or reaches
+    through their module.
+    """
     found: set[str] = set()
-    for path in [*(ROOT / "symgen").rglob("*.py"), *(ROOT / "runtime").rglob("*.py"), *(ROOT / "docs").rglob("*.py")]:
+    for path in [
+        *(ROOT / "symgen").rglob("*.py"),
+        *(ROOT / "runtime").rglob("*.py"),
+        *(ROOT / "docs").rglob("*.py"),
+    ]:
         nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
         imported = {
-            alias.asname or alias.name: f"{n.module}.{alias.name}" for n in nodes if isinstance(n, ast.ImportFrom) for alias in n.names
+            alias.asname or alias.name: f"{n.module}.{alias.name}"
+            for n in nodes
+            if isinstance(n, ast.ImportFrom)
+            for alias in n.names
         }
         reached = {
-            f"{imported[n.value.id]}.{n.attr}" for n in nodes if isinstance(n, ast.Attribute) and getattr(n.value, "id", None) in imported
+            f"{imported[n.value.id]}.{n.attr}"
+            for n in nodes
+            if isinstance(n, ast.Attribute) and getattr(n.value, "id", None) in imported
         }
         own = ".".join(path.relative_to(ROOT).parts[:-1][:2])
-        found |= {name for name in {*imported.values(), *reached} if ".".join(name.split(".")[:2]) != own}
+        found |= {
+            name for name in {*imported.values(), *reached} if ".".join(name.split(".")[:2]) != own
+        }
     return frozenset(found)
 
 
 def is_shown(name: str, module: str) -> bool:
-    public = any(name in getattr(import_module(package), "__all__", ()) for package in ("symgen", "runtime"))
+    public = any(
+        name in getattr(import_module(package), "__all__", ()) for package in ("symgen", "runtime")
+    )
     return public or f"{module}.{name}" in used() or name.endswith("Options")
 
 
 def members(module: ModuleType) -> list[Any]:
-    """Functions and classes that a module writes itself, describes, and that other rooms use, in its order."""
+    """Functions and classes that a module writes itself, describes, and that other rooms use, in
+    its order.
+    """
     written = [
         value
         for name, value in vars(module).items()
         if not name.startswith("_")
-        and (inspect.isclass(value) or inspect.isfunction(inspect.unwrap(value) if callable(value) else value))
+        and (
+            inspect.isclass(value)
+            or inspect.isfunction(inspect.unwrap(value) if callable(value) else value)
+        )
         and getattr(value, "__module__", None) == module.__name__
         and getattr(value, "__name__", None) == name
         and described(value)
         and is_shown(name, module.__name__)
     ]
     return sorted(
-        written, key=lambda value: inspect.unwrap(value).__code__.co_firstlineno if not inspect.isclass(value) else line_of(value)
+        written,
+        key=lambda value: (
+            inspect.unwrap(value).__code__.co_firstlineno
+            if not inspect.isclass(value)
+            else line_of(value)
+        ),
     )
 
 
@@ -107,12 +138,20 @@ def line_of(cls: type) -> int:
 
 def described(value: Any) -> bool:
     doc = value.__doc__ or ""
-    return bool(doc) and not doc.startswith(f"{value.__name__}(")  # a dataclass writes its signature there
+    return bool(doc) and not doc.startswith(
+        f"{value.__name__}("
+    )  # a dataclass writes its signature there
 
 
 def room(package: str) -> str:
-    """The page of a room: its docstring, a table of its names, then its subjects with their functions and classes."""
-    title = "Files of the ground" if package == "runtime" else page_of(package).replace("_", " ").capitalize()
+    """The page of a room: its docstring, a table of its names, then its subjects with their
+    functions and classes.
+    """
+    title = (
+        "Files of the ground"
+        if package == "runtime"
+        else page_of(package).replace("_", " ").capitalize()
+    )
     subjects = [(module, members(module)) for module in modules(package)]
     if package == "runtime":
         subjects = subjects[1:]  # the public names of the package itself are on the index page
@@ -123,14 +162,33 @@ def room(package: str) -> str:
         if not own and not values:
             continue
         if values or not own:
-            heading = module.__name__.rpartition(".")[2].replace("_", " ").capitalize() if not own else "Of the room itself"
+            heading = (
+                module.__name__.rpartition(".")[2].replace("_", " ").capitalize()
+                if not own
+                else "Of the room itself"
+            )
             slugs(heading)
-            parts += [f"## {heading}", f"`from {module.__name__} import {', '.join(v.__name__ for v in values)}`", markdown(module.__doc__)]
+            parts += [
+                f"## {heading}",
+                f"`from {module.__name__} import {', '.join(v.__name__ for v in values)}`",
+                markdown(module.__doc__),
+            ]
         for value in values:
-            rows.append((f"[`{value.__name__}`](#{slugs(value.__name__)})", first_line(value.__doc__)))
+            rows.append(
+                (f"[`{value.__name__}`](#{slugs(value.__name__)})", first_line(value.__doc__))
+            )
             parts += [f"### `{value.__name__}`", *described_in_full(value)]
-    head = [f"# {title}", f"`{package}`", markdown(import_module(package).__doc__) if package != "runtime" else "What every room may use."]
-    return "\n\n".join(part for part in [*head, table(("name", ""), rows).strip(), *parts] if part) + "\n"
+    head = [
+        f"# {title}",
+        f"`{package}`",
+        markdown(import_module(package).__doc__)
+        if package != "runtime"
+        else "What every room may use.",
+    ]
+    return (
+        "\n\n".join(part for part in [*head, table(("name", ""), rows).strip(), *parts] if part)
+        + "\n"
+    )
 
 
 def described_in_full(value: Any) -> Iterator[str]:
@@ -138,7 +196,11 @@ def described_in_full(value: Any) -> Iterator[str]:
     yield f"```text\n{signature(value)}\n```"
     yield markdown(value.__doc__)
     if inspect.isclass(value):
-        methods = [described_method(name, member) for name, member in vars(value).items() if not name.startswith("_")]
+        methods = [
+            described_method(name, member)
+            for name, member in vars(value).items()
+            if not name.startswith("_")
+        ]
         if shown := [line for line in methods if line]:
             yield "**Methods and properties**"
             yield "\n".join(shown)
@@ -147,12 +209,19 @@ def described_in_full(value: Any) -> Iterator[str]:
 def described_method(name: str, member: Any) -> str:
     """One line of a method, a class method or a property with a docstring."""
     if isinstance(member, property):
-        return f"- `{name}`: {first_line(member.fget.__doc__)}" if member.fget and member.fget.__doc__ else ""
+        return (
+            f"- `{name}`: {first_line(member.fget.__doc__)}"
+            if member.fget and member.fget.__doc__
+            else ""
+        )
     function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
     if not inspect.isfunction(function) or not function.__doc__:
         return ""
     kind = "class method " if isinstance(member, classmethod) else ""
-    return f"- {kind}`{arguments(function, bound=not isinstance(member, staticmethod))}`: {first_line(function.__doc__)}"
+    return (
+        f"- {kind}`{arguments(function, bound=not isinstance(member, staticmethod))}`: "
+        f"{first_line(function.__doc__)}"
+    )
 
 
 def signature(value: Any) -> str:
@@ -162,7 +231,14 @@ def signature(value: Any) -> str:
     if len(line) <= WIDTH:
         return line
     inner = parameters(value)
-    return prefix + value.__name__ + "(\n" + "".join(f"    {p},\n" for p in inner) + ")" + returned(value)
+    return (
+        prefix
+        + value.__name__
+        + "(\n"
+        + "".join(f"    {p},\n" for p in inner)
+        + ")"
+        + returned(value)
+    )
 
 
 def arguments(value: Any, *, bound: bool = False) -> str:
@@ -170,10 +246,16 @@ def arguments(value: Any, *, bound: bool = False) -> str:
 
 
 def parameters(value: Any) -> list[str]:
-    """Names and defaults; types are in the docstring. Those of a dataclass are its fields, which pydantic completes only when it makes the first."""
+    """Names and defaults; types are in the docstring. Those of a dataclass are its fields, which
+    pydantic completes only when it makes the first.
+    """
     if inspect.isclass(value) and is_dataclass(value):
         starred = [f for f in fields(value) if f.init and f.kw_only]
-        return [field(f) for f in fields(value) if f.init and not f.kw_only] + ["*"] * bool(starred) + [field(f) for f in starred]
+        return (
+            [field(f) for f in fields(value) if f.init and not f.kw_only]
+            + ["*"] * bool(starred)
+            + [field(f) for f in starred]
+        )
     try:
         listed = list(inspect.signature(value).parameters.values())
     except (ValueError, TypeError):
@@ -200,7 +282,9 @@ def default(value: Any) -> str:
     if inspect.isfunction(value) or inspect.isclass(value):
         return value.__name__
     shown = repr(value)
-    return shown if len(shown) <= 30 and " at 0x" not in shown and not shown.startswith("<") else "..."
+    return (
+        shown if len(shown) <= 30 and " at 0x" not in shown and not shown.startswith("<") else "..."
+    )
 
 
 def returned(value: Any) -> str:
@@ -215,20 +299,36 @@ def names(package: str) -> str:
     parent, rows, parts = import_module(package), [], []
     for name in parent.__all__:
         thing = getattr(parent, name)
-        home = page_of(".".join(thing.__module__.split(".")[:2])) if thing.__module__.count(".") > 1 else "ground"
+        home = (
+            page_of(".".join(thing.__module__.split(".")[:2]))
+            if thing.__module__.count(".") > 1
+            else "ground"
+        )
         link = f"[`{name}`](#{name.lower()})" if callable(thing) else f"`{name}`"
         rows.append((link, first_line(thing.__doc__)))
         described_here = (
-            list(described_in_full(thing)) if inspect.isfunction(thing) else [f"```text\n{signature(thing)}\n```", markdown(thing.__doc__)]
+            list(described_in_full(thing))
+            if inspect.isfunction(thing)
+            else [f"```text\n{signature(thing)}\n```", markdown(thing.__doc__)]
         )
-        parts += [f"### `{name}`", *described_here, f"More of this room: [{home}]({home}.md)." if f"{package}.{home}" in rooms() else ""]
+        parts += [
+            f"### `{name}`",
+            *described_here,
+            f"More of this room: [{home}]({home}.md)." if f"{package}.{home}" in rooms() else "",
+        ]
     return "\n\n".join(part for part in [table(("name", ""), rows).strip(), *parts] if part) + "\n"
 
 
 def contents() -> str:
     """A list of the pages of the rooms, each with the first line of its package."""
     listed = [(name, page_of(name)) for name in rooms()]
-    rows = [(f"[{page}]({page}.md)", f"`{name}`", first_line(import_module(name).__doc__) if name != "runtime" else "Files that every room may use.")
-            for name, page in listed]  # fmt: skip
-    tree = "\n".join(["```{toctree}", ":maxdepth: 1", ":hidden:", "", *(page for _, page in listed), "```"])
+    ground = "Files that every room may use."
+    about = {
+        name: ground if name == "runtime" else first_line(import_module(name).__doc__)
+        for name, _ in listed
+    }
+    rows = [(f"[{page}]({page}.md)", f"`{name}`", about[name]) for name, page in listed]
+    tree = "\n".join(
+        ["```{toctree}", ":maxdepth: 1", ":hidden:", "", *(page for _, page in listed), "```"]
+    )
     return table(("page", "room", ""), rows) + "\n" + tree + "\n"

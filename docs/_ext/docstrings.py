@@ -1,4 +1,6 @@
-"""Docstrings as Markdown. Ours are plain text: equations laid out by eye, `names` in backquotes, numpydoc sections, entries "name : meaning"."""
+"""Docstrings as Markdown. Ours are plain text: equations laid out by eye, `names` in backquotes,
+numpydoc sections, entries "name : meaning".
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ def escaped(part: str) -> str:
 
 
 def markdown(doc: str | None) -> str:
-    """A docstring; an indented paragraph is kept as it stands, a section becomes a list under its title."""
+    """A docstring; an indented paragraph is kept as it stands, a section becomes a list under its
+    title.
+    """
     parts: list[str] = []
     for title, lines in sections(cleandoc(doc or "").splitlines()):
         if not title:
@@ -49,9 +53,14 @@ def sections(lines: Sequence[str]) -> list[tuple[str, list[str]]]:
 
 
 def entries(lines: Sequence[str]) -> list[tuple[str, str, str]]:
-    """(names, type, meaning) of the entries of a section: a line, and the indented lines after it."""
+    """(names, type, meaning) of the entries of a section: a line, the indented lines after it."""
     found: list[tuple[str, str, list[str]]] = []
-    for line in (part for whole in lines if whole.strip() for part in re.split(r"(?<=[.;]) {2,}(?=`?\w+`? : )", whole.rstrip())):
+    for line in (
+        part
+        for whole in lines
+        if whole.strip()
+        for part in re.split(r"(?<=[.;]) {2,}(?=`?\w+`? : )", whole.rstrip())
+    ):
         if line.startswith(" ") and found:
             found[-1][2].append(line.strip())
         else:
@@ -72,7 +81,12 @@ def paragraphs(lines: Sequence[str]) -> list[list[str]]:
     for line in lines:
         if not line.strip():
             found.append([])
-        elif found[-1] and indented(line) != indented(found[-1][-1]) and not ENTRY.match(found[-1][0]) and not LIST.match(found[-1][0]):
+        elif (
+            found[-1]
+            and indented(line) != indented(found[-1][-1])
+            and not ENTRY.match(found[-1][0])
+            and not LIST.match(found[-1][0])
+        ):
             found.append([line])
         else:
             found[-1].append(line)
@@ -84,11 +98,13 @@ def indented(line: str) -> bool:
 
 
 def paragraph(lines: Sequence[str]) -> str:
-    """Prose, a list of entries (several on a line apart by blanks), or a block that stays as it is."""
+    """Prose, a list of entries (several on a line apart by blanks), or a block that stays."""
     if indented(lines[0]):
         return "\n".join(["```text", *(line[4:] for line in lines), "```"])
     if not ENTRY.match(lines[0]):
-        return "\n".join("\\" + line if line[:2] in ("+ ", "# ", "> ") else line for line in map(text, lines))
+        return "\n".join(
+            "\\" + line if line[:2] in ("+ ", "# ", "> ") else line for line in map(text, lines)
+        )
     found: list[str] = []
     for line in (part for whole in lines for part in re.split(r"(?<=[.;]) {2,}", whole.strip())):
         match = ENTRY.match(line)

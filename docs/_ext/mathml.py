@@ -1,4 +1,6 @@
-"""Formulas as MathML, made when the site is built: no script, no fonts to fetch, readable offline and by screen readers."""
+"""Formulas as MathML, made when the site is built: no script, no fonts to fetch, readable offline
+and by screen readers.
+"""
 
 from typing import Any
 
@@ -17,7 +19,9 @@ def display(translator: Any, node: nodes.math_block) -> None:
     r"""$$...$$; a number such as (7) is written \tag{7} and stands at the right."""
     text, _, tag = node.astext().partition(r"\tag{")
     number = f'<span class="eqno">({tag.split("}")[0]})</span>' if tag else ""
-    translator.body.append(f'<div class="math">{convert(text.strip(), display="block")}{number}</div>\n')
+    translator.body.append(
+        f'<div class="math">{convert(text.strip(), display="block")}{number}</div>\n'
+    )
     raise nodes.SkipNode
 
 

@@ -1,4 +1,4 @@
-"""Notebooks of docs/examples as pages: their cells are run, and what they show stands under them."""
+"""Notebooks of docs/examples as pages: their cells are run, what they show stands under them."""
 
 from __future__ import annotations
 

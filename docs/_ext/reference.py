@@ -1,4 +1,6 @@
-"""Reference pages as Markdown, from the program: commands from the command line, formats from their schemas, robots and examples from their files."""
+"""Reference pages as Markdown, from the program: commands from the command line, formats from their
+schemas, robots and examples from their files.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,13 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     if not rows:
         return ""
     lines = [head, ("---",) * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in line) + " |" for line in lines) + "\n"
+    return (
+        "\n".join(
+            "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in line) + " |"
+            for line in lines
+        )
+        + "\n"
+    )
 
 
 # Commands
@@ -45,12 +53,25 @@ def command(name: str, verb: Any) -> str:
     parameters = [p for p in verb.params if not getattr(p, "hidden", False) and p.name != "help"]
     arguments = [p for p in parameters if not p.opts[0].startswith("-")]
     options = [p for p in parameters if p.opts[0].startswith("-")]
-    usage = " ".join(["symgen", name, *(shown(p) for p in arguments), *(["[OPTIONS]"] if options else [])])
+    usage = " ".join(
+        ["symgen", name, *(shown(p) for p in arguments), *(["[OPTIONS]"] if options else [])]
+    )
     return "\n".join(
         [
-            f"## symgen {name}", "", f"```text\n{usage}\n```", "", inspect.cleandoc(verb.help or ""), "",
+            f"## symgen {name}", "", f"```text\n{usage}\n```", "",
+            inspect.cleandoc(verb.help or ""), "",
             table(("argument", ""), [(f"`{shown(p)}`", p.help or "") for p in arguments]),
-            table(("option", "", "default"), [(", ".join(f"`{o}`" for o in sorted(p.opts, key=len)), p.help or "", default(p)) for p in options]),
+            table(
+                ("option", "", "default"),
+                [
+                    (
+                        ", ".join(f"`{o}`" for o in sorted(p.opts, key=len)),
+                        p.help or "",
+                        default(p),
+                    )
+                    for p in options
+                ],
+            ),
         ]
     )  # fmt: skip
 
@@ -62,7 +83,11 @@ def shown(argument: Any) -> str:
 
 
 def default(option: Any) -> str:
-    return "" if option.default in (None, False, ()) or callable(option.default) else f"`{option.default}`"
+    return (
+        ""
+        if option.default in (None, False, ()) or callable(option.default)
+        else f"`{option.default}`"
+    )
 
 
 # Formats
@@ -76,7 +101,13 @@ def robot_file() -> str:
     return "\n".join(parts)
 
 
-HEADINGS = {"FrameRow": "frames", "LoopRow": "loops", "ElementTable": "elements", "DrivesTable": "drives", "LimitsTable": "limits"}
+HEADINGS = {
+    "Frame": "frames",
+    "Loop": "loops",
+    "Element": "elements",
+    "Drives": "drives",
+    "LimitsTable": "limits",
+}
 
 
 def heading(definition: str) -> str:
@@ -94,7 +125,9 @@ def section(title: str, schema: Mapping[str, Any]) -> str:
         )
         for key, value in schema["properties"].items()
     ]
-    return f"## {title}\n\n{schema.get('description', '')}\n\n" + table(("key", "holds", "default", ""), rows)
+    return f"## {title}\n\n{schema.get('description', '')}\n\n" + table(
+        ("key", "holds", "default", ""), rows
+    )
 
 
 def kind(schema: Mapping[str, Any]) -> str:
@@ -111,8 +144,18 @@ def kind(schema: Mapping[str, Any]) -> str:
     if types == "array":
         return "list of " + kind(schema["items"]) if "items" in schema else "list"
     if types == "object":
-        return "table of " + kind(schema["additionalProperties"]) if isinstance(schema.get("additionalProperties"), Mapping) else "table"
-    names = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false", "array": "list"}
+        return (
+            "table of " + kind(schema["additionalProperties"])
+            if isinstance(schema.get("additionalProperties"), Mapping)
+            else "table"
+        )
+    names = {
+        "string": "text",
+        "number": "number",
+        "integer": "whole number",
+        "boolean": "true or false",
+        "array": "list",
+    }
     return " or ".join(names.get(t, t) for t in ([types] if isinstance(types, str) else types))
 
 
@@ -121,14 +164,18 @@ def code(value: Any) -> str:
 
 
 def study_file() -> str:
-    """The sections of a study file from the settings classes: what each holds, its keys, types and defaults."""
+    """The sections of a study file from the settings classes: what each holds, its keys, types and
+    defaults.
+    """
     parts = [f"{prose(Study)}\n\n{keys(Study)}"]
     parts += [f"## `{path}`\n\n{prose(cls)}\n\n{keys(cls)}" for path, cls in settings(Study)]
     return "\n".join(parts)
 
 
 def settings(cls: type, path: str = "") -> Iterator[tuple[str, type]]:
-    """The dataclasses within a dataclass, each with the dotted key it stands under, in the order of the file."""
+    """The dataclasses within a dataclass, each with the dotted key it stands under, in the order of
+    the file.
+    """
     for key, hint in get_type_hints(cls).items():
         for inner in classes(hint):
             if not (cls is not Study and inner.__name__ == "RecordSettings"):  # described once
@@ -145,16 +192,21 @@ def classes(hint: Any) -> Iterator[type]:
 
 
 def prose(cls: type) -> str:
-    """The docstring of a settings class but its attributes, which stand in the table of its keys."""
+    """The docstring of a settings class but its attributes, which the table of its keys holds."""
     return "\n\n".join(
         docstrings.paragraph(part)
-        for part in docstrings.paragraphs(docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines())[0][1])
+        for part in docstrings.paragraphs(
+            docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines())[0][1]
+        )
     )
 
 
 def keys(cls: Any) -> str:
     hints, meanings = get_type_hints(cls, include_extras=False), meaning(cls)
-    rows = [(f"`{f.name}`", words(hints[f.name]), given(f), meanings.get(f.name, "")) for f in fields(cls)]
+    rows = [
+        (f"`{f.name}`", words(hints[f.name]), given(f), meanings.get(f.name, ""))
+        for f in fields(cls)
+    ]
     return table(("key", "holds", "default", ""), rows)
 
 
@@ -163,7 +215,11 @@ def meaning(cls: type) -> dict[str, str]:
     found = {}
     for title, lines in docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines()):
         for names, kind, said in docstrings.entries(lines) if title == "Attributes" else ():
-            unit = ", ".join(part for part in kind.split(", ")[1:] if not part.startswith(("tuple", "or ", "list")))
+            unit = ", ".join(
+                part
+                for part in kind.split(", ")[1:]
+                if not part.startswith(("tuple", "or ", "list"))
+            )
             for name in names.split(", "):
                 found[name] = docstrings.text(said + (f" ({unit})" if unit else ""))
     return found
@@ -177,12 +233,18 @@ def words(hint: Any) -> str:
     if origin in (Union, UnionType):
         return " or ".join(dict.fromkeys("null" if a is type(None) else words(a) for a in inner))
     if origin is tuple:
-        return f"list of {words(inner[0])}" if inner[-1] is Ellipsis else "[" + ", ".join(map(words, inner)) + "]"
+        return (
+            f"list of {words(inner[0])}"
+            if inner[-1] is Ellipsis
+            else "[" + ", ".join(map(words, inner)) + "]"
+        )
     if is_dataclass(hint):
         return "section"
     if origin is not None:
         return "table"
-    return {"int": "whole number", "float": "number", "str": "text", "bool": "true or false"}.get(getattr(hint, "__name__", ""), "any")
+    return {"int": "whole number", "float": "number", "str": "text", "bool": "true or false"}.get(
+        getattr(hint, "__name__", ""), "any"
+    )
 
 
 def given(field: Field[Any]) -> str:
@@ -217,10 +279,13 @@ def robot(name: str) -> str:
     formulas = "\n".join(f"{b.name} = {b.formula}" for b in gathered[:3])
     return "\n".join(
         [
-            f"## {name}", "", f"{docstrings.text(description.title or name)}. Actuated joints: {len(description.joints)}; frames: {len(description.frames)}; "
+            f"## {name}", "",
+            f"{docstrings.text(description.title or name)}. Actuated joints: "
+            f"{len(description.joints)}; frames: {len(description.frames)}; "
             f"{len(regrouping)} base parameters of {len(description.parameters)}.", "",
             f'<p><a href="../robots/{name}.html">{name}: skeleton, frames, formulas</a></p>', "",
-            f"```text\n{formulas}\n```" if formulas else "", "", docstrings.text(" ".join((description.source or "").split())), "",
+            f"```text\n{formulas}\n```" if formulas else "", "",
+            docstrings.text(" ".join((description.source or "").split())), "",
         ]
     )  # fmt: skip
 
@@ -228,7 +293,7 @@ def robot(name: str) -> str:
 def examples() -> str:
     """Every file of docs/examples: its first line as the title, its text."""
     parts = []
-    for path in sorted((HERE / "examples").glob("*.py")):
+    for path in sorted((HERE / "examples").glob("[0-9]*.py")):
         text = path.read_text(encoding="utf-8")
         title = (ast.get_docstring(ast.parse(text)) or path.stem).split("\n")[0].rstrip(".")
         parts.append(f"## {title}\n\n`docs/examples/{path.name}`\n\n```python\n{text}```\n")

@@ -1,4 +1,6 @@
-"""The gallery: the page of every packaged robot, as `symgen show ROBOT --html` writes it, into robots/ of the site."""
+"""The gallery: the page of every packaged robot, as `symgen show ROBOT --html` writes it, into
+robots/ of the site.
+"""
 
 from __future__ import annotations
 

@@ -3,7 +3,10 @@
 import symgen
 
 base = symgen.regrouping(symgen.load_robot("puma560"))
-print(f"{len(base)} of {len(base.robot.parameters)} parameters can be identified; proved: {symgen.certify(base).valid}")
+print(
+    f"{len(base)} of {len(base.robot.parameters)} parameters can be identified; proved: "
+    f"{symgen.certificate(base).valid}"
+)
 for parameter in base.base:
     if parameter.name != parameter.own:  # it absorbs others
         print(f"{parameter.name:6} = {parameter.formula}")

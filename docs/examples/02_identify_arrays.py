@@ -9,7 +9,10 @@ model = symgen.model("planar_2r")  # or a robot file: arm.yaml, arm.urdf
 
 # A measurement: here computed from the values of the robot file, with torque noise.
 t = np.arange(0, 20, 0.002)
-w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+w, a = (
+    np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]),
+    np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]]),
+)
 phase = t[:, None, None] * w
 q = (a * np.sin(phase)).sum(axis=1)
 qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)

@@ -1,4 +1,6 @@
-"""Encoder resolution: how far do parameters move when positions are rounded, and how coarse may an encoder be?"""
+"""Encoder resolution: how far do parameters move when positions are rounded, and how coarse may an
+encoder be?
+"""
 
 import numpy as np
 
@@ -7,7 +9,10 @@ import symgen
 
 model = symgen.model("planar_2r")
 t = np.arange(0, 20, 0.002)
-w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+w, a = (
+    np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]),
+    np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]]),
+)
 phase = t[:, None, None] * w
 q = (a * np.sin(phase)).sum(axis=1)
 qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)
@@ -15,7 +20,9 @@ tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES))
 record = runtime.Record(t, q, tau + np.random.default_rng(0).normal(0, 0.2, q.shape))
 
 steps = ["2*pi/10000", "2*pi/1000", "2*pi/200"]
-study = runtime.Study(signals={"lowpass": {"cutoff": 20}, "median": 1}, cestac={"delta": steps, "runs": 20})
+study = runtime.Study(
+    signals={"lowpass": {"cutoff": 20}, "median": 1}, cestac={"delta": steps, "runs": 20}
+)
 print(runtime.cestac(model, record, study).to_table())
 everyone = runtime.advise(model, record, study, encoders=["all"], confirm=False).encoders[0]
 for limit in everyone.limits:

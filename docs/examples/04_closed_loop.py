@@ -1,4 +1,6 @@
-"""A closed loop: relations of the passive joints of a parallelogram, and a four-bar linkage that has no such relation."""
+"""A closed loop: relations of the passive joints of a parallelogram, and a four-bar linkage that
+has no such relation.
+"""
 
 import numpy as np
 

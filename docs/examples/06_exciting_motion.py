@@ -1,4 +1,6 @@
-"""A motion that tells the parameters apart, within the limits of the robot: values of the robot file stand for those not yet identified."""
+"""A motion that tells the parameters apart, within the limits of the robot: values of the robot
+file stand for those not yet identified.
+"""
 
 import runtime
 import symgen

@@ -1,4 +1,6 @@
-"""The CasADi target: models as functions with derivatives, here the exact derivative of the torques by position."""
+"""The CasADi target: models as functions with derivatives, here the exact derivative of the torques
+by position.
+"""
 
 import casadi as ca
 import numpy as np
@@ -7,7 +9,10 @@ import symgen
 
 arm = symgen.model("planar_2r", target="casadi")
 
-q, qd, qdd, X = (ca.SX.sym(name, n) for name, n in (("q", 2), ("qd", 2), ("qdd", 2), ("X", len(arm.BASE_PARAMETERS))))
+q, qd, qdd, X = (
+    ca.SX.sym(name, n)
+    for name, n in (("q", 2), ("qd", 2), ("qdd", 2), ("X", len(arm.BASE_PARAMETERS)))
+)
 tau = arm.inverse_dynamics(q, qd, qdd, X, *arm.CONSTANTS.values())
 stiffness = ca.Function("stiffness", [q, qd, qdd, X], [ca.jacobian(tau, q)])
 print(np.array(stiffness([0.3, -0.5], [1, 2], [0, 0], np.ones(len(arm.BASE_PARAMETERS)))))

@@ -8,7 +8,10 @@ from runtime.identification.payload import payload
 
 model = symgen.model("planar_2r")
 t = np.arange(0, 20, 0.002)
-w, a = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]), np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+w, a = (
+    np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]),
+    np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]]),
+)
 phase = t[:, None, None] * w
 q = (a * np.sin(phase)).sum(axis=1)
 qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)
@@ -18,7 +21,11 @@ study = runtime.Study(signals={"lowpass": {"cutoff": 20}}, payload={})
 def observed(standard: dict[str, float], seed: int) -> runtime.Observation:
     """Rows of a record of the arm with these parameters."""
     tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(standard))
-    return runtime.observe(model, runtime.Record(t, q, tau + np.random.default_rng(seed).normal(0, 0.2, q.shape)), study)
+    return runtime.observe(
+        model,
+        runtime.Record(t, q, tau + np.random.default_rng(seed).normal(0, 0.2, q.shape)),
+        study,
+    )
 
 
 values = dict(model.VALUES)

@@ -1,8 +1,11 @@
 """Essential parameters: the few that carry the model (chapter 4.1.1).
 
-The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as sigma_rho, eq. (9), stays below threshold times its
-first value. Removing column k deletes a column of the triangular factor and makes its trailing block triangular again; W is not touched. The
-same trail, followed to its end, gives the count for every other threshold. With weights, the weights of the first fit stay.
+The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as
+sigma_rho, eq. (9), stays below threshold times its
+first value. Removing column k deletes a column of the triangular factor and makes its trailing
+block triangular again; W is not touched. The
+same trail, followed to its end, gives the count for every other threshold. With weights, the
+weights of the first fit stay.
 """
 
 from __future__ import annotations
@@ -15,13 +18,11 @@ import numpy as np
 
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import System, assemble, standard_deviations
-from runtime.estimators.methods import linear_companion, linear_system, observed, simulator_of
-from runtime.json_documents import json_text
+from runtime.estimators.method import linear_system
+from runtime.json_documents import Result
 from runtime.model.generated import GeneratedModel
-from runtime.observation.system import Observation
-from runtime.records.record import Record
-from runtime.records.stream import Stream
-from runtime.settings.study import EssentialSettings, EstimateSettings, Study
+from runtime.rows.observation import Observation
+from runtime.settings.study import EssentialSettings, EstimateSettings
 from runtime.table import aligned
 
 THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
@@ -51,7 +52,7 @@ class Removal:
 
 
 @dataclass(frozen=True, eq=False)
-class Essential:
+class Essential(Result):
     """The essential parameters, and the trail that leads to them.
 
     Attributes
@@ -80,9 +81,6 @@ class Essential:
     counts: Mapping[float, int]
     further: tuple[Removal, ...] = ()
 
-    def __str__(self) -> str:
-        return self.to_table()
-
     @property
     def removed(self) -> tuple[str, ...]:
         """Names removed, in order."""
@@ -94,13 +92,19 @@ class Essential:
         lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
         for k, step in enumerate(self.trail):
             name = step.name if step.removed else f"{step.name} (kept)"
-            lines.append((name, str(first - k - step.removed), f"{step.relative_sigma:.3f}", f"{step.ratio:.5f}"))
+            lines.append(
+                (
+                    name,
+                    str(first - k - step.removed),
+                    f"{step.relative_sigma:.3f}",
+                    f"{step.ratio:.5f}",
+                )
+            )
         counts = ", ".join(f"{threshold:.2f}: {count}" for threshold, count in self.counts.items())
-        return f"{len(self.names)} of {first} parameters at threshold {self.threshold}\n\n{aligned(lines)}\n\nparameters kept by threshold  {counts}"
-
-    def to_json(self) -> str:
-        """JSON text: names, threshold, trail, counts by threshold."""
-        return json_text(self.summary())
+        return (
+            f"{len(self.names)} of {first} parameters at threshold "
+            f"{self.threshold}\n\n{aligned(lines)}\n\nparameters kept by threshold  {counts}"
+        )
 
     def summary(self) -> dict[str, Any]:
         """What `to_json` writes, as a mapping."""
@@ -112,26 +116,6 @@ class Essential:
             "further": self.further,
             "counts": {f"{k:g}": v for k, v in self.counts.items()},
         }
-
-
-def essential(
-    model: GeneratedModel, records: Record | Stream | Sequence[Record | Stream] | Observation, study: Study | None = None
-) -> Essential:
-    """Essential parameters of records, or of their Observation, by the method of the study or its linear companion.
-
-    Parameters
-    ----------
-    model : GeneratedModel
-        Emitted module.
-    records : Record, Stream, a sequence of them, or Observation
-        Joint side, SI.
-    study : Study, optional
-        Settings; default: Study().
-    """
-    study = study or Study()
-    if not isinstance(records, Observation):
-        records = observed(model, records, study, simulator=simulator_of(model, study))
-    return essential_of(records, study.essential, linear_companion(study.estimate), model=model)
 
 
 def essential_of(
@@ -166,7 +150,10 @@ def essential_of(
     steps = _trail(system, wanted[-1])
     counts = {threshold: len(system.names) - _accepted(steps, threshold) for threshold in wanted}
     accepted = _accepted(steps, settings.threshold)
-    removals = tuple(Removal(name, relative, ratio, k < accepted) for k, (name, relative, ratio) in enumerate(steps))
+    removals = tuple(
+        Removal(name, relative, ratio, k < accepted)
+        for k, (name, relative, ratio) in enumerate(steps)
+    )
     trail, further = removals[: accepted + 1], removals[accepted + 1 :]
     gone = {step.name for step in trail if step.removed}
     kept = tuple(name for name in system.names if name not in gone)
@@ -191,7 +178,9 @@ def _accepted(steps: Sequence[tuple[str, float, float]], threshold: float) -> in
 
 
 def _trail(system: System, threshold: float) -> list[tuple[str, float, float]]:
-    """(name, %sigma before it goes, sigma_rho ratio after) until the ratio reaches `threshold` or one parameter is left."""
+    """(name, %sigma before it goes, sigma_rho ratio after) until the ratio reaches `threshold` or
+    one parameter is left.
+    """
     steps: list[tuple[str, float, float]] = []
     fit = system.solve()
     first, C = standard_deviations(system, fit)
@@ -209,7 +198,9 @@ def _trail(system: System, threshold: float) -> list[tuple[str, float, float]]:
 
 
 def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """%sigma, shape (b,); inf where the record does not determine the parameter, which therefore goes first."""
+    """%sigma, shape (b,); inf where the record does not determine the parameter, which therefore
+    goes first.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
     return np.where(np.isnan(relative), np.inf, relative)

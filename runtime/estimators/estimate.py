@@ -1,13 +1,16 @@
 """What every estimator returns: parameters, their deviations and the quality of the fit.
 
-Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model: minimal encoder resolution):
+Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model:
+minimal encoder resolution):
 
     X        (7)     sigma_rho  (9)  = ||Y - W X|| / sqrt(r - b)
     sigma    (10)    = square roots of the diagonal of C = sigma_rho^2 (W'W)^-1
     %sigma   (11)    = 100 sigma / |X|
 
-Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it: blocks of time are taken as
-independent instead of samples (`runtime.estimators.block_covariance`). What a record does not determine is nan in memory and null in JSON.
+Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it:
+blocks of time are taken as
+independent instead of samples (`runtime.estimators.block_covariance`). What a record does not
+determine is nan in memory and null in JSON.
 """
 
 from __future__ import annotations
@@ -19,7 +22,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.json_documents import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, json_text, read_text
+from runtime.json_documents import (
+    InfIfNull,
+    Matrix,
+    NanIfNull,
+    Vector,
+    Whole,
+    from_text,
+    json_text,
+    read_text,
+)
 from runtime.latex import parameter_table
 from runtime.markup import number
 from runtime.table import Table, notebook
@@ -27,11 +39,20 @@ from runtime.table import Table, notebook
 Array = np.ndarray
 
 SCHEMA = "symgen-estimate/1"
-"""Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen schema --of estimate`)."""
+"""Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen
+schema --of estimate`).
+"""
 
 
 Status = Literal[
-    "ok", "rank-deficient", "no-redundancy", "singular-weights", "ill-posed", "not-converged", "weak-instruments", "simulation-apart"
+    "ok",
+    "rank-deficient",
+    "no-redundancy",
+    "singular-weights",
+    "ill-posed",
+    "not-converged",
+    "weak-instruments",
+    "simulation-apart",
 ]
 """Outcome of an estimator; the message of the Estimate explains."""
 
@@ -111,7 +132,8 @@ class Estimate:
     units : mapping of str
         Units by name, such as kg*m**2.
     details : mapping
-        Further results of the method, by name; of feasible: standard parameters, eigenvalues, the result of least squares alone.
+        Further results of the method, by name; of feasible: standard parameters, eigenvalues, the
+        result of least squares alone.
     """
 
     names: tuple[str, ...]
@@ -138,7 +160,12 @@ class Estimate:
 
     def __post_init__(self) -> None:
         b = len(self.names)
-        for name, shape in (("X", (b,)), ("sigma", (b,)), ("sigma_corrected", (b,)), ("covariance", (b, b))):
+        for name, shape in (
+            ("X", (b,)),
+            ("sigma", (b,)),
+            ("sigma_corrected", (b,)),
+            ("covariance", (b, b)),
+        ):
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape:
                 raise ValueError(f"{name} has shape {array.shape}; {b} names ask for {shape}")
@@ -171,40 +198,16 @@ class Estimate:
 
     def to_json(self) -> str:
         """JSON text of every field (design: estimate.json); numbers that do not exist are null."""
-        return json_text(
-            {
-                "schema": SCHEMA,
-                "names": self.names,
-                "X": self.X,
-                "sigma": self.sigma,
-                "relative_sigma": self.relative_sigma,
-                "sigma_corrected": self.sigma_corrected,
-                "cond": self.cond,
-                "cond_unit": self.cond_unit,
-                "rank": self.rank,
-                "sigma_rho": self.sigma_rho,
-                "residual_norm": self.residual_norm,
-                "relative_error": self.relative_error,
-                "rows": self.rows,
-                "per_joint": self.per_joint,
-                "method": self.method,
-                "status": self.status,
-                "message": self.message,
-                "groups": self.groups,
-                "iterations": self.iterations,
-                "settings": self.settings,
-                "provenance": self.provenance,
-                "units": self.units,
-                "covariance": self.covariance,
-                "details": self.details,
-            }
-        )
+        computed = {"relative_sigma": self.relative_sigma, "rows": self.rows}
+        return json_text({"schema": SCHEMA, **vars(self), **computed})
 
     @classmethod
     def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
-        """The Estimate that `to_json` wrote, every number to the bit; what stands beside it (estimate.json of `symgen identify`) is left out.
+        """The Estimate that `to_json` wrote, every number to the bit; what stands beside it
+        (estimate.json of `symgen identify`) is left out.
 
-        Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the name it gives.
+        Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the
+        name it gives.
         """
         return from_text(cls, text, SCHEMA, file)
 
@@ -239,24 +242,43 @@ class Estimate:
             for fit in self.per_joint
         ]
         return (
-            Table("parameters", ("parameter", "value", "sigma", "%sigma", "corrected", "unit"), parameters, symbols=True),
-            Table("joints", ("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale"), joints),
+            Table(
+                "parameters",
+                ("parameter", "value", "sigma", "%sigma", "corrected", "unit"),
+                parameters,
+                symbols=True,
+            ),
+            Table(
+                "joints",
+                ("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale"),
+                joints,
+            ),
         )
 
     def _head(self) -> tuple[str, str]:
         return (
-            f"{self.method}: {self.rows} rows, {len(self.names)} parameters, rank {self.rank}, status {self.status}",
-            f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho {self.sigma_rho:.4g}, "
+            (
+                f"{self.method}: {self.rows} rows, {len(self.names)} parameters, rank {self.rank}, "
+                f"status {self.status}"
+            ),
+            f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho "
+            f"{self.sigma_rho:.4g}, "
             f"residual norm {self.residual_norm:.6g}, relative error {self.relative_error:.3f} %",
         )
 
     def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
-        """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its lines, `blocks` stand side by side."""
+        """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its
+        lines, `blocks` stand side by side.
+        """
         shown = self.names if names is None else tuple(names)
         place = [self.names.index(name) for name in shown]
-        return parameter_table(shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks)
+        return parameter_table(
+            shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks
+        )
 
 
 def load_estimate(path: Path | str) -> Estimate:
-    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as `Estimate.from_json`."""
+    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as
+    `Estimate.from_json`.
+    """
     return from_text(Estimate, read_text(path), SCHEMA, str(path))

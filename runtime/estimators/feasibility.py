@@ -1,9 +1,12 @@
 """Can a physical robot have these base parameters, and which standard parameters would it have?
 
-    feasibility(X)            t* = max t: every condition of `runtime.model.inertia` holds with margin t, and K chi = X. t* < 0: no robot has X
-    standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values of the robot file (or to zero)
+    feasibility(X)            t* = max t: every condition of `runtime.model.inertia` holds with
+                              margin t, and K chi = X. t* < 0: no robot has X
+    standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values
+                              of the robot file (or to zero)
 
-A negative t* is blamed on the condition with the largest multiplier; that one is released and the rest asked again, until it holds.
+A negative t* is blamed on the condition with the largest multiplier; that one is released and the
+rest asked again, until it holds.
 Without limits on masses chi is not unique: different chi of one X give the same torques.
 """
 
@@ -15,20 +18,31 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.semidefinite import FURTHEST, Distance, LinearBounds, Optimum, Prior, closest, margin, solutions
-from runtime.model.generated import GeneratedModel
+from runtime.estimators.semidefinite import (
+    Distance,
+    LinearBounds,
+    Optimum,
+    Prior,
+    closest,
+    margin,
+    solutions,
+)
+from runtime.limits import LIMIT
 from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.settings.schema import Positive, Real, Settings, Text
 
 Array = np.ndarray
 Bounds = tuple[Real | None, Real | None]
 
-LEAST = 1e-6  # smallest eigenvalue, SI, that standard parameters keep where there is room
-FLAT = 1e-3  # of the second moments of a link: less than that is a point, a line or a plane
-ROUNDING = 1e-9  # t* above -ROUNDING is zero to the accuracy of the solver
-DENSITY = 200.0  # kg/m^3, of a robot in the cube of its size: a fifth of water; arms have 20 to 100
-POSES = 200  # random, in which the size of a robot is looked for
-TYPICAL = {"X": 0.1, "Y": 0.1, "Z": 0.1, "MX": 0.3, "MY": 0.3, "MZ": 0.3, "M": 3.0}  # kg m^2, kg m, kg; scales of the unknowns only
+TYPICAL = {
+    "X": 0.1,
+    "Y": 0.1,
+    "Z": 0.1,
+    "MX": 0.3,
+    "MY": 0.3,
+    "MZ": 0.3,
+    "M": 3.0,
+}  # kg m^2, kg m, kg; scales of the unknowns only
 
 
 class Ellipsoid(Settings):
@@ -63,15 +77,26 @@ class RobotLimits(Settings):
 
     bounds: Mapping[Text, Bounds] = field(default_factory=dict)
     total_mass: Real | tuple[Real, Real] | None = None
-    centre: Mapping[Text, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(default_factory=dict)
+    centre: Mapping[Text, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(
+        default_factory=dict
+    )
     ellipsoid: Mapping[Text, Ellipsoid] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
-    """margin : t*, SI (kg m^2 or kg of a pseudo-inertia, unit of a friction parameter).   feasible : t* >= 0.
+    """Whether base parameters are those of a physical robot.
 
-    blocking : conditions that had to be released, in order, each with the t* before; empty where X is feasible.   chi : (p,) at t*.
+    Attributes
+    ----------
+    margin : float, SI
+        t*: kg m^2 or kg of a pseudo-inertia, unit of a friction parameter.
+    feasible : bool
+        Whether t* >= 0.
+    blocking : tuple of (str, float)
+        Conditions that had to be released, in order, each with the t* before; empty where feasible.
+    chi : ndarray, shape (p,)
+        Standard parameters at t*.
     """
 
     margin: float
@@ -83,22 +108,37 @@ class Feasibility:
     def text(self) -> str:
         """One sentence."""
         if self.feasible:
-            least = "at least " if self.margin > 0.999 * FURTHEST else ""
-            return f"physically feasible: every condition holds with a margin of {least}{self.margin:.3g}"
+            least = "at least " if self.margin > 0.999 * LIMIT.LARGEST_MARGIN else ""
+            return (
+                "physically feasible: every condition holds with a margin of "
+                f"{least}{self.margin:.3g}"
+            )
         named = ", ".join(f"{name} (margin {t:.3g})" for name, t in self.blocking)
-        return f"NOT physically feasible: no positive mass density and friction gives these parameters; in the way: {named}"
+        return (
+            "NOT physically feasible: no positive mass density and friction gives these "
+            f"parameters; in the way: {named}"
+        )
 
 
 def feasibility(
-    physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None, *, blame: bool = True
+    physical: PhysicalModel,
+    names: Sequence[str],
+    X: Array,
+    limits: RobotLimits | None = None,
+    *,
+    blame: bool = True,
 ) -> Feasibility:
-    """Whether base parameters X, shape (len(names),), are those of a physical robot within the limits. blame : all conditions in the way, not the first."""
+    """Whether base parameters X, shape (len(names),), are those of a physical robot within the
+    limits. blame : all conditions in the way, not the first.
+    """
     rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
     first = margin(physical.conditions, rows, space)
     if not first.solved:
-        raise InputError(unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space)))
+        raise InputError(
+            unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space))
+        )
     blocking, conditions, released = [], list(physical.conditions), first
-    while released.solved and released.margin < -ROUNDING and conditions:
+    while released.solved and released.margin < -LIMIT.MARGIN_ROUNDING and conditions:
         worst = max(released.duals, key=lambda name: released.duals[name])
         blocking.append((worst, released.margin))
         conditions = [c for c in conditions if c.name != worst]
@@ -108,28 +148,50 @@ def feasibility(
     return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
 
 
-def standard_parameters(physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None) -> Array:
-    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError where X is infeasible.
+def standard_parameters(
+    physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
+) -> Array:
+    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError
+    where X is infeasible.
 
-    Of all such chi the one nearest to the values of the robot file, or to zero where it has none, in units of their size.
+    Of all such chi the one nearest to the values of the robot file, or to zero where it has none,
+    in units of their size.
     """
     answer = feasibility(physical, names, X, limits)
     if not answer.feasible:
-        raise InputError(f"no standard parameters: {answer.text}; identify with estimate.method: feasible")
+        raise InputError(
+            f"no standard parameters: {answer.text}; identify with estimate.method: feasible"
+        )
     return nearest_standard(physical, names, X, answer.chi, limits)
 
 
-def nearest_standard(physical: PhysicalModel, names: Sequence[str], X: Array, start: Array, limits: RobotLimits | None = None) -> Array:
+def nearest_standard(
+    physical: PhysicalModel,
+    names: Sequence[str],
+    X: Array,
+    start: Array,
+    limits: RobotLimits | None = None,
+) -> Array:
     """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
     scale = scales(physical)
     space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
     reach = np.abs(space.basis).max(axis=1, initial=0.0) / scale
-    open_ = tuple(c for c in physical.conditions if reach[list(c.numbers)].max() > ROUNDING)
-    if len(open_) < len(physical.conditions):  # X alone decides the others, such as a friction of zero
+    open_ = tuple(
+        c for c in physical.conditions if reach[list(c.numbers)].max() > LIMIT.MARGIN_ROUNDING
+    )
+    if len(open_) < len(
+        physical.conditions
+    ):  # X alone decides the others, such as a friction of zero
         inner = margin(open_, rows, space)
         start = inner.chi if inner.solved else start
-    least = float(np.clip(min((c.smallest(start) for c in open_), default=LEAST) / 2, LEAST**2, LEAST))
+    least = float(
+        np.clip(
+            min((c.smallest(start) for c in open_), default=LIMIT.LEAST_EIGENVALUE) / 2,
+            LIMIT.LEAST_EIGENVALUE**2,
+            LIMIT.LEAST_EIGENVALUE,
+        )
+    )
     nearest = closest(np.diag(1 / scale), chi0 / scale, open_, rows, space, least=least)
     kept = nearest.solved and all(c.smallest(nearest.chi) >= 0 for c in open_)
     return nearest.chi if kept else start
@@ -143,10 +205,23 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
         if name not in physical.standard:
             message = f"no standard parameter {name}; there are {', '.join(physical.standard)}"
             raise SettingsError(message, path=("estimate", "options", "bounds", name))
-        entries.append((f"bounds of {name}", {physical.standard.index(name): 1.0}, *_ends(low, high)))
+        entries.append(
+            (
+                f"bounds of {name}",
+                {physical.standard.index(name): 1.0},
+                -np.inf if low is None else low,
+                np.inf if high is None else high,
+            )
+        )
     if limits.total_mass is not None:
-        low, high = limits.total_mass if isinstance(limits.total_mass, tuple) else (limits.total_mass, limits.total_mass)
-        entries.append(("total_mass", {physical.link(j)[-1]: 1.0 for j in physical.links}, low, high))
+        low, high = (
+            limits.total_mass
+            if isinstance(limits.total_mass, tuple)
+            else (limits.total_mass, limits.total_mass)
+        )
+        entries.append(
+            ("total_mass", {physical.link(j)[-1]: 1.0 for j in physical.links}, low, high)
+        )
     for key, box in limits.centre.items():
         ten = physical.link(_link(physical, key, "centre"))
         for axis, (low, high) in enumerate(box):
@@ -157,7 +232,14 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
         j = _link(physical, key, "ellipsoid")
         condition = next(c for c in physical.conditions if c.name == f"link {j}")
         weights = np.einsum("kij,ij->k", condition.B, _inside(ellipsoid))
-        entries.append((f"ellipsoid of link {key}", dict(zip(condition.numbers, weights.tolist(), strict=True)), 0.0, np.inf))
+        entries.append(
+            (
+                f"ellipsoid of link {key}",
+                dict(zip(condition.numbers, weights.tolist(), strict=True)),
+                0.0,
+                np.inf,
+            )
+        )
     A = np.zeros((len(entries), len(physical.standard)))
     for row, (_, weights_of, _, _) in enumerate(entries):
         A[row, list(weights_of)] = list(weights_of.values())
@@ -165,45 +247,32 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
     return LinearBounds(tuple(entry[0] for entry in entries), A, lower, upper)
 
 
-def reach_of(model: GeneratedModel) -> float:
-    """Size of a robot, m: the largest distance between two of its frames in random poses, and once more the longest link, whose end no frame marks.
-
-    Revolute joints turn anywhere, prismatic ones move within their limits, 1 m where they have none. nan where the frames say nothing.
-    """
-    poses = getattr(model, "frame_poses", None)
-    if poses is None:
-        return float("nan")
-    n, limits = len(model.JOINTS), dict(getattr(model, "LIMITS", None) or {}).get("q")
-    spans = (
-        np.tile([-np.pi, np.pi], (n, 1)) if limits is None else np.array([(-x, x) if np.ndim(x) == 0 else x for x in limits], dtype=float)
-    )
-    q = np.random.default_rng(0).uniform(spans[:, 0], spans[:, 1], (POSES, n))
-    origins = np.asarray(poses(q))[:, :, :3, 3]
-    links = np.linalg.norm(np.diff(origins, axis=1), axis=2)
-    spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
-    return float(spread.max() + links.max()) if links.size and spread.max() > 0 else float("nan")
-
-
 def plausible(physical: PhysicalModel, limits: RobotLimits, reach: float) -> RobotLimits:
-    """The limits with those that the size of a robot, m, sets where nothing is said about its masses.
+    """The limits with those that the size of a robot, m, sets where nothing is said about its
+    masses.
 
-    No centre of mass lies further from the origin of its frame, along any axis, and all links together weigh less than a fifth of the water in a cube of that side.
+    No centre of mass lies further from the origin of its frame, along any axis, and all links
+    together weigh less than a fifth of the water in a cube of that side.
     """
     if not np.isfinite(reach):
         return limits
     box = ((-reach, reach),) * 3
-    said = limits.total_mass is not None or any(name in limits.bounds for name in (f"M{j}" for j in physical.links))
+    said = limits.total_mass is not None or any(
+        name in limits.bounds for name in (f"M{j}" for j in physical.links)
+    )
     own = {str(j): box for j in physical.links if str(j) not in limits.ellipsoid}
     return RobotLimits(
         bounds=limits.bounds,
-        total_mass=limits.total_mass if said else (0.0, DENSITY * reach**3),
+        total_mass=limits.total_mass if said else (0.0, LIMIT.ROBOT_DENSITY * reach**3),
         centre={**own, **limits.centre},
         ellipsoid=limits.ellipsoid,
     )
 
 
 def scales(physical: PhysicalModel) -> Array:
-    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it has none or zero."""
+    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it
+    has none or zero.
+    """
     sizes = []
     for name in physical.standard:
         family = name.rstrip("0123456789")
@@ -214,17 +283,27 @@ def scales(physical: PhysicalModel) -> Array:
 
 
 def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
-    """The pull to the values of the robot file; InputError where they are missing or not those of a body."""
+    """The pull to the values of the robot file; InputError where they are missing or not those of a
+    body.
+    """
     if kind == "none" or weight == 0:
         return None
     numbers = known_inertia(physical)
     if not numbers:
-        raise SettingsError("the robot file has no values of links; give them, or use prior: none", path=("estimate", "options", "prior"))
+        raise SettingsError(
+            "the robot file has no values of links; give them, or use prior: none",
+            path=("estimate", "options", "prior"),
+        )
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
     if kind != "euclidean":
         numbers = tuple(k for j in physical.links for k in physical.link(j))
-        if missing := [physical.standard[k] for k in numbers if physical.standard[k] not in physical.values]:
-            message = f"{kind} needs all values of every link; the robot file has none of {', '.join(missing)}. Use prior: euclidean"
+        if missing := [
+            physical.standard[k] for k in numbers if physical.standard[k] not in physical.values
+        ]:
+            message = (
+                f"{kind} needs all values of every link; the robot file has none of "
+                f"{', '.join(missing)}. Use prior: euclidean"
+            )
             raise SettingsError(message, path=("estimate", "options", "prior"))
         chi0 = with_volume(physical, chi0)
     return Prior(kind, chi0, scales(physical), numbers, weight)
@@ -232,11 +311,17 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | No
 
 def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
     """Numbers of the inertial parameters of links that the robot file has values of."""
-    return tuple(k for j in physical.links for k in physical.link(j) if physical.standard[k] in physical.values)
+    return tuple(
+        k
+        for j in physical.links
+        for k in physical.link(j)
+        if physical.standard[k] in physical.values
+    )
 
 
 def with_volume(physical: PhysicalModel, chi: Array) -> Array:
-    """chi with every point, line and plane of mass made a body: its pseudo-inertia gets a share of the largest second moment (1 g m^2 at least) and of 1 g.
+    """chi with every point, line and plane of mass made a body: its pseudo-inertia gets a share of
+    the largest second moment (1 g m^2 at least) and of 1 g.
 
     SettingsError where a link is no body at all, its pseudo-inertia indefinite.
     """
@@ -244,24 +329,42 @@ def with_volume(physical: PhysicalModel, chi: Array) -> Array:
     for c in (c for c in physical.conditions if c.name.startswith("link ")):
         P = c.matrix(chi)
         size = max(float(np.trace(P[:3, :3])), 1e-3)
-        if c.smallest(chi) < -FLAT * max(size, P[3, 3]):
-            message = f"the values of {c.name} are those of no body: its pseudo-inertia has the eigenvalue {c.smallest(chi):.3g}; correct them, or use prior: euclidean"
+        if c.smallest(chi) < -LIMIT.FLAT_LINK * max(size, P[3, 3]):
+            message = (
+                f"the values of {c.name} are those of no body: its pseudo-inertia has the "
+                f"eigenvalue {c.smallest(chi):.3g}; correct them, or use prior: euclidean"
+            )
             raise SettingsError(message, path=("estimate", "options", "prior"))
-        if c.smallest(chi) < FLAT * size:
-            body = np.diag([FLAT * size] * 3 + [FLAT])  # of a pseudo-inertia: second moments, then the mass
-            chi[list(c.numbers)] += np.linalg.lstsq(c.B.reshape(len(c.B), -1).T, body.ravel(), rcond=None)[0]
+        if c.smallest(chi) < LIMIT.FLAT_LINK * size:
+            body = np.diag(
+                [LIMIT.FLAT_LINK * size] * 3 + [LIMIT.FLAT_LINK]
+            )  # of a pseudo-inertia: second moments, then the mass
+            chi[list(c.numbers)] += np.linalg.lstsq(
+                c.B.reshape(len(c.B), -1).T, body.ravel(), rcond=None
+            )[0]
     return chi
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
-    """What happened, the likely cause, what to try. attempt : the same problem with other rows; each limit is released in turn."""
+    """What happened, the likely cause, what to try. attempt : the same problem with other rows;
+    each limit is released in turn.
+    """
     helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
     if helps:
-        return f"no physical robot within the limits; there is one without {' or without '.join(helps)}: widen it or leave it out"
+        return (
+            "no physical robot within the limits; there is one without "
+            f"{' or without '.join(helps)}: widen it or leave it out"
+        )
     if status.startswith("infeasible") and rows.names:
         named = ", ".join(dict.fromkeys(rows.names))
-        return f"no physical robot within the limits ({named}); more than one of them contradicts the others: leave them out one by one"
-    return f"the semidefinite program was not solved ({status}); try another margin, a prior, or bounds on the masses"
+        return (
+            f"no physical robot within the limits ({named}); more than one of them contradicts "
+            "the others: leave them out one by one"
+        )
+    return (
+        f"the semidefinite program was not solved ({status}); try another margin, a prior, or "
+        "bounds on the masses"
+    )
 
 
 def _inside(e: Ellipsoid) -> Array:
@@ -275,7 +378,3 @@ def _link(physical: PhysicalModel, key: str, setting: str) -> int:
         message = f"no link {key!r}; links are {', '.join(map(str, physical.links))}"
         raise SettingsError(message, path=("estimate", "options", setting, key))
     return int(key)
-
-
-def _ends(low: float | None, high: float | None) -> tuple[float, float]:
-    return -np.inf if low is None else low, np.inf if high is None else high

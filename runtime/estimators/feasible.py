@@ -1,32 +1,45 @@
 """Feasible least squares: the parameters nearest to the record that a physical robot can have.
 
-    min ||R (z - K chi)||^2 + weight D(chi)      subject to  P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
+    min ||R (z - K chi)||^2 + weight D(chi)      subject to
+            P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`); the conditions are those of `runtime.model.inertia`. All base
-parameters are fitted, essential or not: a condition ties every parameter of a link. With the columns of some parameters alone, the others
-are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least squares is feasible, it is the solution.
+W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`);
+the conditions are those of `runtime.model.inertia`. All base
+parameters are fitted, essential or not: a condition ties every parameter of a link. With the
+columns of some parameters alone, the others
+are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least
+squares is feasible, it is the solution.
 
 options (all of `runtime.estimators.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition, SI; 1e-6
-    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from the values of the robot file; "auto": euclidean
+    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from
+               the values of the robot file; "auto": euclidean
                where it has values of links, else none
-    weight     of D, a number; "held-out": that by which four fifths of the record in time predict the fifth that is left out best; "auto": the
+    weight     of D, a number; "held-out": that by which four fifths of the record in time predict
+               the fifth that is left out best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
-    reach      size of the robot, m, which bounds masses and their centres (`runtime.estimators.feasibility.plausible`); "auto": from its frames; null
+    reach      size of the robot, m, which bounds masses and their centres
+               (`runtime.estimators.feasibility.plausible`); "auto": from its frames; null
     bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
-    explain    whether every condition in the way of least squares is named, and the ranges of masses are given; true
+    explain    whether every condition in the way of least squares is named, and the ranges of
+               masses are given; true
     linear     options of the least squares behind it: rank_tolerance, block
 
-`details.masses` holds, for every link, the smallest and largest mass of the physical robots whose residual is at most 1 % larger: what the record says
+`details.masses` holds, for every link, the smallest and largest mass of the physical robots whose
+residual is at most 1 % larger: what the record says
 of it, the prior aside. A mass of which it says little is no value to use by itself.
 
-sigma and covariance are those of least squares without conditions, eq. (10): the theory of estimates on the boundary of a cone has no such
-formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by an active condition is told by `details`.
+sigma and covariance are those of least squares without conditions, eq. (10): the theory of
+estimates on the boundary of a cone has no such
+formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by
+an active condition is told by `details`.
 
-`fitted` takes any R and z: the feasible form of instrumental variables has R = L^-1 Z'V W and z' = L^-1 Z'V Y, L L' = Z'V Z.
+`fitted` takes any R and z: the feasible form of instrumental variables has R = L^-1 Z'V W and z' =
+L^-1 Z'V Y, L L' = Z'V Z.
 
-Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020) for the distances.
+Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020)
+for the distances.
 """
 
 from __future__ import annotations
@@ -38,9 +51,7 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import wls
-from runtime.estimators.block_covariance import drawn_again, gram_root
-from runtime.estimators.estimate import Estimate
+from runtime.estimators.block_covariance import gram_root, scatter
 from runtime.estimators.feasibility import (
     Feasibility,
     RobotLimits,
@@ -50,26 +61,30 @@ from runtime.estimators.feasibility import (
     nearest_standard,
     plausible,
     pulled,
-    reach_of,
     scales,
     unsolved,
 )
-from runtime.estimators.linear import System, assemble
-from runtime.estimators.semidefinite import Distance, LinearBounds, Optimum, closest, everything, extreme
+from runtime.estimators.linear import LinearOptions, System, percent
+from runtime.estimators.method import Beginning, Fitted
+from runtime.estimators.physical import reach_of
+from runtime.estimators.semidefinite import (
+    Distance,
+    LinearBounds,
+    Optimum,
+    closest,
+    everything,
+    extreme,
+)
+from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import PhysicalModel, physical_model
-from runtime.observation.qr_factor import Array, Factor, factor, triangularise
-from runtime.observation.system import Observation
 from runtime.progress import at
-from runtime.settings.schema import Flag, NotNegative, Positive, Resamples, Seed, require, structure
-from runtime.settings.study import EstimateSettings
+from runtime.rows.factor import Array, Factor, factor, triangularise
+from runtime.rows.observation import Observation
+from runtime.settings.schema import Flag, NotNegative, Positive, Resamples, Seed, require
 
-INCREASE = 1.01  # of the residual norm that weight: auto allows
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error
-PARTS = 5  # of the record in time, each left out once
-DETERMINED = 30.0  # %, half the range of a mass, of its middle: above, the record does not determine it
-ACTIVE = 2.0  # a condition within this factor of the margin is active
 
 
 class FeasibleOptions(RobotLimits):
@@ -80,20 +95,25 @@ class FeasibleOptions(RobotLimits):
     margin : float, SI
         Smallest eigenvalue of every condition.
     prior : str
-        Distance D of the inertial parameters from the values of the robot file: none, euclidean, entropic or pullback; auto: euclidean where the
+        Distance D of the inertial parameters from the values of the robot file: none, euclidean,
+        entropic or pullback; auto: euclidean where the
         file has values of links, else none.
     weight : float or str
-        Weight of D; held-out: that by which four fifths of the record in time predict the fifth that is left out best; auto: the largest, to half
+        Weight of D; held-out: that by which four fifths of the record in time predict the fifth
+        that is left out best; auto: the largest, to half
         a decade, that raises the residual norm by at most 1 %.
     reach : float, str or None, m
-        Size of the robot: no centre of mass lies further from the origin of its frame, and all links together weigh less than a fifth of the water in a cube of that
-        side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such bounds.
+        Size of the robot: no centre of mass lies further from the origin of its frame, and all
+        links together weigh less than a fifth of the water in a cube of that
+        side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such
+        bounds.
     bootstrap : int
         Resampled records (blocks of time) behind `sigma_corrected`; 0: none.
     seed : int
         Seed of the bootstrap.
     explain : bool
-        Name every condition that least squares breaks, and give the ranges of the masses; false: the parameters alone, in a third of the time.
+        Name every condition that least squares breaks, and give the ranges of the masses; false:
+        the parameters alone, in a third of the time.
     linear : mapping
         Options of the least squares that starts the method: rank_tolerance, block.
     """
@@ -112,36 +132,44 @@ class FeasibleOptions(RobotLimits):
         require(self.prior != "none" or isinstance(self.weight, str), message, "weight")
 
 
-def feasible(
-    observation: Observation,
-    settings: EstimateSettings,
-    *,
-    model: GeneratedModel | None = None,
-    provenance: Mapping[str, Any] | None = None,
-) -> Estimate:
-    """The feasible Estimate; `details` holds the standard parameters, the smallest eigenvalues, and what least squares gave."""
-    if model is None:
-        raise InputError("method feasible needs the model: it knows which parameters belong to one link")
-    physical = physical_model(model)
-    options = decided(structure(FeasibleOptions, settings.options, ("estimate", "options")), model, physical)
-    system = wls.least_squares(observation, settings, options.linear)
-    free = system.solve()
+def fit(start: Beginning) -> Fitted:
+    """The feasible fit; `details` holds the standard parameters, the smallest eigenvalues, and what
+    least squares gave.
+    """
+    if start.model is None:
+        raise InputError(
+            "method feasible needs the model: it knows which parameters belong to one link"
+        )
+    observation, system, free = start.observation, start.system, start.solution
+    physical = physical_model(start.model)
+    options = decided(start.options, start.model, physical)
     unconstrained = within_limits(physical, system.names, free.X, options)
-    if unconstrained.feasible and unconstrained.margin >= options.margin and options.prior == "none":
+    if (
+        unconstrained.feasible
+        and unconstrained.margin >= options.margin
+        and options.prior == "none"
+    ):
         X, chi, weight = free.X, unconstrained.chi, 0.0
     else:
         searched = options.prior != "none" and options.weight == "held-out"
-        fixed = replace(options, weight=held_out_weight(observation, system, physical, options)) if searched else options
-        at(f"feasible, weight of the prior {fixed.weight:g}" if isinstance(fixed.weight, float) else "feasible")
+        fixed = (
+            replace(options, weight=held_out_weight(observation, system, physical, options))
+            if searched
+            else options
+        )
+        known = isinstance(fixed.weight, float)
+        at(f"feasible, weight of the prior {fixed.weight:g}" if known else "feasible")
         chi, weight = weighed(system.weighted, physical, fixed)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
         chi = nearest_standard(physical, system.names, X, chi, options)
-    fit = replace(free, X=X, residual_norm=residual_norm(system.weighted, X))
-    estimate = assemble(replace(system, settings=settings), fit, model=model, provenance=provenance)
     smallest = physical.smallest(chi)
-    active = [name for name, value in smallest.items() if value < ACTIVE * options.margin]
-    without = assemble(system, free, model=model)
+    active = [
+        name for name, value in smallest.items() if value < LIMIT.ACTIVE_CONDITION * options.margin
+    ]
+    method = "ols" if start.settings.weights == "none" else "wls"
+    residual, measured = system.norms(free.X)
+    without, given = percent(residual, measured), percent(system.norms(X)[0], measured)
     masses = mass_ranges(system.weighted, physical, options, chi) if options.explain else {}
     details = {
         "standard": physical.named(chi),
@@ -151,39 +179,51 @@ def feasible(
         "weight": weight,
         "masses": masses,
         "least_squares": {
-            "method": system.settings.method,
+            "method": method,
             "feasible": unconstrained.feasible,
             "margin": unconstrained.margin,
             "blocking": [{"condition": name, "margin": t} for name, t in unconstrained.blocking],
-            "relative_error": without.relative_error,
-            "residual_norm": without.residual_norm,
-            "X": without.X,
+            "relative_error": without,
+            "residual_norm": float(np.linalg.norm(residual)),
+            "X": free.X,
         },
     }
-    message = " ".join(
-        part
-        for part in (
-            estimate.message,
-            difference_text(system, unconstrained.text, active, estimate, without),
-            prior_text(physical, options, weight),
-            masses_text(masses, options),
-        )
-        if part
+    violated = min(smallest.values()) < 0
+    parts = (
+        f"Least squares ({method}) is {unconstrained.text}. With the conditions the relative error "
+        f"is {given:.3f} % instead of {without:.3f} %; at their limit: "
+        f"{', '.join(active) or 'none'}.",
+        prior_text(physical, options, weight),
+        masses_text(masses, options),
+        "The solver left a condition violated: try another margin, a prior, or bounds on the "
+        "masses."
+        if violated
+        else "",
     )
-    if min(smallest.values()) < 0:
-        estimate = replace(estimate, status="not-converged")
-        message += " The solver left a condition violated: try another margin, a prior, or bounds on the masses."
-    scatter = bootstrapped(observation, system, physical, options, weight) if options.bootstrap else estimate.sigma_corrected
-    return replace(estimate, message=message, details=details, sigma_corrected=scatter)
+    return Fitted(
+        system,
+        replace(free, X=X, residual_norm=residual_norm(system.weighted, X)),
+        corrected=bootstrapped(system, physical, options, weight) if options.bootstrap else None,
+        status="not-converged" if violated else "ok",
+        message=" ".join(part for part in parts if part),
+        details=details,
+    )
 
 
-def within_limits(physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions) -> Feasibility:
-    """Whether X is that of a physical robot within the limits; no where no mass distribution fits into them, whatever its sign."""
+def within_limits(
+    physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
+) -> Feasibility:
+    """Whether X is that of a physical robot within the limits; no where no mass distribution fits
+    into them, whatever its sign.
+    """
     try:
         return feasibility(physical, names, X, options, blame=options.explain)
     except InputError:
         return Feasibility(
-            float("nan"), False, (("the bounds of masses and centres", float("nan")),), np.full(len(physical.standard), np.nan)
+            float("nan"),
+            False,
+            (("the bounds of masses and centres", float("nan")),),
+            np.full(len(physical.standard), np.nan),
         )
 
 
@@ -199,7 +239,7 @@ def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> 
         return at(0.0), 0.0
     if not isinstance(options.weight, str):
         return at(options.weight), options.weight
-    allowed = INCREASE * residual_norm(rows, K @ at(0.0))
+    allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ at(0.0))
     for weight in WEIGHTS:
         try:
             chi = at(float(weight))
@@ -212,18 +252,30 @@ def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> 
     return at(0.0), 0.0
 
 
-def held_out_weight(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions) -> float:
-    """The weight of D by which every fifth of the record is predicted best by the others; the largest of several.
+def held_out_weight(
+    observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
+) -> float:
+    """The weight of D by which every fifth of the record is predicted best by the others; the
+    largest of several.
 
-    Errors of the fifths add up, and none is below that of the least squares of its own rows: a weight is left as soon as it cannot be the best.
+    Errors of the fifths add up, and none is below that of the least squares of its own rows: a
+    weight is left as soon as it cannot be the best.
     """
     if options.prior == "none":
         return 0.0
     t0, t1 = observation.span
-    number = np.minimum((PARTS * (observation.t - t0) / (t1 - t0)).astype(int), PARTS - 1)
+    number = np.minimum(
+        (LIMIT.HELD_OUT_PARTS * (observation.t - t0) / (t1 - t0)).astype(int),
+        LIMIT.HELD_OUT_PARTS - 1,
+    )
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
-    others = [Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ()) for part in parts]
-    least = np.cumsum([part.r22**2 for part in parts][::-1])[::-1]  # of this part and those after it
+    others = [
+        Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())
+        for part in parts
+    ]
+    least = np.cumsum([part.r22**2 for part in parts][::-1])[
+        ::-1
+    ]  # of this part and those after it
     K = physical.rows(system.names)
 
     at("feasible, the weight of the prior by held-out error")
@@ -248,23 +300,42 @@ def held_out_weight(observation: Observation, system: System, physical: Physical
     return chosen
 
 
-def decided(options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel) -> FeasibleOptions:
+def decided(
+    options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
+) -> FeasibleOptions:
     """The options with the prior and the bounds that they leave to the robot."""
-    prior = ("euclidean" if known_inertia(physical) else "none") if options.prior == "auto" else options.prior
-    message = f"{options.weight}, but {model.NAME} has no values of links; give them in the robot file, or leave this out"
-    require(prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight")
+    prior = (
+        ("euclidean" if known_inertia(physical) else "none")
+        if options.prior == "auto"
+        else options.prior
+    )
+    message = (
+        f"{options.weight}, but {model.NAME} has no values of links; give them in the robot "
+        "file, or leave this out"
+    )
+    require(
+        prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight"
+    )
     reach = reach_of(model) if options.reach == "auto" else options.reach
     if reach is not None and np.isfinite(reach):
         limits = plausible(physical, options, reach)
-        return replace(options, prior=prior, reach=reach, total_mass=limits.total_mass, centre=limits.centre)
+        return replace(
+            options, prior=prior, reach=reach, total_mass=limits.total_mass, centre=limits.centre
+        )
     return replace(options, prior=prior, reach=None)
 
 
-def mass_ranges(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, chi: Array) -> dict[str, dict[str, float | bool]]:
-    """Smallest and largest mass of every link, kg, over the physical robots whose residual is at most INCREASE times that of chi; nan: not found."""
+def mass_ranges(
+    rows: Factor, physical: PhysicalModel, options: FeasibleOptions, chi: Array
+) -> dict[str, dict[str, float | bool]]:
+    """Smallest and largest mass of every link, kg, over the physical robots whose residual is at
+    most LIMIT.WEIGHT_INCREASE times that of chi; nan: not found.
+    """
     K = physical.rows(rows.names)
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
-    allowed = (INCREASE * residual_norm(rows, K @ chi) / size) ** 2 - (rows.r22 / size) ** 2
+    allowed = (LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ chi) / size) ** 2 - (
+        rows.r22 / size
+    ) ** 2
     radius = max(float(np.sqrt(max(allowed, 0.0))), 1e-6)
     bounds, space = limit_rows(physical, options), everything(scales(physical))
     ranges: dict[str, dict[str, float | bool]] = {}
@@ -275,27 +346,56 @@ def mass_ranges(rows: Factor, physical: PhysicalModel, options: FeasibleOptions,
             direction = np.zeros(len(physical.standard))
             direction[place] = sign
             found = extreme(
-                direction, rows.R11 @ K / size, rows.r12 / size, radius, physical.conditions, bounds, space, least=options.margin / 2
+                direction,
+                rows.R11 @ K / size,
+                rows.r12 / size,
+                radius,
+                physical.conditions,
+                bounds,
+                space,
+                least=options.margin / 2,
             )
             ends.append(float(found.chi[place]) if found.solved else float("nan"))
         low, high = min(ends[0], chi[place]), max(ends[1], chi[place])
-        determined = all(np.isfinite(ends)) and 100 * (high - low) <= DETERMINED * (high + low)
-        ranges[f"M{j}"] = {"value": float(chi[place]), "lowest": low, "highest": high, "determined": bool(determined)}
+        determined = all(np.isfinite(ends)) and 100 * (high - low) <= LIMIT.MASS_DETERMINED * (
+            high + low
+        )
+        ranges[f"M{j}"] = {
+            "value": float(chi[place]),
+            "lowest": low,
+            "highest": high,
+            "determined": bool(determined),
+        }
     return ranges
 
 
 def masses_text(masses: Mapping[str, Mapping[str, float | bool]], options: FeasibleOptions) -> str:
     """Which masses the record does not determine, and what would narrow them, in words."""
-    loose = [f"{name} ({own['lowest']:.2g} to {own['highest']:.3g} kg)" for name, own in masses.items() if not own["determined"]]
+    loose = [
+        f"{name} ({own['lowest']:.2g} to {own['highest']:.3g} kg)"
+        for name, own in masses.items()
+        if not own["determined"]
+    ]
     if not loose:
         return ""
-    weighed = options.bounds or options.reach is None or not isinstance(options.total_mass, tuple) or options.total_mass[0] > 0
+    weighed = (
+        options.bounds
+        or options.reach is None
+        or not isinstance(options.total_mass, tuple)
+        or options.total_mass[0] > 0
+    )
     asked = (
         ""
         if weighed or options.prior != "none"
-        else " Give total_mass of the data sheet, or values in the robot file: they narrow these ranges."
+        else (
+            " Give total_mass of the data sheet, or values in the robot file: they narrow these "
+            "ranges."
+        )
     )
-    return f"Masses that this record does not determine, no values to use by themselves: {', '.join(loose)}.{asked}"
+    return (
+        "Masses that this record does not determine, no values to use by themselves: "
+        f"{', '.join(loose)}.{asked}"
+    )
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
@@ -310,11 +410,17 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 def part_factor(part: Observation, system: System) -> Factor:
     """Factor of some rows with the weights of the joints in the whole."""
     chosen = part.columns(system.names)
-    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(1 / np.array(system.scales))
+    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
+        1 / np.array(system.scales)
+    )
 
 
-def fitted(R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions, weight: float = 0.0) -> Array:
-    """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z (m,), ||z|| about 1."""
+def fitted(
+    R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions, weight: float = 0.0
+) -> Array:
+    """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z
+    (m,), ||z|| about 1.
+    """
     rows, space = limit_rows(physical, options), everything(scales(physical))
     prior = "none" if options.prior == "auto" else options.prior
     pull = pulled(physical, prior, weight)
@@ -333,23 +439,18 @@ def residual_norm(rows: Factor, X: Array) -> float:
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))
 
 
-def bootstrapped(observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
-    """Deviation of X, shape (b,), over records of resampled blocks of time; weights of the joints stay."""
+def bootstrapped(
+    system: System, physical: PhysicalModel, options: FeasibleOptions, weight: float
+) -> Array:
+    """Deviation of X, shape (b,), over records of resampled blocks of time; weights of the joints
+    stay.
+    """
     fixed = options if options.prior == "none" else replace(options, weight=weight)
     K, names = physical.rows(system.names), system.names
-
     at(f"feasible, {options.bootstrap} records of resampled blocks")
 
     def estimator(gram: Array) -> Array:
         return np.asarray(K @ weighed(Factor(names, gram_root(gram), ()), physical, fixed)[0])
 
-    blocks = observation.block_rows(names, 1 / np.array(system.scales), observation.residual_block, system.whitener)
-    return np.asarray(np.std(drawn_again(blocks, estimator, options.bootstrap, options.seed), axis=0, ddof=1))
-
-
-def difference_text(system: System, answer: str, active: list[str], estimate: Estimate, without: Estimate) -> str:
-    """What the conditions changed, in words."""
-    return (
-        f"Least squares ({system.settings.method}) is {answer}. With the conditions the relative error is {estimate.relative_error:.3f} % "
-        f"instead of {without.relative_error:.3f} %; at their limit: {', '.join(active) or 'none'}."
-    )
+    blocks = replace(system, options=LinearOptions()).block_rows()
+    return scatter(blocks, estimator, options.bootstrap, options.seed)

@@ -1,51 +1,46 @@
 """Robust least squares by iterated weights: rows far off the model count less.
 
-    u_i = e_i / (S_j sqrt(1 - h_i))          S_j = median |e - median e| / 0.6745 over the rows of joint j, h_i leverage
-    X   = argmin sum_i w(u_i) e_i^2 / S_j^2, repeated with new S_j and w until max |dX_i| / sigma_i < 1e-3
+    u_i = e_i / (S_j sqrt(1 - h_i))          S_j = median |e - median e| / 0.6745 over the rows of
+                                             joint j, h_i leverage
+    X   = argmin sum_i w(u_i) e_i^2 / S_j^2, repeated with new S_j and w until max |dX_i| / sigma_i
+        < 1e-3
 
     huber  w = min(1, k/|u|), k = 1.345             started from least squares weighted by joint
-    tukey  w = (1 - (u/c)^2)^2, 0 from |u| = c on, c = 4.685          started from Huber's result: this criterion has local minima
+    tukey  w = (1 - (u/c)^2)^2, 0 from |u| = c on, c = 4.685
+            started from Huber's result: this criterion has local minima
 
     C = (sum_j W_j'W_j / S_j^2)^-1  mean(psi^2) / mean(psi')^2  r / (r - b),    psi = w u
 
-Both constants give 95 % efficiency under normal noise. Where more than 5 % of the rows of a joint have w < 0.5 the model is wrong there; that is
+Both constants give 95 % efficiency under normal noise. Where more than 5 % of the rows of a joint
+have w < 0.5 the model is wrong there; that is
 not a matter of outliers. options: loss, tuning (k or c), passes, block, rank_tolerance.
 
-References: Huber and Ronchetti, Robust Statistics (2009), chapter 7; Maronna, Martin and Yohai, Robust Statistics (2006), chapters 4 and 5.
+References: Huber and Ronchetti, Robust Statistics (2009), chapter 7; Maronna, Martin and Yohai,
+Robust Statistics (2006), chapters 4 and 5.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from runtime.errors import SettingsError
 from runtime.estimators import wls
 from runtime.estimators.block_covariance import block_covariance
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import System, assemble
+from runtime.estimators.linear import LinearOptions, labels_of
+from runtime.estimators.method import Beginning, Fitted
 from runtime.estimators.solution import solve
-from runtime.model.generated import GeneratedModel
-from runtime.observation.qr_factor import Array, Factor, factor
-from runtime.observation.system import Observation, split_rows
-from runtime.settings.schema import Count, Positive, Settings, structure
-from runtime.settings.study import EstimateSettings
+from runtime.limits import LIMIT
+from runtime.rows.factor import Array, Factor, factor
+from runtime.rows.observation import Observation, split_rows
+from runtime.settings.schema import Positive
 
 TUNING = {"huber": 1.345, "tukey": 4.685}
-NORMAL = 0.6745
-"""Median of |z|, z standard normal."""
-CONVERGED = 1e-3
-"""Largest change of a parameter over its sigma at which the weights have converged."""
-DOWN = 0.5
-"""Weight below which a row is reported as down-weighted."""
-SUSPECT = 0.05
-"""Share of down-weighted rows of a joint above which the model is suspected."""
 
 
-class IrlsOptions(Settings):
+class IrlsOptions(LinearOptions):
     """estimate.options of method irls.
 
     Attributes
@@ -54,24 +49,17 @@ class IrlsOptions(Settings):
         huber or tukey.
     tuning : float or None
         k of huber or c of tukey; default: 1.345, 4.685.
-    passes : int
-        Largest number of passes.
-    block : float or None, s
-        Length of the blocks of time behind `sigma_corrected`.
-    rank_tolerance : float or None
-        Singular value, relative to the largest, below which the rank ends.
     """
 
     loss: Literal["huber", "tukey"] = "huber"
     tuning: Positive | None = None
-    passes: Count = 50
-    block: Positive | None = None
-    rank_tolerance: Positive | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """State of the iteration: X, shape (b,), u and w, shape (r,), S, shape (n,), T with T T' = (sum_j W_j'W_j / S_j^2)^-1."""
+class Robust:
+    """State of the iteration: X, shape (b,), u and w, shape (r,), S, shape (n,), T with T T' =
+    (sum_j W_j'W_j / S_j^2)^-1.
+    """
 
     X: Array
     u: Array
@@ -82,27 +70,16 @@ class Fit:
     converged: bool
 
 
-def irls(
-    observation: Observation,
-    settings: EstimateSettings,
-    *,
-    model: GeneratedModel | None = None,
-    provenance: Mapping[str, Any] | None = None,
-) -> Estimate:
-    """The robust Estimate; `details` holds the scales S_j and the share of down-weighted rows by joint."""
-    if settings.weights != "none":
-        raise SettingsError(f"{settings.weights!r} with method irls, which finds its own weights", path=("estimate", "weights"))
-    options = structure(IrlsOptions, settings.options, ("estimate", "options"))
-    start = wls.system(observation, replace(settings, method="wls", options=_linear(options)))
-    first = start.solve()
-    if first.rank < len(start.names):
-        return assemble(replace(start, settings=settings), first, model=model, provenance=provenance)
-    W = observation.columns(start.names).W
-    fit = _iterated(observation, W, start.raw, first.X, "huber", options)
+def fit(start: Beginning) -> Fitted:
+    """The robust fit; `details` holds the scales S_j and the share of down-weighted rows by
+    joint.
+    """
+    W, options = start.observation.W, start.options
+    found = _iterated(start, W, start.solution.X, "huber")
     if options.loss == "tukey":
-        again = _iterated(observation, W, start.raw, fit.X, "tukey", options)
-        fit = replace(again, passes=fit.passes + again.passes)
-    return _estimate(observation, settings, options, start, W, fit, model, provenance)
+        again = _iterated(start, W, found.X, "tukey")
+        found = replace(again, passes=found.passes + again.passes)
+    return _fitted(start, W, found)
 
 
 def weight(u: Array, loss: str, tuning: float) -> Array:
@@ -119,8 +96,9 @@ def slope(u: Array, loss: str, tuning: float) -> Array:
     return np.where(inside, 1.0 if loss == "huber" else (1 - v) * (1 - 5 * v), 0.0)
 
 
-def _iterated(observation: Observation, W: Array, raw: Factor, X: Array, loss: str, options: IrlsOptions) -> Fit:
+def _iterated(start: Beginning, W: Array, X: Array, loss: str) -> Robust:
     """Weights and parameters in turn, from X."""
+    observation, raw, options = start.observation, start.system.raw, start.options
     tuning = _tuning(options, loss)
     for done in range(1, options.passes + 1):
         e = observation.Y - W @ X
@@ -135,9 +113,9 @@ def _iterated(observation: Observation, W: Array, raw: Factor, X: Array, loss: s
         change = float(np.max(np.abs(new - X) / np.linalg.norm(T, axis=1)))
         still = np.allclose(new, X, rtol=1e-12, atol=0)  # exact data, whose sigma is rounding
         X = new
-        if change < CONVERGED or still:
-            return Fit(X, u, w, S, T, done, True)
-    return Fit(X, u, w, S, T, options.passes, False)
+        if change < LIMIT.IRLS_CONVERGED or still:
+            return Robust(X, u, w, S, T, done, True)
+    return Robust(X, u, w, S, T, options.passes, False)
 
 
 def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> Factor:
@@ -148,44 +126,53 @@ def _weighted(observation: Observation, W: Array, raw: Factor, root: Array) -> F
 def _scales(observation: Observation, raw: Factor, e: Array) -> Array:
     """S_j, shape (n,), never below the rounding of Y_j."""
     by_joint = [e[observation.joint(j)] for j in range(observation.n)]
-    S = np.array([np.median(np.abs(x - np.median(x))) / NORMAL if len(x) else 0.0 for x in by_joint])
+    S = np.array(
+        [
+            np.median(np.abs(x - np.median(x))) / LIMIT.NORMAL_MEDIAN if len(x) else 0.0
+            for x in by_joint
+        ]
+    )
     return wls.floored(raw, S)
 
 
-def _estimate(
-    observation: Observation,
-    settings: EstimateSettings,
-    options: IrlsOptions,
-    start: System,
-    W: Array,
-    fit: Fit,
-    model: GeneratedModel | None,
-    provenance: Mapping[str, Any] | None,
-) -> Estimate:
-    """The Estimate of the last pass, with the covariance of a robust estimate."""
+def _fitted(start: Beginning, W: Array, fit: Robust) -> Fitted:
+    """What the last pass gives, with the covariance of a robust estimate."""
+    observation, options = start.observation, start.options
     r, b = W.shape
     loss, tuning = options.loss, _tuning(options, options.loss)
-    weighted = _weighted(observation, W, start.raw, np.sqrt(fit.w) * np.repeat(1 / fit.S, observation.rows))
+    rows = np.repeat(1 / fit.S, observation.rows)
     system = replace(
-        start, settings=settings, weighted=weighted, scales=tuple(fit.S.tolist()), iterations=fit.passes, options=_linear(options)
+        start.system,
+        weighted=_weighted(observation, W, start.system.raw, np.sqrt(fit.w) * rows),
+        scales=tuple(fit.S.tolist()),
+        iterations=fit.passes,
     )
     if not fit.converged:
-        message = f"The weights have not converged after {options.passes} passes. Raise estimate.options.passes, or use loss: huber."
+        message = (
+            f"The weights have not converged after {options.passes} passes. Raise "
+            "estimate.options.passes, or use loss: huber."
+        )
         system = replace(system, status="not-converged", message=message)
-    estimate = assemble(system, replace(system.solve(), X=fit.X), model=model, provenance=provenance)
     psi, inside = fit.w * fit.u, slope(fit.u, loss, tuning)
     C = fit.T @ fit.T.T * np.mean(psi**2) / np.mean(inside) ** 2 * r / max(r - b, 1)
     # to first order about the fit, rows W/S sqrt(mean psi') and residuals psi/sqrt(mean psi')
-    bend, rows = np.sqrt(np.mean(inside)), np.repeat(1 / fit.S, observation.rows)
-    A = np.column_stack([W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend])
-    C_b = block_covariance(split_rows(A, observation.blocks(options.block)), np.zeros(b), fit.T / bend)
-    shares = {joint.joint: float(np.mean(fit.w[observation.joint(j)] < DOWN)) for j, joint in enumerate(estimate.per_joint) if joint.rows}
-    return replace(
-        estimate,
-        covariance=C,
-        sigma=np.sqrt(np.diag(C)),
-        sigma_corrected=np.sqrt(np.diag(C_b)),
-        message=" ".join(part for part in (estimate.message, _told(shares)) if part),
+    bend = np.sqrt(np.mean(inside))
+    A = np.column_stack(
+        [W * rows[:, None] * bend, (observation.Y - W @ fit.X) * rows * fit.w / bend]
+    )
+    blocks = split_rows(A, observation.blocks(options.block))
+    C_b = block_covariance(blocks, np.zeros(b), fit.T / bend)
+    shares = {
+        label: float(np.mean(fit.w[observation.joint(j)] < LIMIT.DOWN_WEIGHTED))
+        for j, label in enumerate(labels_of(start.model, observation.n))
+        if observation.rows[j]
+    }
+    return Fitted(
+        system,
+        replace(system.solve(), X=fit.X),
+        C,
+        np.sqrt(np.diag(C_b)),
+        message=_told(shares),
         details={"loss": loss, "tuning": tuning, "scales": fit.S, "down_weighted": shares},
     )
 
@@ -193,21 +180,19 @@ def _estimate(
 def _told(shares: Mapping[str, float]) -> str:
     """Shares of down-weighted rows in words."""
     text = (
-        f"Share of rows with a weight below {DOWN:g}: "
+        f"Share of rows with a weight below {LIMIT.DOWN_WEIGHTED:g}: "
         + ", ".join(f"joint {joint} {100 * share:.1f} %" for joint, share in shares.items())
         + "."
     )
-    suspect = [joint for joint, share in shares.items() if share > SUSPECT]
+    suspect = [joint for joint, share in shares.items() if share > LIMIT.SUSPECT_SHARE]
     if suspect:
-        text += f" Above {100 * SUSPECT:g} % (joint {', '.join(suspect)}) it is the model that does not fit, not a few outliers."
+        text += (
+            f" Above {100 * LIMIT.SUSPECT_SHARE:g} % (joint {', '.join(suspect)}) it is the model "
+            "that does not fit, not a few outliers."
+        )
     return text
 
 
 def _tuning(options: IrlsOptions, loss: str) -> float:
     """k of Huber or c of Tukey; the start of Tukey by Huber keeps Huber's own k."""
     return options.tuning if options.tuning is not None and loss == options.loss else TUNING[loss]
-
-
-def _linear(options: IrlsOptions) -> dict[str, float]:
-    given = {"block": options.block, "rank_tolerance": options.rank_tolerance}
-    return {key: value for key, value in given.items() if value is not None}

@@ -1,12 +1,15 @@
-"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all from triangular factors.
+"""From a factored linear system to an Estimate: eqs. (7)-(11), rank and residuals by joint, all
+from triangular factors.
 
-A System is the rows as a method weighs them. Ordinary least squares leaves them as they are; weighted least squares divides the rows of joint
-j by s_j. Removing columns from a System is cheap, which is what `runtime.estimators.essential` lives on; weights stay as they are while columns go.
+A System is the rows as a method weighs them. Ordinary least squares leaves them as they are;
+weighted least squares divides the rows of joint
+j by s_j. Removing columns from a System is cheap, which is what `runtime.estimators.essential`
+lives on; weights stay as they are while columns go.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -19,12 +22,28 @@ from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.estimate import Estimate, JointFit, Status
 from runtime.estimators.solution import Solution, solve
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.observation.qr_factor import Array, Factor
-from runtime.observation.system import Observation
+from runtime.rows.factor import Array, Factor
+from runtime.rows.observation import Observation
+from runtime.settings.schema import Count, Positive, Settings
 from runtime.settings.study import EstimateSettings, to_mapping
 
-OPTIONS = ("rank_tolerance", "block")
-"""Options every linear method takes: smallest s_i/s_1 with unit columns that counts as rank; length of a block of residuals, s."""
+
+class LinearOptions(Settings):
+    """estimate.options of methods ols and wls, and of those that start from them.
+
+    Attributes
+    ----------
+    rank_tolerance : float or None
+        Smallest s_i/s_1 with unit columns that counts as rank; default: the rounding of the rows.
+    block : float or None, s
+        Length of the blocks of residuals behind `sigma_corrected`; default: that of the rows.
+    passes : int
+        Largest number of passes of weights that are found by iteration.
+    """
+
+    rank_tolerance: Positive | None = None
+    block: Positive | None = None
+    passes: Count = 50
 
 
 @dataclass(frozen=True)
@@ -46,13 +65,13 @@ class System:
     whitener : ndarray, shape (n, n), or None
         Multiplies the n rows of one instant in place of the scales.
     known_variance : bool
-        The rows of the weighted system have variance 1: C = (W'W)^-1; else C = sigma_rho^2 (W'W)^-1.
+        The rows of the weighted system have variance 1: C = (W'W)^-1; else C = sigma_rho^2
+        (W'W)^-1.
     iterations : int
         Passes that found the weights.
     status, message : str
         As in an Estimate.
-    options : mapping
-        Checked options of the method.
+    options : LinearOptions
     """
 
     observation: Observation
@@ -65,7 +84,7 @@ class System:
     iterations: int = 0
     status: Status = "ok"
     message: str = ""
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: LinearOptions = field(default_factory=LinearOptions)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -82,23 +101,41 @@ class System:
 
     def _changed(self, change: Callable[[Factor], Factor]) -> System:
         raw = change(self.raw)
-        return replace(self, raw=raw, weighted=raw if self.weighted is self.raw else change(self.weighted))
+        return replace(
+            self, raw=raw, weighted=raw if self.weighted is self.raw else change(self.weighted)
+        )
 
     def solve(self) -> Solution:
         """Least-squares solution of the weighted system."""
-        return solve(self.weighted, self.options.get("rank_tolerance"))
+        return solve(self.weighted, self.options.rank_tolerance)
+
+    def norms(self, X: Array) -> tuple[Array, Array]:
+        """||Y_j - W_j X|| and ||Y_j|| by joint, without weights, shape (n,) each."""
+        joints = self.raw.joints
+        residual = np.array([joint.residual_norm(X) for joint in joints])
+        return residual, np.array([joint.measured_norm for joint in joints])
+
+    @property
+    def block(self) -> float:
+        """Length of a block of residuals, s."""
+        return self.options.block or self.observation.residual_block
+
+    def block_rows(self) -> Iterator[Array]:
+        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1)."""
+        return self.observation.block_rows(
+            self.names, 1 / np.array(self.scales), self.block, self.whitener
+        )
 
 
-def checked_options(settings: EstimateSettings, known: Sequence[str] = OPTIONS) -> Mapping[str, Any]:
-    """settings.options, refused when one is unknown or not a positive number."""
-    for key, value in settings.options.items():
-        if key not in known:
-            raise SettingsError(
-                f"unknown option {key!r} of {settings.method}; known: {', '.join(known)}", path=("estimate", "options", key)
-            )
-        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
-            raise SettingsError(f"{value!r}; expected a positive number", path=("estimate", "options", key))
-    return settings.options
+def ordinary(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """Ordinary least squares, eq. (7): the rows as they are, in N m.
+
+    X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
+    """
+    raw = raw_factor(observation, settings)
+    return System(observation, settings, raw, raw, (1.0,) * observation.n, options=options)
 
 
 def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
@@ -118,7 +155,9 @@ def columns_asked(observation: Observation, settings: EstimateSettings) -> tuple
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
-    """sigma_rho of eq. (9), and C of eq. (10) with shape (b, b); nan where the record says nothing."""
+    """sigma_rho of eq. (9), and C of eq. (10) with shape (b, b); nan where the record says
+    nothing.
+    """
     freedom = system.weighted.rows - fit.rank
     sigma_rho = fit.residual_norm / np.sqrt(freedom) if freedom > 0 else np.nan
     C = fit.T @ fit.T.T * (1.0 if system.known_variance else sigma_rho**2)
@@ -128,30 +167,39 @@ def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
 
 
 def assemble(
-    system: System, fit: Solution, *, model: GeneratedModel | None = None, provenance: Mapping[str, Any] | None = None
+    system: System,
+    fit: Solution,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
 ) -> Estimate:
-    """The Estimate of a solved system; `model` gives units, joint numbers and the hash of the robot."""
+    """The Estimate of a solved system; `model` gives units, joint numbers and the hash of the
+    robot.
+    """
     observation, names = system.observation, system.names
     sigma_rho, C = standard_deviations(system, fit)
-    block, C_b = correlated_covariance(system, fit)
-    corrected = np.sqrt(np.diag(C_b))
+    corrected = np.sqrt(np.diag(correlated_covariance(system, fit)))
     corrected[_undetermined(system, fit)] = np.nan
-    norms = [joint.residual_norm(fit.X) for joint in system.raw.joints]
-    measured = [joint.measured_norm for joint in system.raw.joints]
-    labels = joint_labels(model) if model is not None else tuple(map(str, range(1, observation.n + 1)))
+    norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows
     per_joint = tuple(
         JointFit(
             label,
-            joint.rows,
+            rows,
             norm,
-            _percent(norm, of),
-            float(norm / np.sqrt(joint.rows * share)) if share > 0 and joint.rows else np.nan,
+            percent(norm, of),
+            float(norm / np.sqrt(rows * share)) if share > 0 and rows else np.nan,
             scale,
         )
-        for label, joint, norm, of, scale in zip(labels, system.raw.joints, norms, measured, system.scales, strict=True)
+        for label, rows, norm, of, scale in zip(
+            labels_of(model, observation.n),
+            [joint.rows for joint in system.raw.joints],
+            norms.tolist(),
+            measured.tolist(),
+            system.scales,
+            strict=True,
+        )
     )
-    total = float(np.linalg.norm(norms))
     status, message = outcome(system, fit)
     return Estimate(
         names=names,
@@ -163,28 +211,37 @@ def assemble(
         cond=condition(system.weighted, fit.rank),
         cond_unit=fit.cond_unit,
         rank=fit.rank,
-        residual_norm=total,
-        relative_error=_percent(total, float(np.linalg.norm(measured))),
+        residual_norm=float(np.linalg.norm(norms)),
+        relative_error=percent(norms, measured),
         per_joint=per_joint,
         method=system.settings.method,
         status=status,
         message=message,
         groups=fit.groups,
         iterations=system.iterations,
-        settings={**observation.settings, "estimate": to_mapping(system.settings), "residual_block": block},
+        settings={
+            **observation.settings,
+            "estimate": to_mapping(system.settings),
+            "residual_block": system.block,
+        },
         provenance={**describe(observation, model), **(provenance or {})},
         units=dict(getattr(model, "UNITS", {})),
     )
 
 
-def correlated_covariance(system: System, fit: Solution) -> tuple[float, Array]:
-    """Length of the blocks of residuals, s, and the covariance that takes blocks as independent, shape (b, b); nan without redundancy."""
-    observation, b = system.observation, len(system.names)
-    block = float(system.options.get("block", observation.residual_block))
+def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
+    """Names of the joints, their numbers where there is no model."""
+    return tuple(map(str, range(1, n + 1))) if model is None else joint_labels(model)
+
+
+def correlated_covariance(system: System, fit: Solution) -> Array:
+    """The covariance that takes blocks of residuals as independent, shape (b, b); nan without
+    redundancy.
+    """
+    b = len(system.names)
     if system.raw.rows <= b:
-        return block, np.full((b, b), np.nan)
-    rows = observation.block_rows(system.names, 1 / np.array(system.scales), block, system.whitener)
-    return block, block_covariance(rows, fit.X, fit.T)
+        return np.full((b, b), np.nan)
+    return block_covariance(system.block_rows(), fit.X, fit.T)
 
 
 def condition(factor: Factor, rank: int) -> float:
@@ -199,21 +256,30 @@ def outcome(system: System, fit: Solution) -> tuple[Status, str]:
     if fit.rank < b:
         silent = [group[0] for group in fit.groups if len(group) == 1]
         mixed = ["(" + ", ".join(group) + ")" for group in fit.groups if len(group) > 1]
-        parts = [f"The {system.weighted.rows} rows of this record have rank {fit.rank} for {b} parameters (unit columns)."]
+        parts = [
+            (
+                f"The {system.weighted.rows} rows of this record have rank {fit.rank} for {b} "
+                "parameters (unit columns)."
+            )
+        ]
         if silent:
             parts.append(f"No effect on these rows: {', '.join(silent)}.")
         if mixed:
             parts.append(
-                f"Cannot be told apart: {'; '.join(mixed)}; the values given are those of least norm and only their joint effect is meant."
+                f"Cannot be told apart: {'; '.join(mixed)}; the values given are those of least "
+                "norm and only their joint effect is meant."
             )
         parts.append(
-            "Likely causes: a motion that does not excite them (a joint at rest, one configuration, constant velocity), or columns that are not base "
-            "parameters of this robot. Use a richer motion, or leave names out with estimate.columns until one of each group is gone."
+            "Likely causes: a motion that does not excite them (a joint at rest, one "
+            "configuration, constant velocity), or columns that are not base "
+            "parameters of this robot. Use a richer motion, or leave names out with "
+            "estimate.columns until one of each group is gone."
         )
         return "rank-deficient", " ".join(parts)
     if system.weighted.rows <= b:
         return "no-redundancy", (
-            f"{system.weighted.rows} rows for {b} parameters: the fit is exact whatever the noise and no uncertainty can be stated. "
+            f"{system.weighted.rows} rows for {b} parameters: the fit is exact whatever the noise "
+            "and no uncertainty can be stated. "
             "Use a longer record or a smaller decimation factor."
         )
     return system.status, system.message
@@ -225,15 +291,23 @@ def describe(observation: Observation, model: GeneratedModel | None = None) -> d
         own = version("symgen")
     except PackageNotFoundError:
         own = "not installed"
-    robot: dict[str, Any] = {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
+    robot: dict[str, Any] = (
+        {} if model is None else {"robot": model.NAME, "robot_sha256": model.SOURCE_SHA256}
+    )
     if labels := getattr(model, "LABELS", {}):
         robot["labels"] = {f"q{j}": str(name) for j, name in labels.items()}
-    return {**robot, "files": dict(observation.files), "versions": {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__}}
+    return {
+        **robot,
+        "files": dict(observation.files),
+        "versions": {"symgen": own, "numpy": np.__version__, "scipy": scipy.__version__},
+    }
 
 
 def _undetermined(system: System, fit: Solution) -> list[int]:
     return [system.names.index(name) for group in fit.groups for name in group]
 
 
-def _percent(norm: float, of: float) -> float:
-    return 100 * norm / of if of > 0 else float("nan")
+def percent(error: Array | float, of: Array | float) -> float:
+    """100 ||error|| / ||of||, %; nan where `of` is zero."""
+    norm = float(np.linalg.norm(of))
+    return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")

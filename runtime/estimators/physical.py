@@ -1,4 +1,6 @@
-"""Estimates that no drive has: motor inertias and frictions that are certainly negative. The conditions themselves: `runtime.model.inertia`."""
+"""The robot itself: how large it is, and estimates that no drive has. The conditions of bodies:
+`runtime.model.inertia`.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +10,61 @@ from typing import Any
 import numpy as np
 
 from runtime.estimators.estimate import Estimate
-from runtime.model.generated import GeneratedModel
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, joint_units
 from runtime.model.inertia import SIGNED, is_form
 
-CERTAIN = 3.0  # deviations
+Array = np.ndarray
+
+FREE = {"rad": (-np.pi, np.pi), "m": (-1.0, 1.0)}  # range of a joint without limits
+
+
+def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
+    """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n);
+    None without poses, or where a loop does not close.
+    """
+    poses = getattr(model, "frame_poses", None)
+    try:
+        with np.errstate(all="ignore"):
+            return None if poses is None else np.asarray(poses(q))[:, :, :3, 3]
+    except ValueError:
+        return None
+
+
+def reach_of(model: GeneratedModel) -> float:
+    """Size of a robot, m: the largest distance between two of its frames in random poses, and once
+    more the longest link, whose end no frame marks.
+
+    Joints move within their limits; without them revolute joints turn anywhere, prismatic ones
+    move by 1 m to both sides of zero. nan where the frames say nothing.
+    """
+    limits = dict(getattr(model, "LIMITS", None) or {}).get("q")
+    spans = (
+        np.array([FREE[unit] for unit in joint_units(model)])
+        if limits is None
+        else np.array([(-x, x) if np.ndim(x) == 0 else x for x in limits], dtype=float)
+    )
+    rng = np.random.default_rng(0)
+    q = rng.uniform(spans[:, 0], spans[:, 1], (LIMIT.REACH_POSES, len(spans)))
+    origins = frame_origins(model, q)
+    if origins is None or origins.shape[1] < 2:
+        return float("nan")
+    links = np.linalg.norm(np.diff(origins, axis=1), axis=2)
+    spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
+    return float(spread.max() + links.max()) if spread.max() > 0 else float("nan")
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
-    """Motor inertias and frictions of their own column that are negative by more than CERTAIN corrected deviations: no drive has them."""
+    """Motor inertias and frictions of their own column that are negative by more than
+    LIMIT.CERTAIN_SIGN corrected deviations: no drive has them.
+    """
     elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
-    signed = {name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)}
+    signed = {
+        name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)
+    }
     sigma = np.fmax(fit.sigma, fit.sigma_corrected)
-    return tuple(name for i, name in enumerate(fit.names) if name in signed and fit.X[i] < -CERTAIN * sigma[i])
+    return tuple(
+        name
+        for i, name in enumerate(fit.names)
+        if name in signed and fit.X[i] < -LIMIT.CERTAIN_SIGN * sigma[i]
+    )

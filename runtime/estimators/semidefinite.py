@@ -1,18 +1,26 @@
 """Semidefinite programs over the standard parameters, as cone programs for Clarabel.
 
-    closest     min ||R chi - z||^2 + weight D(chi)    subject to  P >= least 1 of every condition, rows, chi in a Space
+    closest     min ||R chi - z||^2 + weight D(chi)    subject to
+            P >= least 1 of every condition, rows, chi in a Space
     extreme     min d'chi                              subject to  the same, ||R chi - z|| <= radius
-    margin      max t                                  subject to  P >= t 1 of every condition, rows, chi in a Space
+    margin      max t                                  subject to
+            P >= t 1 of every condition, rows, chi in a Space
 
-Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of chi = origin + basis w, with sizes near one as
-interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an equation, so that R is not squared (the euclidean
-distance, of unknowns in units of their size, is). A symmetric matrix enters by the columns of its upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and holds to
+Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of
+chi = origin + basis w, with sizes near one as
+interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an
+equation, so that R is not squared (the euclidean
+distance, of unknowns in units of their size, is). A symmetric matrix enters by the columns of its
+upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and
+holds to
 rounding. Clarabel is deterministic: same problem, same bits.
 
     entropic distance, without its constants     tr M - log det M,  M = L P L' with P0 = (L'L)^-1
-    log det M = max sum_i log Z_ii               [[M, Z], [Z', diag(Z_ii)]] >= 0,  Z lower triangular
+    log det M = max sum_i log Z_ii               [[M, Z], [Z', diag(Z_ii)]] >= 0,
+            Z lower triangular
 
-Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004), for the cones.
+Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004),
+for the cones.
 """
 
 from __future__ import annotations
@@ -27,17 +35,26 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
 
+from runtime.limits import LIMIT
 from runtime.model.inertia import Condition
 
 Array = np.ndarray
 Distance = Literal["none", "euclidean", "entropic", "pullback"]
 
-TOLERANCES = ((1e-12, 1e-11), (1e-9, 1e-9))  # of the gap and of the constraints, tried in this order
-STATUS = {"Solved": "optimal", "AlmostSolved": "optimal_inaccurate", "PrimalInfeasible": "infeasible", "AlmostPrimalInfeasible": "infeasible_inaccurate",
-          "DualInfeasible": "unbounded", "AlmostDualInfeasible": "unbounded_inaccurate"}  # fmt: skip
+TOLERANCES = (
+    (1e-12, 1e-11),
+    (1e-9, 1e-9),
+)  # of the gap and of the constraints, tried in this order
+STATUS = {
+    "Solved": "optimal",
+    "AlmostSolved": "optimal_inaccurate",
+    "PrimalInfeasible": "infeasible",
+    "AlmostPrimalInfeasible": "infeasible_inaccurate",
+    "DualInfeasible": "unbounded",
+    "AlmostDualInfeasible": "unbounded_inaccurate",
+}
 SOLVED = ("optimal", "optimal_inaccurate")
-FURTHEST = 1.0  # largest margin, SI, and ...
-LARGEST = 1e4  # largest unknown, in units of its size: the problem of `margin` has a solution whatever K leaves open
+# largest unknown, in units of its size: the problem of `margin` has a solution whatever K leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +69,9 @@ class LinearBounds:
     def without(self, name: str) -> LinearBounds:
         """The rows of other names."""
         kept = [k for k, own in enumerate(self.names) if own != name]
-        return LinearBounds(tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept])
+        return LinearBounds(
+            tuple(self.names[k] for k in kept), self.A[kept], self.lower[kept], self.upper[kept]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,19 +89,28 @@ def everything(scale: Array) -> Space:
 
 def solutions(K: Array, X: Array, scale: Array) -> Space:
     """Every chi with K chi = X, K of full row rank."""
-    return Space(scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale))
+    return Space(
+        scale * np.linalg.lstsq(K * scale, X, rcond=None)[0], scale[:, None] * null_space(K * scale)
+    )
 
 
 def within(space: Space, rows: LinearBounds) -> tuple[Space, LinearBounds]:
-    """`space` with the rows that are equations fulfilled (nearest to that where they contradict it), and the other rows."""
+    """`space` with the rows that are equations fulfilled (nearest to that where they contradict
+    it), and the other rows.
+    """
     equal = rows.lower == rows.upper
     others = LinearBounds(
-        tuple(n for n, e in zip(rows.names, equal, strict=True) if not e), *(x[~equal] for x in (rows.A, rows.lower, rows.upper))
+        tuple(n for n, e in zip(rows.names, equal, strict=True) if not e),
+        *(x[~equal] for x in (rows.A, rows.lower, rows.upper)),
     )
     if not equal.any():
         return space, others
     A = rows.A[equal]
-    origin = space.origin + space.basis @ np.linalg.lstsq(A @ space.basis, rows.lower[equal] - A @ space.origin, rcond=None)[0]
+    origin = (
+        space.origin
+        + space.basis
+        @ np.linalg.lstsq(A @ space.basis, rows.lower[equal] - A @ space.origin, rcond=None)[0]
+    )
     return Space(origin, space.basis @ null_space(A @ space.basis)), others
 
 
@@ -124,7 +152,8 @@ class Optimum:
     margin : float, SI
         t of a problem of `margin`; nan of others.
     duals : mapping of str to float
-        Trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands in the way.
+        Trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands
+        in the way.
     """
 
     status: str
@@ -139,11 +168,16 @@ class Optimum:
 
 
 class Program:
-    """A cone program in w of chi = origin + basis w and `more` further unknowns, built constraint by constraint."""
+    """A cone program in w of chi = origin + basis w and `more` further unknowns, built constraint
+    by constraint.
+    """
 
     def __init__(self, space: Space, more: int) -> None:
         self.space, self.m = space, space.basis.shape[1]
-        self.quadratic, self.linear = np.zeros((self.m + more, self.m + more)), np.zeros(self.m + more)
+        self.quadratic, self.linear = (
+            np.zeros((self.m + more, self.m + more)),
+            np.zeros(self.m + more),
+        )
         self.constraints: list[tuple[Any, Array, Array]] = []  # cone, A, b: b + A x in the cone
         self.multipliers: dict[str, slice] = {}  # of each condition
 
@@ -158,7 +192,9 @@ class Program:
         return A, M @ self.space.origin
 
     def conditions_hold(self, conditions: Sequence[Condition], least: float) -> None:
-        """P >= least 1 of every condition; of least 0: P >= t 1, t the last unknown, in a problem of `margin`."""
+        """P >= least 1 of every condition; of least 0: P >= t 1, t the last unknown, in a problem
+        of `margin`.
+        """
         start = sum(len(b) for _, _, b in self.constraints)
         triangles, ones = _triangles(tuple(conditions), len(self.space.origin))
         A, b = self.of_chi(triangles)
@@ -168,7 +204,13 @@ class Program:
         for c in conditions:
             n = c.B.shape[1]
             own = slice(end, end := end + n * (n + 1) // 2)
-            self.constraints.append((clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1), A[own], b[own]))
+            self.constraints.append(
+                (
+                    clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1),
+                    A[own],
+                    b[own],
+                )
+            )
             self.multipliers[c.name] = slice(start + own.start, start + own.stop)
 
     def rows_hold(self, rows: LinearBounds) -> None:
@@ -182,7 +224,11 @@ class Program:
         """||M chi - z|| <= radius."""
         A, b = self.of_chi(M)
         self.constraints.append(
-            (clarabel.SecondOrderConeT(1 + len(z)), np.vstack([self.unknowns(1), A]), np.concatenate([[radius], b - z]))
+            (
+                clarabel.SecondOrderConeT(1 + len(z)),
+                np.vstack([self.unknowns(1), A]),
+                np.concatenate([[radius], b - z]),
+            )
         )
 
     def at_least_zero(self, A: Array, b: Array) -> None:
@@ -191,7 +237,9 @@ class Program:
             self.constraints.append((clarabel.NonnegativeConeT(len(b)), A, b))
 
     def add_squares(self, first: int, M: Array, z: Array, weight: float) -> None:
-        """weight ||M chi - z||^2 in the criterion; the residual are unknowns from number `first` on."""
+        """weight ||M chi - z||^2 in the criterion; the residual are unknowns from number `first`
+        on.
+        """
         A, b = self.of_chi(M)
         own = np.arange(first, first + len(z))
         A[np.arange(len(z)), own] = -1.0
@@ -205,7 +253,9 @@ class Program:
         self.linear += 2 * weight * A.T @ (b - z)
 
     def add_entropy(self, first: int, B: Array, numbers: Sequence[int], weight: float) -> None:
-        """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n); Z and log Z_ii are unknowns from `first` on."""
+        """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n);
+        Z and log Z_ii are unknowns from `first` on.
+        """
         n, p = B.shape[1], len(self.space.origin)
         i, j = np.tril_indices(n)
         A, b = self.of_chi(on_standard(triangle(np.pad(B, ((0, 0), (0, n), (0, n)))), numbers, p))
@@ -219,7 +269,9 @@ class Program:
             E[0, logarithm] = E[2, first + place] = 1.0
             self.constraints.append((clarabel.ExponentialConeT(), E, np.array([0.0, 1.0, 0.0])))
             self.linear[logarithm] = -weight
-        self.linear[: self.m] += weight * np.trace(B, axis1=1, axis2=2) @ self.space.basis[list(numbers)]
+        self.linear[: self.m] += (
+            weight * np.trace(B, axis1=1, axis2=2) @ self.space.basis[list(numbers)]
+        )
 
     def solve(self) -> tuple[str, Array, dict[str, float]]:
         """Status, x, and the trace of the multiplier of each condition."""
@@ -231,11 +283,17 @@ class Program:
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
-            solution = clarabel.DefaultSolver(Q, self.linear, given, np.concatenate(b), list(cones), settings).solve()
+            solution = clarabel.DefaultSolver(
+                Q, self.linear, given, np.concatenate(b), list(cones), settings
+            ).solve()
             status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
             if status in SOLVED:
                 z = np.array(solution.z)
-                return status, np.array(solution.x), {name: trace(z[rows]) for name, rows in self.multipliers.items()}
+                return (
+                    status,
+                    np.array(solution.x),
+                    {name: trace(z[rows]) for name, rows in self.multipliers.items()},
+                )
         return status, np.full(len(self.linear), np.nan), {}
 
 
@@ -249,7 +307,8 @@ def closest(
     least: float,
     pull: Prior | None = None,
 ) -> Optimum:
-    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that ||z|| is about 1.
+    """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that
+    ||z|| is about 1.
 
     least : smallest eigenvalue of every condition, SI, not zero.
     """
@@ -271,7 +330,11 @@ def closest(
     program.rows_hold(rows)
     if pull is not None and pull.kind == "euclidean":
         numbers = list(pull.numbers)
-        program.add_squared(np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None], (pull.chi0 / pull.scale)[numbers], pull.weight)
+        program.add_squared(
+            np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None],
+            (pull.chi0 / pull.scale)[numbers],
+            pull.weight,
+        )
     first = program.m
     for M, value, weight in squares:
         program.add_squares(first, M, value, weight)
@@ -285,16 +348,26 @@ def closest(
 
 
 def extreme(
-    direction: Array, R: Array, z: Array, radius: float, conditions: Sequence[Condition], rows: LinearBounds, space: Space, *, least: float
+    direction: Array,
+    R: Array,
+    z: Array,
+    radius: float,
+    conditions: Sequence[Condition],
+    rows: LinearBounds,
+    space: Space,
+    *,
+    least: float,
 ) -> Optimum:
-    """The chi of `space` with the smallest direction'chi, direction of shape (p,), among those with ||R chi - z|| <= radius; scaled as for `closest`."""
+    """The chi of `space` with the smallest direction'chi, direction of shape (p,), among those with
+    ||R chi - z|| <= radius; scaled as for `closest`.
+    """
     space, rows = within(space, rows)
     program = Program(space, 0)
     program.linear[:] = direction @ space.basis
     program.conditions_hold(conditions, least)
     program.rows_hold(rows)
     program.within_ball(R, z, radius)
-    bounds = np.full(program.m, LARGEST)
+    bounds = np.full(program.m, LIMIT.LARGEST_UNKNOWN)
     program.at_least_zero(-np.eye(program.m), bounds)
     program.at_least_zero(np.eye(program.m), bounds)
     status, x, duals = program.solve()
@@ -302,14 +375,16 @@ def extreme(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical robot is in `space`."""
+    """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical
+    robot is in `space`.
+    """
     space, rows = within(space, rows)
     program = Program(space, 1)
     program.linear[-1] = -1.0
     program.conditions_hold(conditions, 0.0)
     program.rows_hold(rows)
-    bounds = np.full(program.m + 1, LARGEST)
-    bounds[-1] = FURTHEST
+    bounds = np.full(program.m + 1, LIMIT.LARGEST_UNKNOWN)
+    bounds[-1] = LIMIT.LARGEST_MARGIN
     program.at_least_zero(-np.eye(program.m + 1), bounds)
     program.at_least_zero(np.eye(program.m + 1)[:-1], bounds[:-1])
     status, x, duals = program.solve()
@@ -317,16 +392,22 @@ def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) ->
 
 
 def triangle(B: Array) -> Array:
-    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the diagonal times sqrt(2): shape (n (n + 1)/2, k)."""
+    """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the
+    diagonal times sqrt(2): shape (n (n + 1)/2, k).
+    """
     i, j, factor = _upper(B.shape[1])
     return np.asarray((B[:, i, j] * factor).T)
 
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Triangles of the conditions on p standard parameters, one below the other, shape (rows, p), and those of the identity, (rows,)."""
+    """Triangles of the conditions on p standard parameters, one below the other, shape (rows, p),
+    and those of the identity, (rows,).
+    """
     ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
-    return np.vstack([on_standard(triangle(c.B), c.numbers, p) for c in conditions] or [np.zeros((0, p))]), np.concatenate([*ones, []])
+    return np.vstack(
+        [on_standard(triangle(c.B), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
+    ), np.concatenate([*ones, []])
 
 
 @lru_cache(maxsize=32)
@@ -343,7 +424,9 @@ def trace(z: Array) -> float:
 
 
 def on_standard(M: Array, numbers: Sequence[int], p: int) -> Array:
-    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape (k, p)."""
+    """Columns of M, shape (k, len(numbers)), as those of all p standard parameters, shape
+    (k, p).
+    """
     spread = np.zeros((len(M), p))
     spread[:, list(numbers)] = M
     return spread

@@ -1,11 +1,16 @@
-"""Least squares from a triangular factor, with the rank of the record and the parameters it cannot tell apart.
+"""Least squares from a triangular factor, with the rank of the record and the parameters it cannot
+tell apart.
 
-With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition of a (b, b) matrix. Judged on unit columns,
-rank is the number of s_i above tolerance * s_1. Full rank: eq. (7) by back substitution, (W'W)^-1 = T T' with T = R_11^-1. Otherwise the
-solution of least norm in the units of D is taken, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2', the projector on the directions that leave
+With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition
+of a (b, b) matrix. Judged on unit columns,
+rank is the number of s_i above tolerance * s_1. Full rank: eq. (7) by back substitution, (W'W)^-1 =
+T T' with T = R_11^-1. Otherwise the
+solution of least norm in the units of D is taken, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2', the
+projector on the directions that leave
 W X unchanged, names the parameters: i and k are in one group when P_ik is not zero.
 
-Reference: Gautier (1991) for rank and groups by orthogonal factorisation; Golub and Van Loan, section 5.5.
+Reference: Gautier (1991) for rank and groups by orthogonal factorisation; Golub and Van Loan,
+section 5.5.
 """
 
 from __future__ import annotations
@@ -17,10 +22,8 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
 
-from runtime.observation.qr_factor import Array, Factor, triangularise
-
-PARTICIPATION = 1e-6
-"""Smallest entry of a unit null vector (unit columns of W) by which a parameter belongs to a group."""
+from runtime.limits import LIMIT
+from runtime.rows.factor import Array, Factor, triangularise
 
 
 @dataclass(frozen=True)
@@ -63,14 +66,17 @@ def unit_columns(R11: Array) -> tuple[Array, Array]:
 
 
 def rank_tolerance(factor: Factor) -> float:
-    """Default tolerance on s_i / s_1 with unit columns: r times the unit round-off, r the number of rows."""
+    """Default tolerance on s_i / s_1 with unit columns: r times the unit round-off, r the number of
+    rows.
+    """
     return float(max(factor.rows, len(factor.names)) * np.finfo(float).eps)
 
 
 def solve(factor: Factor, tolerance: float | None = None) -> Solution:
     """Least-squares solution of eq. (7) from R, rank-deficient or not.
 
-    tolerance : smallest s_i / s_1 (unit columns) that counts as rank; default `rank_tolerance(factor)`.
+    tolerance : smallest s_i / s_1 (unit columns) that counts as rank; default
+    `rank_tolerance(factor)`.
     """
     b = len(factor.names)
     tolerance = rank_tolerance(factor) if tolerance is None else tolerance
@@ -89,26 +95,34 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
     return Solution(T @ z, T, residual, rank, np.inf, null_groups(Vt[rank:], factor.names))
 
 
-def null_groups(V2t: Array, names: Sequence[str], participation: float = PARTICIPATION) -> tuple[tuple[str, ...], ...]:
-    """Names that trade against each other along the null directions V2t, shape (b - rank, b), orthonormal rows.
+def null_groups(
+    V2t: Array, names: Sequence[str], participation: float = LIMIT.NULL_PARTICIPATION
+) -> tuple[tuple[str, ...], ...]:
+    """Names that trade against each other along the null directions V2t, shape (b - rank, b),
+    orthonormal rows.
 
-    participation : |entry| of P = V_2 V_2' (diagonal: its square root) below which a parameter takes no part.
+    participation : |entry| of P = V_2 V_2' (diagonal: its square root) below which a parameter
+    takes no part.
     """
     P = V2t.T @ V2t
     part = np.flatnonzero(np.sqrt(np.diag(P)) > participation)
-    count, label = connected_components(np.abs(P[np.ix_(part, part)]) > participation, directed=False)
+    count, label = connected_components(
+        np.abs(P[np.ix_(part, part)]) > participation, directed=False
+    )
     return tuple(tuple(names[i] for i in part[label == g]) for g in range(count))
 
 
-def joint_scatter(factor: Factor, tolerance: float | None = None) -> tuple[float | None, ...]:
-    """s_j of each joint from its own least squares: s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j).
+def joint_scatter(factor: Factor, tolerance: float | None = None) -> Array:
+    """s_j of each joint from its own least squares, shape (n,): s_j^2 = ||Y_j - W_j X_j||^2 / (N_j
+    - b_j).
 
-    X_j is fitted to the rows of joint j alone and b_j = rank(W_j) with unit columns. None where a joint has no more rows than b_j.
+    X_j is fitted to the rows of joint j alone and b_j = rank(W_j) with unit columns. nan where a
+    joint has no more rows than b_j.
     """
-    scatter: list[float | None] = []
+    scatter = []
     for joint in factor.joints:
-        own = Factor(tuple(factor.names[i] for i in joint.columns), triangularise(joint.R), (joint,))
-        fit = solve(own, tolerance)
+        names = tuple(factor.names[i] for i in joint.columns)
+        fit = solve(Factor(names, triangularise(joint.R), (joint,)), tolerance)
         freedom = joint.rows - fit.rank
-        scatter.append(fit.residual_norm / np.sqrt(freedom) if freedom > 0 else None)
-    return tuple(scatter)
+        scatter.append(fit.residual_norm / np.sqrt(freedom) if freedom > 0 else np.nan)
+    return np.array(scatter)

@@ -1,126 +1,151 @@
-"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals in N m.
+"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals
+in N m.
 
     X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
 
 `weights` says where s_j comes from:
 
-    joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint j alone, b_j = rank W_j. Exactly invariant
+    joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint
+                j alone, b_j = rank W_j. Exactly invariant
                 under scaling of Y and W of one joint.
-    iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until every s_j changes by less than 1e-3.
-    covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n rows of one instant times L^-1, L L' = Omega.
+    iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until
+                every s_j changes by less than 1e-3.
+    covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n
+    rows of one instant times L^-1, L L' = Omega.
 
 The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from runtime.errors import SettingsError
-from runtime.estimators import ols
 from runtime.estimators.estimate import Status
-from runtime.estimators.linear import OPTIONS, System, checked_options, raw_factor
+from runtime.estimators.linear import LinearOptions, System, ordinary
 from runtime.estimators.solution import joint_scatter, solve
-from runtime.observation.qr_factor import Factor, factor
-from runtime.observation.system import Observation, whitened
+from runtime.limits import LIMIT
+from runtime.rows.factor import Factor, factor
+from runtime.rows.observation import Observation, whitened
 from runtime.settings.study import EstimateSettings
 
-CONVERGED = 1e-3
-"""Relative change of every s_j at which iterated weights have converged."""
-EXACT = 1e-12
-"""Residual over torque (rms) below which a joint is fitted exactly; what remains is rounding and says nothing about weights."""
-PASSES = 50
-"""Largest number of passes of iterated weights; option `passes`."""
 
-
-def system(observation: Observation, settings: EstimateSettings) -> System:
-    """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been named."""
-    checked_options(settings, (*OPTIONS, "passes"))
-    raw = raw_factor(observation, settings)
+def weighted(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been
+    named.
+    """
+    start = _by_joint(observation, settings, options)
     if settings.weights == "covariance":
         observation.require_rows("weights: covariance")
-        return _covariance(observation, settings, raw)
-    start = _by_joint(observation, settings, raw)
+        return _covariance(start)
     return _iterated(start) if settings.weights == "iterated" else start
 
 
-def least_squares(observation: Observation, settings: EstimateSettings, options: Mapping[str, Any]) -> System:
-    """The rows as `settings.weights` asks, those of ols for "none"; options : block, rank_tolerance, passes where given."""
-    given = {key: value for key, value in options.items() if value is not None}
-    if settings.weights == "none":
-        return ols.system(observation, EstimateSettings("ols", "none", settings.columns, given))
-    return system(observation, EstimateSettings("wls", settings.weights, settings.columns, given))
+def by_weights(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """The rows as `settings.weights` asks, as they are for "none"."""
+    rows = ordinary if settings.weights == "none" else weighted
+    return rows(observation, settings, options)
 
 
-def _by_joint(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
-    scales = _first_scales(raw, settings.options.get("rank_tolerance"))
-    weighted = raw.weighted(1 / scales)
-    return System(observation, settings, raw, weighted, tuple(scales.tolist()), known_variance=True, options=settings.options)
-
-
-def _first_scales(raw: Factor, tolerance: float | None) -> np.ndarray:
-    """s_j from joint j alone; from the common ordinary least squares where joint j has too few rows. Never zero."""
-    fit = solve(raw, tolerance)
-    own = joint_scatter(raw, tolerance)
-    return floored(raw, np.array([c if s is None else s for s, c in zip(own, common_scales(raw, fit.X, fit.rank), strict=True)]))
+def _by_joint(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """s_j from joint j alone; from the common ordinary least squares where joint j has too few
+    rows. Never zero.
+    """
+    system = ordinary(observation, settings, options)
+    raw, fit = system.raw, system.solve()
+    own = joint_scatter(raw, options.rank_tolerance)
+    common = common_scales(raw, fit.X, fit.rank)
+    scales = floored(raw, np.where(np.isnan(own), common, own))
+    return replace(
+        system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known_variance=True
+    )
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
-    """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost degrees of freedom."""
+    """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost
+    degrees of freedom.
+    """
     share = max(1 - rank / raw.rows, 1 / raw.rows)
-    return np.array([joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints])
+    return np.array(
+        [joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints]
+    )
 
 
 def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
-    """Scales not below EXACT times the rms of Y_j: an exact fit of a joint must not weigh infinitely."""
-    rounding = [EXACT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints]
+    """Scales not below LIMIT.EXACT_FIT times the rms of Y_j: an exact fit of a joint must not weigh
+    infinitely.
+    """
+    rounding = [
+        LIMIT.EXACT_FIT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints
+    ]
     least = np.maximum(scales, rounding)
     smallest = least[least > 0].min(initial=np.inf)
     return np.where(least > 0, least, smallest if np.isfinite(smallest) else 1.0)
 
 
 def _iterated(start: System) -> System:
-    raw, tolerance = start.raw, start.options.get("rank_tolerance")
-    limit = int(start.options.get("passes", PASSES))
+    raw, tolerance = start.raw, start.options.rank_tolerance
+    limit = start.options.passes
     scales, change, done, rank = np.array(start.scales), np.inf, 0, solve(raw, tolerance).rank
-    while change >= CONVERGED and done < limit:
+    while change >= LIMIT.WLS_CONVERGED and done < limit:
         new = floored(raw, common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, rank))
         change = float(np.max(np.abs(new / scales - 1)))
         scales, done = new, done + 1
     status: Status = "ok"
     message = ""
-    if change >= CONVERGED:
+    if change >= LIMIT.WLS_CONVERGED:
         status = "not-converged"
         message = (
-            f"The weights of the joints still change by {change:.1e} after {limit} passes (limit {CONVERGED}). "
+            f"The weights of the joints still change by {change:.1e} after {limit} passes (limit "
+            f"{LIMIT.WLS_CONVERGED}). "
             "Raise estimate.options.passes, or use weights: joint, which needs none."
         )
-    weighted = raw.weighted(1 / scales)
-    return replace(start, weighted=weighted, scales=tuple(scales.tolist()), iterations=done, status=status, message=message)
+    return replace(
+        start,
+        weighted=raw.weighted(1 / scales),
+        scales=tuple(scales.tolist()),
+        iterations=done,
+        status=status,
+        message=message,
+    )
 
 
-def _covariance(observation: Observation, settings: EstimateSettings, raw: Factor) -> System:
+def _covariance(start: System) -> System:
+    """The rows of one instant times L^-1; those of `start` where the residuals are dependent."""
+    observation, raw = start.observation, start.raw
     n, N = observation.n, observation.rows[0]
-    same = set(observation.rows) == {N} and all(np.array_equal(observation.t[:N], observation.t[observation.joint(j)]) for j in range(n))
+    same = set(observation.rows) == {N} and all(
+        np.array_equal(observation.t[:N], observation.t[observation.joint(j)]) for j in range(n)
+    )
     if not same:
         counts = ", ".join(map(str, observation.rows))
-        message = f"covariance needs every joint at every instant; rows per joint are {counts}. Use weights: joint, or rows.low_speed: 0"
+        message = (
+            f"covariance needs every joint at every instant; rows per joint are {counts}. "
+            "Use weights: joint, or rows.low_speed: 0"
+        )
         raise SettingsError(message, path=("estimate", "weights"))
     W = observation.columns(raw.names).W
-    fit = solve(raw, settings.options.get("rank_tolerance"))
+    fit = solve(raw, start.options.rank_tolerance)
     E = (observation.Y - W @ fit.X).reshape(n, N)
     Omega = E @ E.T / max(N - fit.rank / n, 1)
     try:
         whitener = solve_triangular(cholesky(Omega, lower=True), np.eye(n), lower=True)
     except LinAlgError:
-        message = "The residuals of the joints are linearly dependent (an exact fit, or fewer instants than joints); weights by joint were used instead."
-        return replace(_by_joint(observation, settings, raw), status="singular-weights", message=message)
+        message = (
+            "The residuals of the joints are linearly dependent (an exact fit, or fewer "
+            "instants than joints); weights by joint were used instead."
+        )
+        return replace(start, status="singular-weights", message=message)
     whole = whitened(np.column_stack([W, observation.Y]), whitener)
-    weighted = factor(whole[:, :-1], whole[:, -1], observation.rows, raw.names)
+    whole_factor = factor(whole[:, :-1], whole[:, -1], observation.rows, raw.names)
     scales = tuple(np.sqrt(np.diag(Omega)).tolist())
-    return System(observation, settings, raw, weighted, scales, whitener, known_variance=True, options=settings.options)
+    return replace(start, weighted=whole_factor, scales=scales, whitener=whitener)

@@ -1,18 +1,24 @@
-"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter, section 2.2.3).
+"""How well a motion lets the parameters be identified, and the limits that it must keep (chapter,
+section 2.2.3).
 
-The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by the deviation s_j of its torque, columns multiplied by the
+The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by
+the deviation s_j of its torque, columns multiplied by the
 size of their parameter, so that parameters are compared by their relative error.
 
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
                                           logdet    -log det W_w'W_w
                                           sigma     largest %sigma_i, the root of the diagonal of C
-                                          record  largest %sigma_i over that of the motion of a record: sigma with the deviations there as sizes
+                                          record  largest %sigma_i over that of the motion of a
+                                          record: sigma with the deviations there as sizes
     C = A W_w'Omega W_w A, A = (W_w'W_w)^-1       predicted covariance of X_i/|X_i|
 
-Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which costs a tenth of the precision or more.
+Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which
+costs a tenth of the precision or more.
 
-W is that of the identification: the motion, sampled at the controller rate, goes through the filters and the decimation of the study.
-Parameters smaller than a hundredth of the largest of their unit count as if they had that size. `runtime.excitation.search` searches the motion.
+W is that of the identification: the motion, sampled at the controller rate, goes through the
+filters and the decimation of the study.
+Parameters smaller than a hundredth of the largest of their unit count as if they had that size.
+`runtime.excitation.search` searches the motion.
 """
 
 from __future__ import annotations
@@ -24,19 +30,19 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
+from runtime.loop.dry_friction import dry_friction
 from runtime.model.generated import GeneratedModel, base_columns, require
-from runtime.motion.dry_friction import dry_friction
-from runtime.observation.filters import decimation_factor
-from runtime.observation.noise_gain import bandwidth
-from runtime.observation.observation import Observation, observe
 from runtime.records.record import Record
+from runtime.rows.observation import Observation
+from runtime.rows.observe import observe
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Signals, Study
 from runtime.settings.trajectories import Motion
+from runtime.signals.filters import decimation_factor
+from runtime.signals.noise_gain import bandwidth
 
 Array = np.ndarray
-
-SMALLEST = 0.01  # of the largest parameter of the same unit: what a smaller one counts as
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +68,9 @@ class MotionLimits:
     def of(self, share: float) -> MotionLimits:
         """The limits with `share` of each kept free; of a range, of its half width."""
         middle, half = (self.lower + self.upper) / 2, (1 - share) * (self.upper - self.lower) / 2
-        return MotionLimits(middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau)))
+        return MotionLimits(
+            middle - half, middle + half, *((1 - share) * x for x in (self.qd, self.qdd, self.tau))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,30 +93,39 @@ class Weights:
 
     def matrix(self, observation: Observation) -> Array:
         """W_w, shape (r, c)."""
-        return np.asarray(observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size)
+        return np.asarray(
+            observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size
+        )
 
     def condition(self, observation: Observation) -> float:
         """Condition number of W_w; inf where it is singular."""
         values = np.linalg.svd(np.linalg.qr(self.matrix(observation), mode="r"), compute_uv=False)
         return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
 
-    def relative_sigma(self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)) -> Array:
+    def relative_sigma(
+        self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)
+    ) -> Array:
         """Predicted %sigma of the parameters, shape (c,), of their size.
 
-        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart (`kept_correlation`).
+        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart
+        (`kept_correlation`).
         """
         W = self.matrix(observation)
         inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
         spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
         instant = np.rint((observation.t - observation.t.min()) * observation.rate).astype(int)
-        instant += observation.record * (int(instant.max(initial=0)) + len(correlation))  # no two records are neighbours
+        instant += observation.record * (
+            int(instant.max(initial=0)) + len(correlation)
+        )  # no two records are neighbours
         known = np.append(correlation, 0.0)
         for j in range(observation.n):
             own = observation.joint(j)
             acting = np.flatnonzero(W[own].any(axis=0))
             at, rows = instant[own], W[own][:, acting]
             upper = correlation[0] / 2 * rows  # Omega W_j, of Omega the upper half alone
-            for k in range(1, len(correlation)):  # rows: as many periods apart, or more where some between are left out
+            for k in range(
+                1, len(correlation)
+            ):  # rows: as many periods apart, or more where some between are left out
                 r = known[np.minimum(at[k:] - at[:-k], len(correlation))]
                 upper[:-k] += r[:, None] * rows[k:]
             product = rows.T @ upper
@@ -139,78 +156,139 @@ class Excess:
     time: float
 
     def __str__(self) -> str:
-        return f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, limit {self.limit:.4g}"
+        return (
+            f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, "
+            "limit "
+            f"{self.limit:.4g}"
+        )
 
 
 def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
-    """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has none."""
+    """The limits of the robot file, changed by `given`; raises SettingsError where q, qd or qdd has
+    none.
+    """
     n = len(model.JOINTS)
     known = {**dict(getattr(model, "LIMITS", None) or {}), **given}
     missing = [name for name in ("q", "qd", "qdd") if known.get(name) is None]
     if missing:
-        raise SettingsError(f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the robot file", path=("limits",))
+        raise SettingsError(
+            (
+                f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the "
+                "robot "
+                "file"
+            ),
+            path=("limits",),
+        )
     unknown = known.keys() - {"q", "qd", "qdd", "tau"}
     if unknown:
-        raise SettingsError(f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",))
+        raise SettingsError(
+            f"no limit {', '.join(sorted(unknown))}; there are q, qd, qdd, tau", path=("limits",)
+        )
     largest = {}
     for name in ("qd", "qdd", "tau"):
-        largest[name] = np.array(np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,)))
+        largest[name] = np.array(
+            np.broadcast_to(np.asarray(known.get(name, np.inf), dtype=float), (n,))
+        )
         if not np.all(largest[name] > 0):
-            raise SettingsError(f"{name}: {largest[name].tolist()}; expected more than 0", path=("limits", name))
-    ranges = [(-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]]
+            raise SettingsError(
+                f"{name}: {largest[name].tolist()}; expected more than 0", path=("limits", name)
+            )
+    ranges = [
+        (-float(x), float(x)) if np.ndim(x) == 0 else tuple(map(float, x)) for x in known["q"]
+    ]
     if len(ranges) != n or any(len(x) != 2 or not x[0] < x[1] for x in ranges):
-        raise SettingsError(f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q"))
+        raise SettingsError(
+            f"{known['q']}; expected {n} numbers or pairs (lower, upper)", path=("limits", "q")
+        )
     lower, upper = np.array(ranges).T
     return MotionLimits(lower, upper, **largest)
 
 
 def weights_of(
-    model: GeneratedModel, settings: ExcitationSettings, X: Mapping[str, float], *, essential: Sequence[str] = (), s: Sequence[float] = ()
+    model: GeneratedModel,
+    settings: ExcitationSettings,
+    X: Mapping[str, float],
+    *,
+    essential: Sequence[str] = (),
+    s: Sequence[float] = (),
 ) -> Weights:
-    """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an estimate where there is one."""
+    """Columns, deviations and sizes from the parameters X by name; `essential`, `s`: those of an
+    estimate where there is one.
+    """
     n = len(model.JOINTS)
     names = base_columns(model, settings.columns, essential or model.BASE_PARAMETERS, "columns")
     deviation = np.array(settings.torque_sigma or tuple(s) or (1.0,) * n, dtype=float)
     if deviation.shape != (n,) or not np.all(deviation > 0):
-        raise SettingsError(f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",))
+        raise SettingsError(
+            f"{deviation.tolist()}; expected {n} numbers above 0", path=("torque_sigma",)
+        )
     units = dict(getattr(model, "UNITS", {}))
     largest: dict[str, float] = {}
     for name in names:
         largest[units.get(name, "")] = max(largest.get(units.get(name, ""), 0.0), abs(X[name]))
     if not all(largest.values()):
         raise InputError(
-            f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give values in the robot file or an estimate"
+            f"every parameter in {', '.join(u for u, x in largest.items() if not x)} is zero; give "
+            "values in the robot file or an estimate"
         )
-    return Weights(names, deviation, np.array([max(abs(X[name]), SMALLEST * largest[units.get(name, "")]) for name in names]))
+    return Weights(
+        names,
+        deviation,
+        np.array(
+            [
+                max(abs(X[name]), LIMIT.SMALLEST_SIZE * largest[units.get(name, "")])
+                for name in names
+            ]
+        ),
+    )
 
 
 def criterion_of(weights: Weights, observation: Observation, criterion: str) -> float:
     """The criterion on the rows of the identification, exact; smaller is better."""
     if criterion == "cond":
         return weights.condition(observation)
-    if criterion in ("sigma", "record"):  # white residuals: the order of candidates does not depend on it
+    if criterion in (
+        "sigma",
+        "record",
+    ):  # white residuals: the order of candidates does not depend on it
         return float(weights.relative_sigma(observation).max())
-    return float(-2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(observation), mode="r"))))))
+    return float(
+        -2 * np.sum(np.log(np.abs(np.diag(np.linalg.qr(weights.matrix(observation), mode="r")))))
+    )
 
 
 def kept_correlation(signals: Signals, rate: float) -> Array:
-    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the torque noise is white at `rate`, Hz."""
+    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the
+    torque noise is white at `rate`, Hz.
+    """
     factor = decimation_factor(signals, rate)
-    kept = bandwidth(replace(signals, median=1), rate).decimation[::factor] if factor > 1 else np.ones(1)
+    kept = (
+        bandwidth(replace(signals, median=1), rate).decimation[::factor]
+        if factor > 1
+        else np.ones(1)
+    )
     return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
 
 
 def planned(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
-    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time window of the rows is left out."""
+    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time
+    window of the rows is left out.
+    """
     t, q, *_ = motion.sampled(rate)
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
     return observe(model, record, replace(study, rows=replace(study.rows, window=(None, None))))
 
 
 def excesses(
-    model: GeneratedModel, motion: Motion, limits: MotionLimits, settings: ExcitationSettings, X: Array, rate: float | None = None
+    model: GeneratedModel,
+    motion: Motion,
+    limits: MotionLimits,
+    settings: ExcitationSettings,
+    X: Array,
+    rate: float | None = None,
 ) -> list[Excess]:
-    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint and quantity. Distances are not among them.
+    """Limits that the motion exceeds on the grid of the controller: the worst instant of each joint
+    and quantity. Distances are not among them.
 
     The rate of the torque is that without dry friction, whose jump at a reversal no motion avoids.
     """
@@ -226,9 +304,23 @@ def excesses(
     ]
     if settings.torque_rate:
         smooth = model.inverse_dynamics(q, qd, qdd, X * dry_friction(model).smooth)
-        bounds.append(("rate of torque", np.abs(np.gradient(smooth, t, axis=0)), -free, np.array(settings.torque_rate)))
+        bounds.append(
+            (
+                "rate of torque",
+                np.abs(np.gradient(smooth, t, axis=0)),
+                -free,
+                np.array(settings.torque_rate),
+            )
+        )
     if settings.torque_rms:
-        bounds.append(("rms torque", np.sqrt(np.mean(tau**2, axis=0))[None], -free, np.array(settings.torque_rms)))
+        bounds.append(
+            (
+                "rms torque",
+                np.sqrt(np.mean(tau**2, axis=0))[None],
+                -free,
+                np.array(settings.torque_rms),
+            )
+        )
     exceeded = []
     for what, x, lower, upper in bounds:
         beyond = np.maximum(x - upper, lower - x)
@@ -240,11 +332,19 @@ def excesses(
     return exceeded
 
 
-def usage(model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array) -> dict[str, list[float]]:
-    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a range, measured from its middle."""
+def usage(
+    model: GeneratedModel, motion: Motion, limits: MotionLimits, rate: float, X: Array
+) -> dict[str, list[float]]:
+    """Largest share of each limit that the motion uses at `rate`, Hz, by quantity and joint; of a
+    range, measured from its middle.
+    """
     _, q, qd, qdd = motion.sampled(rate)
     middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
-    shares = {"position": (q - middle) / half, "velocity": qd / limits.qd, "acceleration": qdd / limits.qdd}
+    shares = {
+        "position": (q - middle) / half,
+        "velocity": qd / limits.qd,
+        "acceleration": qdd / limits.qdd,
+    }
     if np.isfinite(limits.tau).any():
         shares["torque"] = model.inverse_dynamics(q, qd, qdd, X) / limits.tau
     return {what: np.abs(x).max(axis=0).tolist() for what, x in shares.items()}

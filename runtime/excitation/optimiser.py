@@ -1,11 +1,15 @@
-"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the limits.
+"""IPOPT on CasADi's functions: from a random start to a motion of small criterion within the
+limits.
 
-From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the scale of a column, then the criterion itself.
+From each start, first -log det(W_w'W_w) is lowered, which is smooth and does not depend on the
+scale of a column, then the criterion itself.
 Condition numbers and largest deviations are followed by the smooth bounds
 
-    cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),     A = W_w'W_w, C = A^-1.
+    cond^2 <= (tr A^8 tr C^8)^(1/8),     max_i C_ii <= (sum_i C_ii^8)^(1/8),
+            A = W_w'W_w, C = A^-1.
 
-Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), but for the rate of the torque, which leaves dry friction out.
+Limits hold at the points of the grid, with a margin. sign(qd) is tanh(qd/v0), but for the rate of
+the torque, which leaves dry friction out.
 """
 
 from __future__ import annotations
@@ -20,14 +24,13 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.excitation.criteria import MotionLimits, Weights
 from runtime.excitation.result import Start
+from runtime.limits import LIMIT
 from runtime.model.casadi import SymbolicModel, load_symbolic
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.families import Fourier
 from runtime.settings.trajectories import Motion, Part
 
 Array = np.ndarray
-
-SOFT = 1e-6  # violation of a constraint that IPOPT aims at, of its scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,8 @@ class Problem:
         All base parameters, for torques.
     smooth : ndarray, shape (b,), 0 or 1
         0 for the parameters of dry friction.
+    trust : bool
+        Run the file though it was not emitted here.
     """
 
     path: str
@@ -53,33 +58,48 @@ class Problem:
     limits: MotionLimits
     X: Array
     smooth: Array
+    trust: bool = False
 
 
 def one_start(problem: Problem, number: int) -> Start:
     """The motion that IPOPT reaches from the random start `number`."""
     rng = np.random.default_rng([problem.settings.seed, number])
-    guess = Motion(tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.families))
+    guess = Motion(
+        tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.families)
+    )
     return improved(problem, number, guess)
 
 
 def improved(problem: Problem, number: int, guess: Motion) -> Start:
     """The motion that IPOPT reaches from `guess`."""
     settings, n = problem.settings, len(problem.weights.s)
-    symbolic = load_symbolic(problem.path)
+    symbolic = load_symbolic(problem.path, trust=problem.trust)
     p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.families)]
     q, qd, qdd = _states(settings, p)
     A = _information(symbolic, settings, problem.weights, q, qd, qdd)
     g, lower, upper = _constraints(symbolic, problem, p, q, qd, qdd)
-    least, most = (np.concatenate([np.tile(family.bounds()[k], n) for family in settings.families]) for k in (0, 1))
+    least, most = (
+        np.concatenate([np.tile(family.bounds()[k], n) for family in settings.families])
+        for k in (0, 1)
+    )
     nlp = {"x": ca.vertcat(*(ca.vec(part) for part in p)), "g": g}
     x = np.concatenate([part.p.ravel(order="F") for part in guess.parts])
-    reached = _minimised({**nlp, "f": _logdet(A)}, x, (least, most), (lower, upper), settings.iterations)
+    reached = _minimised(
+        {**nlp, "f": _logdet(A)}, x, (least, most), (lower, upper), settings.iterations
+    )
     if settings.criterion != "logdet":
-        reached = _minimised({**nlp, "f": _spread(A, settings.criterion)}, reached[0], (least, most), (lower, upper), settings.iterations)
+        reached = _minimised(
+            {**nlp, "f": _spread(A, settings.criterion)},
+            reached[0],
+            (least, most),
+            (lower, upper),
+            settings.iterations,
+        )
     x, criterion, violation, message = reached
     sizes = np.cumsum([part.p.size for part in guess.parts])[:-1]
     parts = [
-        Part(part.family, values.reshape(part.p.shape, order="F")) for part, values in zip(guess.parts, np.split(x, sizes), strict=True)
+        Part(part.family, values.reshape(part.p.shape, order="F"))
+        for part, values in zip(guess.parts, np.split(x, sizes), strict=True)
     ]
     return Start(number, Motion(tuple(parts)).to_mapping(), criterion, message, violation)
 
@@ -94,14 +114,23 @@ def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, A
     return q, qd, qdd
 
 
-def _information(symbolic: SymbolicModel, settings: ExcitationSettings, weights: Weights, q: Any, qd: Any, qdd: Any) -> Any:
+def _information(
+    symbolic: SymbolicModel,
+    settings: ExcitationSettings,
+    weights: Weights,
+    q: Any,
+    qd: Any,
+    qdd: Any,
+) -> Any:
     """A = sum_j W_wj'W_wj over the grid, shape (c, c)."""
     n, M = len(weights.s), q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
     D = smoothed(symbolic.regressor, settings.smooth)(*inputs, *symbolic.CONSTANTS.values())
     numbers = [list(symbolic.BASE_PARAMETERS).index(name) for name in weights.names]
     weighted = ca.mtimes(ca.mtimes(ca.diag(1 / weights.s), D[:, numbers]), ca.diag(weights.size))
-    rows = [ca.Function("row", inputs, [weighted[j, :].T]).map(M)(q.T, qd.T, qdd.T) for j in range(n)]
+    rows = [
+        ca.Function("row", inputs, [weighted[j, :].T]).map(M)(q.T, qd.T, qdd.T) for j in range(n)
+    ]
     return sum(ca.mtimes(row, row.T) for row in rows) / M
 
 
@@ -121,7 +150,9 @@ def _spread(A: Any, criterion: str) -> Any:
     return (ca.log(ca.sumsqr(A4)) + ca.log(ca.sumsqr(C4))) / 8
 
 
-def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any) -> tuple[Any, Array, Array]:
+def _constraints(
+    symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any
+) -> tuple[Any, Array, Array]:
     """g(p) with its bounds, each divided by its scale."""
     settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
     M = q.shape[0]
@@ -134,12 +165,15 @@ def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q:
     rows += _distances(symbolic, settings, q)
     ends = []
     for k, (family, coefficients) in enumerate(zip(settings.families, p, strict=True)):
-        begin, end = ([x.T for x in _at(family, coefficients, np.array([t]))] for t in (0.0, family.duration))
+        begin, end = (
+            [x.T for x in _at(family, coefficients, np.array([t]))] for t in (0.0, family.duration)
+        )
         if isinstance(family, Fourier):
             rows += [(begin[1] / limits.qd, 0.0, 0.0), (begin[2] / limits.qdd, 0.0, 0.0)]
         speed = getattr(family, "speed", None)
         if speed is not None:
-            middles = family.blend / 2 + family.travel * (np.arange(family.points - 1) + 0.5)  # type: ignore[attr-defined]
+            shaped: Any = family  # of points: it has a speed
+            middles = shaped.blend / 2 + shaped.travel * (np.arange(shaped.points - 1) + 0.5)
             rows.append((_at(family, coefficients, middles)[1].T / speed, -1.0, 1.0))
         ends.append((begin[0], end[0]))
         if k:
@@ -147,11 +181,18 @@ def _constraints(symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q:
         elif settings.begin is not None:
             rows.append(((begin[0] - np.array(settings.begin)) / half, 0.0, 0.0))
     g = [ca.vec(expression) for expression, *_ in rows]
-    lower, upper = (np.concatenate([np.full(part.numel(), bound[k]) for part, (_, *bound) in zip(g, rows, strict=True)]) for k in (0, 1))
+    lower, upper = (
+        np.concatenate(
+            [np.full(part.numel(), bound[k]) for part, (_, *bound) in zip(g, rows, strict=True)]
+        )
+        for k in (0, 1)
+    )
     return ca.vertcat(*g), lower, upper
 
 
-def _torques(symbolic: SymbolicModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any) -> list[tuple[Any, float, float]]:
+def _torques(
+    symbolic: SymbolicModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any
+) -> list[tuple[Any, float, float]]:
     """Torques, their root mean squares and rates of change, where they are limited."""
     settings = problem.settings
     limited = np.isfinite(limits.tau)
@@ -162,41 +203,88 @@ def _torques(symbolic: SymbolicModel, problem: Problem, limits: MotionLimits, q:
     dynamics = smoothed(symbolic.inverse_dynamics, settings.smooth)
 
     def torque(X: Array) -> Any:
-        function = ca.Function("torque", inputs, [dynamics(*inputs, X, *symbolic.CONSTANTS.values())])
+        function = ca.Function(
+            "torque", inputs, [dynamics(*inputs, X, *symbolic.CONSTANTS.values())]
+        )
         return function.map(M)(q.T, qd.T, qdd.T).T
 
     tau, share = torque(problem.X), 1 - settings.margin
-    rows: list[tuple[Any, float, float]] = [(tau[:, j] / limits.tau[j], -1.0, 1.0) for j in np.flatnonzero(limited).tolist()]
+    rows: list[tuple[Any, float, float]] = [
+        (tau[:, j] / limits.tau[j], -1.0, 1.0) for j in np.flatnonzero(limited).tolist()
+    ]
     if settings.torque_rms:
-        rows.append((ca.sum1(tau**2).T / M / (share * np.array(settings.torque_rms)) ** 2, 0.0, 1.0))
+        rows.append(
+            (ca.sum1(tau**2).T / M / (share * np.array(settings.torque_rms)) ** 2, 0.0, 1.0)
+        )
     if settings.torque_rate:
         smooth = torque(problem.X * problem.smooth)
-        rows.append(((smooth[1:, :] - smooth[:-1, :]) * settings.grid / _rows(share * np.array(settings.torque_rate), M - 1), -1.0, 1.0))
+        rows.append(
+            (
+                (smooth[1:, :] - smooth[:-1, :])
+                * settings.grid
+                / _rows(share * np.array(settings.torque_rate), M - 1),
+                -1.0,
+                1.0,
+            )
+        )
     return rows
 
 
-def _distances(symbolic: SymbolicModel, settings: ExcitationSettings, q: Any) -> list[tuple[Any, float, float]]:
-    """Squared distances of the spheres that stay apart, of the square of the smallest they may have."""
+def _distances(
+    symbolic: SymbolicModel, settings: ExcitationSettings, q: Any
+) -> list[tuple[Any, float, float]]:
+    """Squared distances of the spheres that stay apart, of the square of the smallest they may
+    have.
+    """
     if not settings.pairs:
         return []
     n, M = q.shape[1], q.shape[0]
     at = ca.SX.sym("q", n)
     frame_poses: Any = getattr(symbolic, "frame_poses", None)
     if frame_poses is None:
-        raise InputError("this casadi module has no frame_poses, which distances need; emit it again")
-    poses = dict(zip(frame_poses.name_out(), frame_poses(at, *symbolic.CONSTANTS.values()), strict=True))
-    unknown = [sphere.frame for sphere in settings.spheres if f"T{sphere.frame}" not in poses and sphere.frame != 0]
+        raise InputError(
+            "this casadi module has no frame_poses, which distances need; emit it again"
+        )
+    poses = dict(
+        zip(frame_poses.name_out(), frame_poses(at, *symbolic.CONSTANTS.values()), strict=True)
+    )
+    unknown = [
+        sphere.frame
+        for sphere in settings.spheres
+        if f"T{sphere.frame}" not in poses and sphere.frame != 0
+    ]
     if unknown:
-        raise InputError(f"no frame {unknown[0]} that could carry a sphere; there are 0, {', '.join(name[1:] for name in poses)}")
+        raise InputError(
+            f"no frame {unknown[0]} that could carry a sphere; there are 0, "
+            f"{', '.join(name[1:] for name in poses)}"
+        )
     poses["T0"] = ca.SX.eye(4)
-    centres = [ca.mtimes(poses[f"T{s.frame}"], ca.vertcat(*s.centre, 1.0))[:3] for s in settings.spheres]
-    smallest = [settings.spheres[a].radius + settings.spheres[b].radius + settings.gap for a, b in settings.pairs]
-    squares = [ca.sumsqr(centres[a] - centres[b]) / d**2 for (a, b), d in zip(settings.pairs, smallest, strict=True)]
-    return [(ca.Function("apart", [at], [ca.vertcat(*squares)]).map(M)(q.T), 1.0 + 2 * settings.margin, np.inf)]
+    centres = [
+        ca.mtimes(poses[f"T{s.frame}"], ca.vertcat(*s.centre, 1.0))[:3] for s in settings.spheres
+    ]
+    smallest = [
+        settings.spheres[a].radius + settings.spheres[b].radius + settings.gap
+        for a, b in settings.pairs
+    ]
+    squares = [
+        ca.sumsqr(centres[a] - centres[b]) / d**2
+        for (a, b), d in zip(settings.pairs, smallest, strict=True)
+    ]
+    return [
+        (
+            ca.Function("apart", [at], [ca.vertcat(*squares)]).map(M)(q.T),
+            1.0 + 2 * settings.margin,
+            np.inf,
+        )
+    ]
 
 
 def _minimised(
-    nlp: dict[str, Any], guess: Array, range_of_x: tuple[Array, Array], range_of_g: tuple[Array, Array], iterations: int
+    nlp: dict[str, Any],
+    guess: Array,
+    range_of_x: tuple[Array, Array],
+    range_of_g: tuple[Array, Array],
+    iterations: int,
 ) -> tuple[Array, float, float, str]:
     """x, criterion, largest violation of a constraint, and what IPOPT says."""
     options: dict[str, Any] = {
@@ -207,7 +295,7 @@ def _minimised(
             "print_level": 0,
             "sb": "yes",
             "tol": 1e-4,
-            "constr_viol_tol": SOFT,
+            "constr_viol_tol": LIMIT.IPOPT_VIOLATION,
             "acceptable_tol": 1e-3,
             "mu_strategy": "adaptive",
         },
@@ -215,7 +303,9 @@ def _minimised(
         "error_on_fail": False,
     }
     solver = ca.nlpsol("excite", "ipopt", nlp, options)
-    end = solver(x0=guess, lbx=range_of_x[0], ubx=range_of_x[1], lbg=range_of_g[0], ubg=range_of_g[1])
+    end = solver(
+        x0=guess, lbx=range_of_x[0], ubx=range_of_x[1], lbg=range_of_g[0], ubg=range_of_g[1]
+    )
     g = np.asarray(end["g"]).ravel()
     violation = float(np.max(np.maximum(range_of_g[0] - g, g - range_of_g[1]), initial=0.0))
     criterion = float(end["f"])
@@ -232,7 +322,11 @@ def smoothed(function: Any, v0: float) -> Any:
     results = [[0.0] * function.nnz_out(k) for k in range(function.n_out())]
     w: list[Any] = [None] * function.sz_w()
     for k in range(function.n_instructions()):
-        op, i, o = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        op, i, o = (
+            function.instruction_id(k),
+            function.instruction_input(k),
+            function.instruction_output(k),
+        )
         if op == ca.OP_CONST:
             w[o[0]] = ca.SX(function.instruction_constant(k))
         elif op == ca.OP_INPUT:
@@ -242,7 +336,9 @@ def smoothed(function: Any, v0: float) -> Any:
         elif op == ca.OP_SIGN:
             w[o[0]] = ca.tanh(w[i[0]] / v0)
         else:
-            w[o[0]] = ca.SX.unary(op, w[i[0]]) if len(i) == 1 else ca.SX.binary(op, w[i[0]], w[i[1]])
+            w[o[0]] = (
+                ca.SX.unary(op, w[i[0]]) if len(i) == 1 else ca.SX.binary(op, w[i[0]], w[i[1]])
+            )
     outputs = [ca.SX(function.sparsity_out(k), ca.vertcat(*x)) for k, x in enumerate(results)]
     return ca.Function(f"{function.name()}_smooth", inputs, outputs)
 
@@ -256,7 +352,12 @@ def _at(family: Any, p: Any, t: Array) -> list[Any]:
 def _guess(problem: Problem, family: Any, rng: np.random.Generator) -> Array:
     limits = problem.limits
     speed = np.minimum(limits.qd, 1e3)
-    return np.array([family.guess(rng, lo, up, v) for lo, up, v in zip(limits.lower, limits.upper, speed, strict=True)]).T
+    return np.array(
+        [
+            family.guess(rng, lo, up, v)
+            for lo, up, v in zip(limits.lower, limits.upper, speed, strict=True)
+        ]
+    ).T
 
 
 def _rows(x: Array, M: int) -> Any:

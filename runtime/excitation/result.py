@@ -1,6 +1,8 @@
-"""The result of a search for an exciting motion: the motion, what it promises, how far it uses the limits.
+"""The result of a search for an exciting motion: the motion, what it promises, how far it uses the
+limits.
 
-Every figure is that of the rows the identification will use, with sign(qd) itself. No CasADi here: pages read results without it.
+Every figure is that of the rows the identification will use, with sign(qd) itself. No CasADi here:
+pages read results without it.
 """
 
 from __future__ import annotations
@@ -11,17 +13,16 @@ from typing import Any
 import numpy as np
 
 from runtime.excitation.criteria import MotionLimits, Weights, usage
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.loop.result import csv_text
 from runtime.model.generated import GeneratedModel
-from runtime.motion.result import csv_text
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import to_mapping
 from runtime.settings.trajectories import Motion
 from runtime.table import Table
 
 Array = np.ndarray
-
-LISTED = 10  # parameters of the table, the least certain ones
-NAMED = 5  # parameters, in a sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class Excitation(Result):
     """The best motion of a search.
 
     Attributes
@@ -110,7 +111,9 @@ class Excitation:
         return t, q, qd, qdd, self.model.inverse_dynamics(q, qd, qdd, self.known.X)
 
     def to_csv(self) -> str:
-        """t, q1 ..., qd1 ..., qdd1 ... at the controller rate, SI: a reference that `simulate` reads."""
+        """t, q1 ..., qd1 ..., qdd1 ... at the controller rate, SI: a reference that `simulate`
+        reads.
+        """
         t, q, qd, qdd, _ = self.sampled()
         return csv_text(t, q=q, qd=qd, qdd=qdd)
 
@@ -121,42 +124,87 @@ class Excitation:
 
     @property
     def worse(self) -> dict[str, float]:
-        """Parameters that the motion of the record tells better, by name, with the ratio of predicted %sigma to that of the record, largest first."""
+        """Parameters that the motion of the record tells better, by name, with the ratio of
+        predicted %sigma to that of the record, largest first.
+        """
         before = self.known.relative_sigma
-        ratios = {name: sigma / before[name] for name, sigma in self.relative_sigma.items() if before.get(name, 0.0) > 0}
-        return dict(sorted(((name, ratio) for name, ratio in ratios.items() if ratio > 1), key=lambda item: -item[1]))
+        ratios = {
+            name: sigma / before[name]
+            for name, sigma in self.relative_sigma.items()
+            if before.get(name, 0.0) > 0
+        }
+        return dict(
+            sorted(
+                ((name, ratio) for name, ratio in ratios.items() if ratio > 1),
+                key=lambda item: -item[1],
+            )
+        )
 
     @property
     def comparison(self) -> str:
-        """The motion beside that of the record, parameter by parameter, a sentence; "" without record."""
+        """The motion beside that of the record, parameter by parameter, a sentence; "" without
+        record.
+        """
         before, worse = self.known.relative_sigma, self.worse
         if not before:
             return ""
         if not worse:
-            return f" It tells each of these {len(before)} parameters better than the motion of the record."
-        named = ", ".join(f"{name} {self.relative_sigma[name]:.2g} % (record {before[name]:.2g} %)" for name in list(worse)[:NAMED])
-        more = f" and {len(worse) - NAMED} more" if len(worse) > NAMED else ""
-        return f" It tells {len(before) - len(worse)} of {len(before)} parameters better than the motion of the record, and WORSE: {named}{more}."
+            return (
+                f" It tells each of these {len(before)} parameters better than the motion of "
+                "the record."
+            )
+        named = ", ".join(
+            f"{name} {self.relative_sigma[name]:.2g} % (record {before[name]:.2g} %)"
+            for name in list(worse)[: LIMIT.SIGMAS_NAMED]
+        )
+        more = (
+            f" and {len(worse) - LIMIT.SIGMAS_NAMED} more"
+            if len(worse) > LIMIT.SIGMAS_NAMED
+            else ""
+        )
+        return (
+            f" It tells {len(before) - len(worse)} of {len(before)} parameters better than the "
+            f"motion of the record, and WORSE: {named}{more}."
+        )
 
     @property
     def torques(self) -> str:
         """What is not limited, a sentence; "" where every torque is."""
-        free = [str(j) for j, limit in zip(self.model.JOINTS, self.limits.tau, strict=True) if not np.isfinite(limit)]
+        free = [
+            str(j)
+            for j, limit in zip(self.model.JOINTS, self.limits.tau, strict=True)
+            if not np.isfinite(limit)
+        ]
         if not free:
             return ""
         largest = np.abs(self.sampled()[-1]).max(axis=0)
         values = ", ".join(f"{x:.3g}" for x in largest)
-        return f" Torque limits of joint {', '.join(free)} are unknown and were not kept: it asks for up to {values}; compare with the data sheet (limits: {{tau: [...]}})."
+        return (
+            f" Torque limits of joint {', '.join(free)} are unknown and were not kept: it asks "
+            f"for up to {values}; compare with the data sheet (limits: {{tau: [...]}})."
+        )
 
     @property
     def verdict(self) -> str:
-        """Condition, the least certain parameter, where the motion of the record is better, and limits that are unknown."""
-        of_record = "" if self.known.condition is None else f" (motion of the record: {self.known.condition:.1f})"
+        """Condition, the least certain parameter, where the motion of the record is better, and
+        limits that are unknown.
+        """
+        of_record = (
+            ""
+            if self.known.condition is None
+            else f" (motion of the record: {self.known.condition:.1f})"
+        )
         worst = max(self.relative_sigma, key=self.relative_sigma.__getitem__)
-        kept = "all limits" if np.isfinite(self.limits.tau).all() else "the limits of position, velocity and acceleration"
+        kept = (
+            "all limits"
+            if np.isfinite(self.limits.tau).all()
+            else "the limits of position, velocity and acceleration"
+        )
         return (
-            f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) {self.condition:.1f}{of_record}; "
-            f"least certain is {worst} with a predicted %sigma of {self.relative_sigma[worst]:.2g}.{self.comparison}{self.torques}"
+            f"A motion of {self.motion.duration:.1f} s within {kept} with weighted cond(W) "
+            f"{self.condition:.1f}{of_record}; "
+            f"least certain is {worst} with a predicted %sigma of "
+            f"{self.relative_sigma[worst]:.2g}.{self.comparison}{self.torques}"
         )
 
     def summary(self) -> dict[str, Any]:
@@ -173,34 +221,66 @@ class Excitation:
             "torque_sigma": self.known.weights.s.tolist(),
             "limits_used": self.usage,
             "margin": self.margin,
-            "starts": [{"number": s.number, "criterion": s.criterion, "violation": s.violation, "message": s.message} for s in self.starts],
+            "starts": [
+                {
+                    "number": s.number,
+                    "criterion": s.criterion,
+                    "violation": s.violation,
+                    "message": s.message,
+                }
+                for s in self.starts
+            ],
             "settings": to_mapping(self.settings),
         }
 
     def sigma_table(self, most: int | None = None) -> Table:
-        """Predicted %sigma, the least certain parameters first, beside that of the motion of the record; the first `most` of them."""
+        """Predicted %sigma, the least certain parameters first, beside that of the motion of the
+        record; the first `most` of them.
+        """
         before = self.known.relative_sigma
         worst = sorted(self.relative_sigma.items(), key=lambda item: -item[1])[:most]
-        rows = [(name, f"{value:.3g}", *((f"{before[name]:.3g}",) if before else ())) for name, value in worst]
-        note = f"Parameters and torque deviations: {self.known.source}. Torque noise is taken as white at the sampling rate; model error is not."
-        return Table("Predicted %sigma", ("parameter", "this motion", *(("motion of the record",) if before else ())), rows, note)
+        rows = [
+            (name, f"{value:.3g}", *((f"{before[name]:.3g}",) if before else ()))
+            for name, value in worst
+        ]
+        note = (
+            f"Parameters and torque deviations: {self.known.source}. Torque noise is taken as "
+            "white at the sampling rate; model error is not."
+        )
+        return Table(
+            "Predicted %sigma",
+            ("parameter", "this motion", *(("motion of the record",) if before else ())),
+            rows,
+            note,
+        )
 
     def usage_table(self) -> Table:
         """Share of the limits used, by quantity and joint."""
         rows = [(what, *(f"{100 * x:.1f}" for x in shares)) for what, shares in self.usage.items()]
         note = "At the controller rate. 100 is the limit; the optimiser keeps a margin."
-        return Table("Share of the limits used, %", ("", *(f"joint {j}" for j in self.model.JOINTS)), rows, note)
+        return Table(
+            "Share of the limits used, %",
+            ("", *(f"joint {j}" for j in self.model.JOINTS)),
+            rows,
+            note,
+        )
 
     def starts_table(self) -> Table:
         """How every start ended."""
-        rows = [(str(s.number), f"{s.criterion:.4g}", f"{s.violation:.1e}", s.message) for s in self.starts]
+        rows = [
+            (str(s.number), f"{s.criterion:.4g}", f"{s.violation:.1e}", s.message)
+            for s in self.starts
+        ]
         return Table("Starts", ("start", "criterion", "violation", "end"), rows)
 
     def to_table(self) -> str:
         """Verdict, the least certain parameters, how far the limits are used."""
         return "\n\n".join(
-            [self.verdict, *(f"{table.caption}\n{table.to_text()}" for table in (self.sigma_table(LISTED), self.usage_table()))]
+            [
+                self.verdict,
+                *(
+                    f"{table.caption}\n{table.to_text()}"
+                    for table in (self.sigma_table(LIMIT.SIGMAS_LISTED), self.usage_table())
+                ),
+            ]
         )
-
-    def __str__(self) -> str:
-        return self.to_table()

@@ -4,7 +4,8 @@
     excitation.verdict, excitation.relative_sigma     # predicted %sigma of every parameter
     t, q, qd, qdd, tau = excitation.sampled()
 
-The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is widened until the limits hold at the controller rate. Every
+The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is widened until
+the limits hold at the controller rate. Every
 figure of the result is that of the rows the identification will use, with sign(qd) itself.
 """
 
@@ -20,7 +21,6 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators.essential import essential_of
-from runtime.estimators.methods import estimate_of
 from runtime.excitation.criteria import (
     Weights,
     criterion_of,
@@ -32,22 +32,21 @@ from runtime.excitation.criteria import (
 )
 from runtime.excitation.optimiser import Problem, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
+from runtime.limits import LIMIT
+from runtime.loop.dry_friction import dry_friction
+from runtime.loop.methods import estimate_of
+from runtime.loop.simulation import parameters_of
 from runtime.model.casadi import casadi_path
 from runtime.model.generated import GeneratedModel, require
-from runtime.motion.dry_friction import dry_friction
-from runtime.motion.simulation import parameters_of
-from runtime.observation.observation import observe
+from runtime.model.loading import is_trusted
 from runtime.parallel import results
 from runtime.records.record import Record
+from runtime.rows.observe import observe
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Study
 from runtime.settings.trajectories import Motion, motion_from_mapping
 
 Array = np.ndarray
-
-TOLERATED = 1e-3  # violation at the points of the grid of a start that is looked at
-BEST = 3  # starts that are looked at on the grid of the controller
-WIDENINGS = 2  # of the margin, doubled each time
 
 
 def excite(
@@ -59,13 +58,15 @@ def excite(
     workers: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
-    """The motion of smallest criterion over all starts of study.excitation, within the limits at the controller rate.
+    """The motion of smallest criterion over all starts of study.excitation, within the limits at
+    the controller rate.
 
     Parameters
     ----------
     model : GeneratedModel
     records : Record or sequence of Record
-        Their estimate gives parameters and deviations of the torques; without records, the values of the robot file serve.
+        Their estimate gives parameters and deviations of the torques; without records, the values
+        of the robot file serve.
     study : Study, optional
         Families, limits, criterion, filters and rows; default: Study().
     symbolic : str, Path or module, optional
@@ -78,82 +79,134 @@ def excite(
     Raises
     ------
     InputError
-        No start keeps the limits, with the limit that was missed most; or the parameters are known neither from a record nor from the robot file.
+        No start keeps the limits, with the limit that was missed most; or the parameters are known
+        neither from a record nor from the robot file.
     """
     study = study or Study()
     settings = study.excitation or ExcitationSettings()
-    known = _known(model, (records,) if isinstance(records, Record) else tuple(records), study, settings)
+    known = _known(
+        model, (records,) if isinstance(records, Record) else tuple(records), study, settings
+    )
     limits, weights = limits_of(model, settings.limits), known.weights
     if settings.criterion == "record" and not known.relative_sigma:
-        raise InputError("criterion: record compares with the motion of a record; give one, or ask for cond, logdet or sigma")
+        raise InputError(
+            "criterion: record compares with the motion of a record; give one, or ask for cond, "
+            "logdet or sigma"
+        )
     if settings.criterion == "auto":
         settings = replace(settings, criterion="record" if known.relative_sigma else "cond")
     if settings.criterion == "record":  # a column in units of its deviation by the record
         before = np.array([known.relative_sigma[name] for name in weights.names])
-        weights = replace(weights, size=weights.size * np.maximum(before, 1e-3 * before.max()) / 100)
+        weights = replace(
+            weights, size=weights.size * np.maximum(before, 1e-3 * before.max()) / 100
+        )
     require(model, "inverse_dynamics")
     path = str(getattr(symbolic, "__file__", symbolic) or casadi_path(model))
-    problem = Problem(path, settings, weights, limits, known.X, dry_friction(model).smooth)
+    trust = is_trusted(model) or isinstance(symbolic, ModuleType)
+    smooth = dry_friction(model).smooth
+    problem = Problem(path, settings, weights, limits, known.X, smooth, trust)
     starts = []
     for start in results(one_start, problem, range(settings.starts), workers):
         starts.append(start)
         if progress is not None:
             progress(len(starts), settings.starts)
     starts.sort(key=lambda s: s.number)
-    kept = sorted((s for s in starts if s.violation <= TOLERATED), key=lambda s: s.criterion)
+    kept = sorted(
+        (s for s in starts if s.violation <= LIMIT.GRID_VIOLATION), key=lambda s: s.criterion
+    )
     if not kept:
         least = min(starts, key=lambda s: s.violation)
         raise InputError(
-            f"no motion within the limits in {settings.starts} starts; the closest misses a limit by {least.violation:.2g} of it "
-            f"({least.message}). Widen the limits, lengthen the parts, ask for fewer harmonics or points, or free `begin`"
+            f"no motion within the limits in {settings.starts} starts; the closest misses a limit "
+            f"by {least.violation:.2g} of it "
+            f"({least.message}). Widen the limits, lengthen the parts, ask for fewer harmonics or "
+            "points, or free `begin`"
         )
     candidates = []
-    for motion, margin in _within(model, problem, kept[:BEST]):
+    for motion, margin in _within(model, problem, kept[: LIMIT.STARTS_COMPARED]):
         observation = planned(model, motion, study, settings.rate)
-        candidates.append((criterion_of(weights, observation, settings.criterion), motion, margin, observation))
+        candidates.append(
+            (criterion_of(weights, observation, settings.criterion), motion, margin, observation)
+        )
     if not candidates:
         exceeded = excesses(model, motion_from_mapping(kept[0].motion), limits, settings, known.X)
         raise InputError(
-            f"between the points of the grid {'; '.join(map(str, exceeded[:3]))}, also with twice and four times the margin; "
+            f"between the points of the grid {'; '.join(map(str, exceeded[:3]))}, also with twice "
+            "and four times the margin; "
             f"raise `grid` ({settings.grid:g} Hz)"
         )
     _, motion, margin, observation = min(candidates, key=lambda candidate: candidate[0])
     sigma = _relative_sigma(known.weights, observation, study, settings.rate)
-    return Excitation(model, motion, known.weights.condition(observation), sigma, tuple(starts), margin, settings, limits, known)
+    return Excitation(
+        model,
+        motion,
+        known.weights.condition(observation),
+        sigma,
+        tuple(starts),
+        margin,
+        settings,
+        limits,
+        known,
+    )
 
 
-def _within(model: GeneratedModel, problem: Problem, starts: Sequence[Start]) -> Iterator[tuple[Motion, float]]:
-    """Motions of the starts within the limits at the controller rate, with the margin that took; none of a start where wider ones do not help."""
+def _within(
+    model: GeneratedModel, problem: Problem, starts: Sequence[Start]
+) -> Iterator[tuple[Motion, float]]:
+    """Motions of the starts within the limits at the controller rate, with the margin that took;
+    none of a start where wider ones do not help.
+    """
     for start in starts:
         settings = problem.settings
-        for _ in range(WIDENINGS + 1):
+        for _ in range(LIMIT.MARGIN_DOUBLINGS + 1):
             motion = motion_from_mapping(start.motion)
-            if start.violation <= TOLERATED and not excesses(model, motion, problem.limits, settings, problem.X):
+            if start.violation <= LIMIT.GRID_VIOLATION and not excesses(
+                model, motion, problem.limits, settings, problem.X
+            ):
                 yield motion, settings.margin
                 break
             settings = replace(settings, margin=max(2 * settings.margin, 0.01))
             start = improved(replace(problem, settings=settings), start.number, motion)
 
 
-def _known(model: GeneratedModel, records: Sequence[Record], study: Study, settings: ExcitationSettings) -> Known:
-    """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the values of the robot file."""
+def _known(
+    model: GeneratedModel, records: Sequence[Record], study: Study, settings: ExcitationSettings
+) -> Known:
+    """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the
+    values of the robot file.
+    """
     if not records:
         X = parameters_of(model)
-        return Known(X, "values of the robot file", weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))))
+        return Known(
+            X,
+            "values of the robot file",
+            weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))),
+        )
     observation = observe(model, records, study)
     linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
     fit = estimate_of(observation, linear, model=model)
     if fit.status == "rank-deficient":
         raise InputError(
-            f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; leave it out, or name columns"
+            f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; "
+            "leave it out, or name columns"
         )
     names = essential_of(observation, study.essential, linear).names
     deviations = [joint.sigma_rho for joint in fit.per_joint]
-    weights = weights_of(model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=names, s=deviations)
+    weights = weights_of(
+        model, settings, dict(zip(fit.names, fit.X, strict=True)), essential=names, s=deviations
+    )
     sigma = _relative_sigma(weights, observation, study, records[0].rate)
-    return Known(fit.X, f"estimate of {', '.join(record.name for record in records)}", weights, weights.condition(observation), sigma)
+    return Known(
+        fit.X,
+        f"estimate of {', '.join(record.name for record in records)}",
+        weights,
+        weights.condition(observation),
+        sigma,
+    )
 
 
-def _relative_sigma(weights: Weights, observation: Any, study: Study, rate: float) -> dict[str, float]:
+def _relative_sigma(
+    weights: Weights, observation: Any, study: Study, rate: float
+) -> dict[str, float]:
     sigma = weights.relative_sigma(observation, kept_correlation(study.signals, rate))
     return dict(zip(weights.names, map(float, sigma), strict=True))

@@ -1,12 +1,10 @@
-"""Can the values of an identification be used? One question after another, each with its answer, the limit, and what to do.
+"""Can the values of an identification be used? One question after another, each with its answer,
+the limit, and what to do.
 
-    good       within the limit
-    doubtful   usable with the care that the remedy names
-    no         not usable
-    open       not asked, or only the user can tell: does not count
-
-The verdict is the worst of the answers. Limits are constants of this module: they are conventions of practice, not theorems. Errors are relative, in %:
-100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of the block bootstrap (`runtime.identification.uncertainty`), never
+The verdict is the worst of the answers. Limits are constants of this module: they are conventions
+of practice, not theorems. Errors are relative, in %:
+100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of the block
+bootstrap (`runtime.identification.uncertainty`), never
 eq. (10) alone.
 """
 
@@ -14,72 +12,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from runtime.checks.check import WORST, Check, State, worst_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import CLOSED_LOOP
-from runtime.estimators.physical import CERTAIN
-from runtime.identification.homogeneity import LEVEL, Homogeneity
-from runtime.identification.validation import CORRELATION
+from runtime.identification.homogeneity import Homogeneity
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.loop.methods import CLOSED_LOOP
 from runtime.resolution.advice import Advice, step_text
-from runtime.resolution.result import BIASED, NEGLIGIBLE
 from runtime.resolution.runs import Level
 from runtime.table import Table, notebook
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
 
-State = Literal["good", "doubtful", "no", "open"]
-WORST: tuple[State, ...] = ("no", "doubtful", "good")
 ANSWERS = {"good": "Yes", "doubtful": "With care", "no": "No"}
 
-COND = 100.0
-"""Condition number of W with unit columns above which a fit is doubtful."""
-TOTAL = (10.0, 20.0)
-"""Relative error of all joints, %: good up to the first, unusable above the second."""
-JOINT = (25.0, 50.0)
-"""Of the worst joint, %."""
-PREDICTION = ((1.5, 2.0), (3.0, 5.0))
-"""Error on data that did not give the parameters: times the error of the fit, or % where that is larger; good, then usable; at most ..."""
-UNSEEN = (10.0, 15.0)
-"""... so many %."""
-DEVIATION = 30.0
-"""Deviation of a parameter in % of its value."""
-NAMED = 8  # parameters, in a sentence
-RELEVANT = 10.0
-"""Difference between records, % of the value, up to which a parameter is the same in practice, however certain the difference."""
-LOST = 25.0
-"""Relative error of a joint in %, above which it is asked whether the removed parameters explained it."""
-
 
 @dataclass(frozen=True)
-class Check:
-    """One question.
-
-    Attributes
-    ----------
-    question : str
-    state : "good", "doubtful", "no" or "open"
-    finding : str
-        The answer, with its numbers.
-    limit : str
-        What a good answer keeps to.
-    remedy : str
-        What to do where the answer is not good.
-    """
-
-    question: str
-    state: State
-    finding: str
-    limit: str = ""
-    remedy: str = ""
-
-
-@dataclass(frozen=True)
-class Checklist:
-    """The verdict on an identification: whether its values can be used, the largest doubt, the next step.
+class Checklist(Result):
+    """The verdict on an identification: whether its values can be used, the largest doubt, the next
+    step.
 
     Attributes
     ----------
@@ -94,18 +50,22 @@ class Checklist:
     @property
     def state(self) -> State:
         """The worst answer."""
-        return next((state for state in WORST if any(check.state == state for check in self.checks)), "open")
+        return next(
+            (state for state in WORST if any(check.state == state for check in self.checks)), "open"
+        )
 
     @property
     def answer(self) -> str:
         """Yes, with care, or no; a yes says where something was not judged."""
         unanswered = any(check.state == "open" for check in self.checks)
-        return ANSWERS[self.state] + (", as far as judged" if self.state == "good" and unanswered else "")
+        return ANSWERS[self.state] + (
+            ", as far as judged" if self.state == "good" and unanswered else ""
+        )
 
     @property
     def worst(self) -> Check | None:
         """The first check that is not good; None where all are, open ones aside."""
-        return next((check for state in WORST[:2] for check in self.checks if check.state == state), None)
+        return worst_of(self.checks)
 
     @property
     def doubt(self) -> str:
@@ -113,20 +73,38 @@ class Checklist:
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
-        return f"none among the checks below. Not judged: {' '.join(unanswered)}" if unanswered else "none among the checks below."
+        return (
+            f"none among the checks below. Not judged: {' '.join(unanswered)}"
+            if unanswered
+            else "none among the checks below."
+        )
 
     @property
     def next(self) -> str:
         """What to do, in a sentence."""
-        check = self.worst or next((check for check in self.checks if check.state == "open" and check.remedy), None)
-        return (check.remedy if check is not None else "use the essential parameters with their corrected deviations") + "."
-
-    def __str__(self) -> str:
-        return self.to_text()
+        check = self.worst or next(
+            (check for check in self.checks if check.state == "open" and check.remedy), None
+        )
+        return (
+            check.remedy
+            if check is not None
+            else "use the essential parameters with their corrected deviations"
+        ) + "."
 
     def _repr_html_(self) -> str:
-        rows = [(check.question, check.state, check.finding, check.remedy if check.state != "good" else "") for check in self.checks]
-        return notebook([f"{self.answer}. {self.use}"], Table("", ("question", "answer", "finding", "what to do"), rows, wide=(1, 2, 3)))
+        rows = [
+            (
+                check.question,
+                check.state,
+                check.finding,
+                check.remedy if check.state != "good" else "",
+            )
+            for check in self.checks
+        ]
+        return notebook(
+            [f"{self.answer}. {self.use}"],
+            Table("", ("question", "answer", "finding", "what to do"), rows, wide=(1, 2, 3)),
+        )
 
     def to_text(self) -> str:
         """The verdict as plain text."""
@@ -134,8 +112,24 @@ class Checklist:
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
-        checks = [{"question": c.question, "state": c.state, "found": c.finding, "limit": c.limit, "remedy": c.remedy} for c in self.checks]
-        return {"state": self.state, "answer": self.answer, "use": self.use, "doubt": self.doubt, "next": self.next, "checks": checks}
+        checks = [
+            {
+                "question": c.question,
+                "state": c.state,
+                "found": c.finding,
+                "limit": c.limit,
+                "remedy": c.remedy,
+            }
+            for c in self.checks
+        ]
+        return {
+            "state": self.state,
+            "answer": self.answer,
+            "use": self.use,
+            "doubt": self.doubt,
+            "next": self.next,
+            "checks": checks,
+        }
 
 
 def checklist_of(
@@ -152,7 +146,8 @@ def checklist_of(
     homogeneity: Homogeneity | None = None,
     halves: bool = False,
 ) -> Checklist:
-    """The checklist of an identification; rank alone where the record does not determine the parameters.
+    """The checklist of an identification; rank alone where the record does not determine the
+    parameters.
 
     Parameters
     ----------
@@ -163,7 +158,8 @@ def checklist_of(
     use : str
         What they explain, in one sentence.
     bootstrap : mapping of str to float
-        Deviations by name from blocks of time drawn again; parameters that it lacks have the corrected deviation.
+        Deviations by name from blocks of time drawn again; parameters that it lacks have the
+        corrected deviation.
     prediction_error : float, %
         Largest relative error of `fit` on data that did not give it; nan where there are none.
     negative : sequence of str
@@ -173,50 +169,88 @@ def checklist_of(
     advice : Advice, optional
         The coarsest encoders, and the step in use.
     halves : bool
-        Whether `prediction_error` is that of a part of the record from another one, not of a validation record.
+        Whether `prediction_error` is that of a part of the record from another one, not of a
+        validation record.
     plausible : sequence of Check
-        Whether record, study and robot file suit each other: what is wrong there is the cause of what follows.
+        Whether record, study and robot file suit each other: what is wrong there is the cause of
+        what follows.
     homogeneity : Homogeneity, optional
         Whether several records agree.
     """
     rank = determined(estimate, fit)
-    first, last = ([], [rank]) if rank.state == "doubtful" else ([rank], [])  # a bad condition is the least of several doubts
+    first, last = (
+        ([], [rank]) if rank.state == "doubtful" else ([rank], [])
+    )  # a bad condition is the least of several doubts
     checks = [*first, *plausible]
     if estimate.status != "rank-deficient":
-        differ = homogeneity is not None and homogeneity.largest > RELEVANT
-        checks += [explained(fit), *explained_by_joint(estimate, fit), predicted(fit, prediction_error, halves, differ=differ)]
+        differ = homogeneity is not None and homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE
+        checks += [
+            explained(fit),
+            *explained_by_joint(estimate, fit),
+            predicted(fit, prediction_error, halves, differ=differ),
+        ]
         checks += [] if homogeneity is None else [agreeing(homogeneity)]
         checks += [signs(negative), certain(fit, bootstrap), separate(fit), *last]
-        checks += [physical(fit if "standard" in fit.details else estimate, feasibility), resolved(advice)]
+        checks += [
+            physical(fit if "standard" in fit.details else estimate, feasibility),
+            resolved(advice),
+        ]
     return Checklist(tuple(checks), use)
 
 
 def determined(estimate: Estimate, fit: Estimate) -> Check:
     """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
-    question, limit = "Does the record determine the parameters?", f"full rank, condition number below {COND:g} with unit columns"
+    question, limit = (
+        "Does the record determine the parameters?",
+        f"full rank, condition number below {LIMIT.CONDITION:g} with unit columns",
+    )
     failed = next((one for one in (estimate, fit) if one.status != "ok"), None)
     if failed is not None and failed.status == "rank-deficient":
         groups = "; ".join(", ".join(group) for group in failed.groups)
-        remedy = "record a motion that excites these parameters (symgen excite), or leave them out (estimate: columns)"
-        return Check(question, "no", f"No: rank {failed.rank} for {len(failed.names)} parameters, not told apart: {groups}", limit, remedy)
+        remedy = (
+            "record a motion that excites these parameters (symgen excite), or leave them "
+            "out "
+            "(estimate: columns)"
+        )
+        return Check(
+            question,
+            "no",
+            f"No: rank {failed.rank} for {len(failed.names)} parameters, not told apart: {groups}",
+            limit,
+            remedy,
+        )
     if failed is not None:
-        return Check(question, "no", f"No: {failed.status}, {failed.message.rstrip('.')}", limit, "see the message of the estimator")
+        return Check(
+            question,
+            "no",
+            f"No: {failed.status}, {failed.message.rstrip('.')}",
+            limit,
+            "see the message of the estimator",
+        )
     cond = fit.cond_unit
     text = f"All {len(fit.names)}, condition number {rounded(cond)} with unit columns"
-    if cond <= COND:
+    if cond <= LIMIT.CONDITION:
         return Check(question, "good", text, limit)
-    remedy = "record a motion that moves the joints in more combinations (symgen excite), or use fewer parameters (essential.threshold)"
-    return Check(question, "doubtful", f"{text}: some of their combinations it hardly does", limit, remedy)
+    remedy = (
+        "record a motion that moves the joints in more combinations (symgen excite), or use "
+        "fewer parameters (essential.threshold)"
+    )
+    return Check(
+        question, "doubtful", f"{text}: some of their combinations it hardly does", limit, remedy
+    )
 
 
 def explained(fit: Estimate) -> Check:
     """Error of the fit in total."""
     return Check(
         "Does the model explain the torques?",
-        _state(fit.relative_error, *TOTAL),
+        _state(fit.relative_error, *LIMIT.TOTAL_ERROR),
         f"{fit.relative_error:.1f} % of them stay unexplained",
-        f"{TOTAL[0]:g} % (usable to {TOTAL[1]:g} %)",
-        "look at the joints below: units, signs and ratios of the drives first, then friction (--friction)",
+        f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
+        (
+            "look at the joints below: units, signs and ratios of the drives first, then friction "
+            "(--friction)"
+        ),
     )
 
 
@@ -227,25 +261,43 @@ def explained_by_joint(estimate: Estimate, fit: Estimate) -> list[Check]:
         return []
     worst = max(joints, key=lambda joint: joint.relative_error)
     text = f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained"
-    remedy = (
-        lost_joints(estimate, fit)
-        or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, time shift between position and torque"
+    remedy = lost_joints(estimate, fit) or (
+        f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
+        "time shift between position and torque"
     )
-    return [Check("On every joint?", _state(worst.relative_error, *JOINT), text, f"{JOINT[0]:g} % (usable to {JOINT[1]:g} %)", remedy)]
+    return [
+        Check(
+            "On every joint?",
+            _state(worst.relative_error, *LIMIT.JOINT_ERROR),
+            text,
+            f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)",
+            remedy,
+        )
+    ]
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
-    """The joints whose torque the removed parameters explained, and what to do; "" where there is none.
+    """The joints whose torque the removed parameters explained, and what to do; "" where there is
+    none.
 
-    The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a joint of large forces rules it, such as a lift
+    The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a
+    joint of large forces rules it, such as a lift
     in N beside a wrist in N m.
     """
     whole = {joint.joint: joint.relative_error for joint in estimate.per_joint}
-    lost = [joint for joint in fit.per_joint if joint.relative_error > max(LOST, 2 * whole.get(joint.joint, np.inf))]
+    lost = [
+        joint
+        for joint in fit.per_joint
+        if joint.relative_error > max(LIMIT.LOST_JOINT, 2 * whole.get(joint.joint, np.inf))
+    ]
     if not lost:
         return ""
     weighted = any(joint.scale != 1.0 for joint in estimate.per_joint)
-    remedy = "lower essential.threshold" if weighted else "weigh the joints by their noise (estimate: {method: wls})"
+    remedy = (
+        "lower essential.threshold"
+        if weighted
+        else "weigh the joints by their noise (estimate: {method: wls})"
+    )
     by_all = " and ".join(f"{whole[joint.joint]:.1f} % of joint {joint.joint}" for joint in lost)
     by_essential = " and ".join(f"{joint.relative_error:.1f} %" for joint in lost)
     return (
@@ -257,16 +309,28 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
 def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool = False) -> Check:
     """Largest relative error, %, on data that did not give the parameters; open where it is nan.
 
-    halves : it is that of a half of the record, fitted from the other half. Half a record may lack what the whole one shows: never a "no".
-    differ : records disagree by more than RELEVANT.
+    halves : it is that of a half of the record, fitted from the other half. Half a record may lack
+    what the whole one shows: never a "no".
+    differ : records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
-    limits = [min(max(times * fit.relative_error, least), most) for (times, least), most in zip(PREDICTION, UNSEEN, strict=True)]
+    limits = [
+        min(max(times * fit.relative_error, least), most)
+        for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
+    ]
     return Check(
         "Does it predict data it has not seen?",
-        "open" if not np.isfinite(error) else "doubtful" if halves and error > limits[0] else _state(error, *limits),
+        "open"
+        if not np.isfinite(error)
+        else "doubtful"
+        if halves and error > limits[0]
+        else _state(error, *limits),
         f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
         f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
-        "see in which parameters the records differ: another robot, load or wiring, or a motion that one of them does not excite"
+        (
+            "see in which parameters the records differ: another robot, load or wiring, or a "
+            "motion "
+            "that one of them does not excite"
+        )
         if differ
         else ("name a record that it has to predict (validate.record); " if halves else "")
         + ("" if "standard" in fit.details else "fewer parameters (a larger essential.threshold), ")
@@ -276,38 +340,93 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
 
 def agreeing(homogeneity: Homogeneity) -> Check:
     """Whether several records tell the same parameters."""
-    question, limit = "Do the records agree?", f"differences within the stated deviations, p above {LEVEL:g}"
+    question, limit = (
+        "Do the records agree?",
+        f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}",
+    )
     if len(homogeneity.records) < 2:
         return Check(question, "open", homogeneity.text.rstrip("."), limit)
-    remedy = "look at the record that differs: load, temperature, time since the last one; or its motion shows what the model leaves out"
-    if not homogeneity.agree and homogeneity.largest <= RELEVANT:
-        text = f"They differ by more than their stated deviations, but by at most {homogeneity.largest:.0f} % of a value"
-        return Check(question, "good", text, f"{limit}, or by at most {RELEVANT:g} % of any value", remedy)
-    return Check(question, "good" if homogeneity.agree else "doubtful", homogeneity.text.rstrip("."), limit, remedy)
+    remedy = (
+        "look at the record that differs: load, temperature, time since the last one; or its "
+        "motion shows what the model leaves out"
+    )
+    if not homogeneity.agree and homogeneity.largest <= LIMIT.RELEVANT_DIFFERENCE:
+        text = (
+            "They differ by more than their stated deviations, but by at most "
+            f"{homogeneity.largest:.0f} % of a value"
+        )
+        return Check(
+            question,
+            "good",
+            text,
+            f"{limit}, or by at most {LIMIT.RELEVANT_DIFFERENCE:g} % of any value",
+            remedy,
+        )
+    return Check(
+        question,
+        "good" if homogeneity.agree else "doubtful",
+        homogeneity.text.rstrip("."),
+        limit,
+        remedy,
+    )
 
 
 def signs(negative: Sequence[str]) -> Check:
     """Friction and motor inertias certainly below zero. Usual cause: the sign of a ratio."""
-    remedy = "look at the sign of ratio, torque constant and columns of that joint, then at its coupling, units and frame; fit again"
+    remedy = (
+        "look at the sign of ratio, torque constant and columns of that joint, then at its "
+        "coupling, units and frame; fit again"
+    )
     text = f"Below zero: {', '.join(negative)}" if negative else "None is certainly below zero"
     question = "Have friction and motor inertia the right sign?"
-    return Check(question, "no" if negative else "good", text, f"not below zero by {CERTAIN:g} deviations", remedy)
+    return Check(
+        question,
+        "no" if negative else "good",
+        text,
+        f"not below zero by {LIMIT.CERTAIN_SIGN:g} deviations",
+        remedy,
+    )
 
 
 def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
-    """Deviations without the assumption of independent residuals; bootstrap : as for `checklist_of`."""
+    """Deviations without the assumption of independent residuals; bootstrap : as for
+    `checklist_of`.
+    """
     deviations = np.fmax(fit.sigma_corrected, [bootstrap.get(name, np.nan) for name in fit.names])
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
     order = np.argsort(-percent)
-    above = [fit.names[i] for i in order if percent[i] > DEVIATION]
-    physical_set = "standard" in fit.details  # all columns, held together by the conditions and the values of the robot file
-    state: State = "good" if not above else "no" if 2 * len(above) > len(fit.names) and not physical_set else "doubtful"
-    text = f"Largest deviation {percent[order[0]]:.0f} % ({fit.names[order[0]]}), median {np.median(percent):.1f} %"
+    above = [fit.names[i] for i in order if percent[i] > LIMIT.LARGE_DEVIATION]
+    physical_set = (
+        "standard" in fit.details
+    )  # all columns, held together by the conditions and the values of the robot file
+    state: State = (
+        "good"
+        if not above
+        else "no"
+        if 2 * len(above) > len(fit.names) and not physical_set
+        else "doubtful"
+    )
+    text = (
+        f"Largest deviation {percent[order[0]]:.0f} % ({fit.names[order[0]]}), median "
+        f"{np.median(percent):.1f} %"
+    )
     if above:
-        text += f"; above {DEVIATION:g} %: {', '.join(above[:NAMED])}" + (f" and {len(above) - NAMED} more" if len(above) > NAMED else "")
-    remedy = "do not use these values one by one: the torques know their combination better; a longer record, or one that excites them"
-    return Check("Is every value certain?", state, text, f"{DEVIATION:g} % of the value", remedy)
+        text += (
+            f"; above {LIMIT.LARGE_DEVIATION:g} %: {', '.join(above[: LIMIT.PARAMETERS_NAMED])}"
+            + (
+                f" and {len(above) - LIMIT.PARAMETERS_NAMED} more"
+                if len(above) > LIMIT.PARAMETERS_NAMED
+                else ""
+            )
+        )
+    remedy = (
+        "do not use these values one by one: the torques know their combination better; a "
+        "longer record, or one that excites them"
+    )
+    return Check(
+        "Is every value certain?", state, text, f"{LIMIT.LARGE_DEVIATION:g} % of the value", remedy
+    )
 
 
 def separate(fit: Estimate) -> Check:
@@ -315,12 +434,25 @@ def separate(fit: Estimate) -> Check:
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
-    above = np.triu(np.abs(correlation) > CORRELATION, 1)
-    pairs = [(fit.names[i], fit.names[k], correlation[i, k]) for i, k in zip(*np.nonzero(above), strict=True)]
-    text = ", ".join(f"{a} with {b} ({c:+.2f})" for a, b, c in pairs[:4]) + (", ..." if len(pairs) > 4 else "")
-    remedy = "use them together or not at all; a motion that moves them apart tells them (symgen excite)"
+    above = np.triu(np.abs(correlation) > LIMIT.CORRELATION, 1)
+    pairs = [
+        (fit.names[i], fit.names[k], correlation[i, k])
+        for i, k in zip(*np.nonzero(above), strict=True)
+    ]
+    text = ", ".join(f"{a} with {b} ({c:+.2f})" for a, b, c in pairs[:4]) + (
+        ", ..." if len(pairs) > 4 else ""
+    )
+    remedy = (
+        "use them together or not at all; a motion that moves them apart tells them (symgen excite)"
+    )
     finding = f"These trade: {text}" if pairs else "No two of them trade against each other"
-    return Check("Can the values be told apart?", "doubtful" if pairs else "good", finding, f"|correlation| below {CORRELATION:g}", remedy)
+    return Check(
+        "Can the values be told apart?",
+        "doubtful" if pairs else "good",
+        finding,
+        f"|correlation| below {LIMIT.CORRELATION:g}",
+        remedy,
+    )
 
 
 def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
@@ -328,9 +460,17 @@ def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
     question = "Can a physical robot have them?"
     limit = "every pseudo-inertia positive semidefinite, friction and motor inertia not negative"
     if "standard" in estimate.details:
-        loose = [name for name, mass in estimate.details.get("masses", {}).items() if not mass["determined"]]
+        loose = [
+            name
+            for name, mass in estimate.details.get("masses", {}).items()
+            if not mass["determined"]
+        ]
         text = (
-            f"; the record does not determine the masses {', '.join(loose[:NAMED])}: none of them is a value to use by itself"
+            (
+                "; the record does not determine the masses "
+                f"{', '.join(loose[: LIMIT.PARAMETERS_NAMED])}: none of them is a value to use by "
+                "itself"
+            )
             if loose
             else ""
         )
@@ -341,28 +481,57 @@ def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
     if feasibility.feasible:
         return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)
     blocking = ", ".join(name for name, _ in feasibility.blocking)
-    remedy = "before you simulate or control with them, fit under these conditions (estimate: {method: feasible}); torque prediction is not concerned"
-    return Check(question, "doubtful", f"No: no body has what the fit of all parameters gives {blocking}", limit, remedy)
+    remedy = (
+        "before you simulate or control with them, fit under these conditions (estimate: "
+        "{method: feasible}); torque prediction is not concerned"
+    )
+    return Check(
+        question,
+        "doubtful",
+        f"No: no body has what the fit of all parameters gives {blocking}",
+        limit,
+        remedy,
+    )
 
 
 def resolved(advice: Advice | None) -> Check:
-    """Whether the encoder resolves enough: the answer of the advisor, and of the step in use where it is given."""
-    question, limit = "Does the encoder resolve enough?", f"bias below {NEGLIGIBLE:g} % (usable to {BIASED:g} %)"
+    """Whether the encoder resolves enough: the answer of the advisor, and of the step in use where
+    it is given.
+    """
+    question, limit = (
+        "Does the encoder resolve enough?",
+        f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
+    )
     if advice is None:
-        return Check(question, "open", "Not asked", limit, "ask with symgen report, or symgen cestac --advise")
+        return Check(
+            question,
+            "open",
+            "Not asked",
+            limit,
+            "ask with symgen report, or symgen cestac --advise",
+        )
     steps = ", ".join(
-        f"{one.percent:g} % up to {step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
+        (
+            f"{one.percent:g} % up to "
+            f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
+        )
         for one in advice.encoders[0].limits
     )
     text = f"Least squares stays within {steps} {advice.place}"
     if not advice.asked:
-        remedy = "say which step your encoder has (symgen report --encoder STEP, --side motor where it sits there)"
+        remedy = (
+            "say which step your encoder has (symgen report --encoder STEP, --side motor "
+            "where it sits there)"
+        )
         return Check(question, "open", text, limit, remedy)
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
     labels = ", ".join(Level(step).label for step in advice.asked)
     text += f"; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
-    remedy = f"a finer encoder, or an estimator that simulates the closed loop (estimate.method: {', '.join(CLOSED_LOOP)})"
-    return Check(question, _state(error, NEGLIGIBLE, BIASED), text, limit, remedy)
+    remedy = (
+        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: "
+        f"{', '.join(CLOSED_LOOP)})"
+    )
+    return Check(question, _state(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED), text, limit, remedy)
 
 
 def rounded(cond: float) -> str:

@@ -1,12 +1,19 @@
-"""Which of several treatments of the same records predicts best? One call for "with all rows or without rest, with the counterbalance known or not".
+"""Which of several treatments of the same records predicts best? One call for "with all rows or
+without rest, with the counterbalance known or not".
 
-Every candidate is identified on its own terms; the set of parameters that predicts its validation records best stands for it. All of them are then judged on the
-same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out what it cannot explain,
+Every candidate is identified on its own terms; the set of parameters that predicts its validation
+records best stands for it. All of them are then judged on the
+same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out
+what it cannot explain,
 
-    e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||         residual of candidate c on the validation records treated as by candidate k, of the measured torque
+    e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||
+            residual of candidate c on the validation records treated as by candidate k, of the
+            measured torque
 
-known torques included in what is measured, so that those who know them have no advantage by the norm. Order: the geometric mean over k. A candidate whose
-estimator did not end well comes after all others. The winner of many candidates is chosen by the validation records, which are then no unseen data for it.
+known torques included in what is measured, so that those who know them have no advantage by the
+norm. Order: the geometric mean over k. A candidate whose
+estimator did not end well comes after all others. The winner of many candidates is chosen by the
+validation records, which are then no unseen data for it.
 """
 
 from __future__ import annotations
@@ -18,22 +25,25 @@ from typing import Any
 import numpy as np
 
 from runtime.blas import single_threaded
+from runtime.checks.plausibility import plausibility
+from runtime.checks.rest import low_speed_of_rest
+from runtime.checks.samples import samples_of
 from runtime.errors import InputError
 from runtime.identification.identification import identify
 from runtime.identification.parameter_sets import ORDER
-from runtime.identification.plausibility.plausibility import low_speed_of_rest, plausibility
-from runtime.identification.plausibility.samples import samples_of
 from runtime.identification.result import Identification
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import observe
 from runtime.progress import at
 from runtime.records.reading import read_records
 from runtime.records.record import Record
+from runtime.rows.observe import observe
 from runtime.settings.study import Study
 from runtime.table import Table
 
 Candidate = Study | tuple[Study, Record | Sequence[Record], Record | Sequence[Record]]
-"""A study that names its records and validation records, or a study, records and validation records."""
+"""A study that names its records and validation records, or a study, records and validation
+records.
+"""
 STATED = "as stated"
 
 
@@ -63,31 +73,50 @@ class Ranking:
     @property
     def mean_errors(self) -> dict[str, float]:
         """Geometric mean of e_ck over k, %, by candidate."""
-        return {name: float(np.exp(np.mean(np.log(list(own.values()))))) for name, own in self.errors.items()}
+        return {
+            name: float(np.exp(np.mean(np.log(list(own.values())))))
+            for name, own in self.errors.items()
+        }
 
     @property
     def verdict(self) -> str:
         """The order, in one sentence."""
-        first, *others = [f"{name} ({columns_text(self.results[name])}) {error:.1f} %" for name, error in self.mean_errors.items()]
+        first, *others = [
+            f"{name} ({columns_text(self.results[name])}) {error:.1f} %"
+            for name, error in self.mean_errors.items()
+        ]
         then = f"; then {', '.join(others)}" if others else ""
         return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
 
     def table(self) -> Table:
         """One line by candidate."""
-        header = ("treatment", "parameters", "fit %", "unseen, rows of all treatments %", *(f"unseen, {name} %" for name in ORDER), "use")
+        header = (
+            "treatment",
+            "parameters",
+            "fit %",
+            "unseen, rows of all treatments %",
+            *(f"unseen, {name} %" for name in ORDER),
+            "use",
+        )
         rows = [
             (
                 name,
                 columns_text(result),
                 f"{result.model_estimate.relative_error:.2f}",
                 f"{self.mean_errors[name]:.2f}",
-                *(f"{result.set_errors[own]:.2f}" if own in result.set_errors else "-" for own in ORDER),
+                *(
+                    f"{result.set_errors[own]:.2f}" if own in result.set_errors else "-"
+                    for own in ORDER
+                ),
                 result.checklist.answer if result.usable else result.estimate.status,
             )
             for name, result in self.results.items()
         ]
         return Table(
-            "Treatments of the records, the best first", header, rows, note="Unseen by set of parameters: on the treatment's own rows."
+            "Treatments of the records, the best first",
+            header,
+            rows,
+            note="Unseen by set of parameters: on the treatment's own rows.",
         )
 
     def summary(self) -> dict[str, Any]:
@@ -106,14 +135,24 @@ class Ranking:
             }
             for name, result in self.results.items()
         ]
-        return {"schema": 1, "verdict": self.verdict, "treatments": treatments, "missing": self.missing}
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "treatments": treatments,
+            "missing": self.missing,
+        }
 
     def __str__(self) -> str:
         return "\n\n".join([self.table().to_text(), *self.missing, self.verdict])
 
 
 @single_threaded
-def compare(model: GeneratedModel, candidates: Candidate | Mapping[str, Candidate], *, variants: GeneratedModel | None = None) -> Ranking:
+def compare(
+    model: GeneratedModel,
+    candidates: Candidate | Mapping[str, Candidate],
+    *,
+    variants: GeneratedModel | None = None,
+) -> Ranking:
     """Identify with each of several treatments, and order them by what they predict.
 
     Parameters
@@ -121,14 +160,16 @@ def compare(model: GeneratedModel, candidates: Candidate | Mapping[str, Candidat
     model : GeneratedModel
         An emitted module.
     candidates : mapping of str to Candidate, or Candidate
-        By name, each with validation records of the same instants. Of one alone the `treatments` are compared.
+        By name, each with validation records of the same instants. Of one alone the `treatments`
+        are compared.
     variants : GeneratedModel, optional
         The module of `symgen.variants`: the plausibility of the best treatment is then judged.
 
     Raises
     ------
     InputError
-        A candidate without validation records, or with others than the first; none that can be identified.
+        A candidate without validation records, or with others than the first; none that can be
+        identified.
     """
     if not isinstance(candidates, Mapping):
         candidates = treatments(model, candidates)
@@ -144,10 +185,17 @@ def compare(model: GeneratedModel, candidates: Candidate | Mapping[str, Candidat
         except InputError as e:
             missing.append(f"{name}: {e}")
     if not results:
-        raise InputError(f"no treatment can be identified; {missing[0]}" if missing else "no treatment; expected one or more to compare")
+        raise InputError(
+            f"no treatment can be identified; {missing[0]}"
+            if missing
+            else "no treatment; expected one or more to compare"
+        )
     unseen = {name: opened[name][2] for name in results}
     errors = {
-        name: {other: _error(model, result, unseen[name], results[other].study) for other in results} for name, result in results.items()
+        name: {
+            other: _error(model, result, unseen[name], results[other].study) for other in results
+        }
+        for name, result in results.items()
     }
     means = Ranking(results, errors).mean_errors
     order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
@@ -155,11 +203,17 @@ def compare(model: GeneratedModel, candidates: Candidate | Mapping[str, Candidat
         study, records, _ = opened[order[0]]
         found = plausibility(model, records, study, variants=variants)
         results[order[0]] = replace(results[order[0]], plausibility=found)
-    return Ranking({name: results[name] for name in order}, {name: errors[name] for name in order}, tuple(missing))
+    return Ranking(
+        {name: results[name] for name in order},
+        {name: errors[name] for name in order},
+        tuple(missing),
+    )
 
 
 def treatments(model: GeneratedModel, candidate: Candidate) -> dict[str, Candidate]:
-    """The candidate as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ."""
+    """The candidate as stated, without the rows of joints that stand, and with its known torques
+    left out, as far as these differ.
+    """
     study, records, further = _opened(model, candidate)
     found: dict[str, Candidate] = {STATED: (study, records, further)}
     low = low_speed_of_rest(samples_of(records, study), study)
@@ -167,7 +221,11 @@ def treatments(model: GeneratedModel, candidate: Candidate) -> dict[str, Candida
         study = replace(study, rows=replace(study.rows, low_speed=low))
         found["without rest"] = (study, records, further)
     if any(record.tau_known is not None for record in (*records, *further)):
-        found["known torques left out"] = (study, [_measured(record) for record in records], [_measured(record) for record in further])
+        found["known torques left out"] = (
+            study,
+            [replace(record, tau_known=None) for record in records],
+            [replace(record, tau_known=None) for record in further],
+        )
     return found
 
 
@@ -176,10 +234,13 @@ def columns_text(result: Identification) -> str:
     return f"{result.model_columns} parameters, {len(result.model_estimate.names)}"
 
 
-def _opened(model: GeneratedModel, candidate: Candidate) -> tuple[Study, list[Record], list[Record]]:
+def _opened(
+    model: GeneratedModel, candidate: Candidate
+) -> tuple[Study, list[Record], list[Record]]:
     if isinstance(candidate, Study):
         own, unseen = (
-            read_records(x, model, missing=candidate.signals.admits_missing) for x in (candidate.record, candidate.validate.record)
+            read_records(x, model, missing=candidate.signals.admits_missing)
+            for x in (candidate.record, candidate.validate.record)
         )
         return candidate, own, unseen
     study, records, further = candidate
@@ -189,26 +250,35 @@ def _opened(model: GeneratedModel, candidate: Candidate) -> tuple[Study, list[Re
 
 def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
     if not further:
-        raise InputError(f"{name} has no validation record, by which treatments are compared; set validate.record")
+        raise InputError(
+            f"{name} has no validation record, by which treatments are compared; set "
+            "validate.record"
+        )
     for record in further:
-        if not _measured(record).tau.any():
+        if not record.tau.any():
             raise InputError(
-                "the torques are zero throughout; expected measured ones, which a validation record compares with", file=record.file
+                (
+                    "the torques are zero throughout; expected measured ones, which a validation "
+                    "record compares with"
+                ),
+                file=record.file,
             )
     if [len(record) for record in further] != [len(record) for record in first]:
         raise InputError(
-            f"{name} is validated by {', '.join(r.file for r in further)}, the first by {', '.join(r.file for r in first)}; expected the same"
+            f"{name} is validated by {', '.join(r.file for r in further)}, the first by "
+            f"{', '.join(r.file for r in first)}; expected the same"
         )
 
 
-def _measured(record: Record) -> Record:
-    """The record with its known torques among the measured ones."""
-    return record if record.tau_known is None else replace(record, tau=record.tau + record.tau_known, known="")
-
-
-def _error(model: GeneratedModel, result: Identification, unseen: Sequence[Record], study: Study) -> float:
-    """Residual of a result on validation records treated as by `study`, % of the measured torque."""
+def _error(
+    model: GeneratedModel, result: Identification, unseen: Sequence[Record], study: Study
+) -> float:
+    """Residual of a result on validation records treated as by `study`, % of the measured
+    torque.
+    """
     fit = result.model_estimate
     residual, _ = observe(model, unseen, study).norms(fit.names, fit.X)
-    _, total = observe(model, [_measured(record) for record in unseen], study).norms((), np.zeros(0))
+    _, total = observe(model, [replace(record, tau_known=None) for record in unseen], study).norms(
+        (), np.zeros(0)
+    )
     return 100 * float(np.linalg.norm(residual) / np.linalg.norm(total))

@@ -1,6 +1,8 @@
-"""What the coupling of the drives explains: the same records as if the drives were coupled in position and torque, in one of them, or in none.
+"""What the coupling of the drives explains: the same records as if the drives were coupled in
+position and torque, in one of them, or in none.
 
-W depends on the positions alone: two observations serve all four, of which that of the coupling used exists already.
+W depends on the positions alone: two observations serve all four, of which that of the coupling
+used exists already.
 """
 
 from __future__ import annotations
@@ -12,12 +14,15 @@ from typing import TypeAlias, overload
 import numpy as np
 
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import CLOSED_LOOP, estimate_of, linear_companion, point_estimate
+from runtime.estimators.method import linear_companion
+from runtime.loop.methods import CLOSED_LOOP, estimate_of, point_estimate
 from runtime.model.drives import Coupling, Drives
 from runtime.model.generated import GeneratedModel
-from runtime.observation.observation import Observation, with_torques
 from runtime.records.record import Record
 from runtime.records.stream import ChangedStream, Stream
+from runtime.rows.observation import Observation
+from runtime.rows.observe import with_torques
+from runtime.rows.prepared import Prepared, record_of
 from runtime.settings.study import Study
 
 Array = np.ndarray
@@ -27,15 +32,21 @@ COUPLINGS: tuple[Coupling, ...] = ("both", "position", "torque", "none")
 
 
 def coupling_fits(
-    model: GeneratedModel, records: Sequence[Record | Stream], study: Study, observation: Observation, fit: Estimate, observed: Observed
+    model: GeneratedModel,
+    records: Sequence[Prepared | Stream],
+    study: Study,
+    observation: Observation,
+    fit: Estimate,
+    observed: Observed,
 ) -> dict[Coupling, Estimate]:
-    """Estimates of all parameters by the coupling used; empty unless all records are of the motor side of coupled drives.
+    """Estimates of all parameters by the coupling used; empty unless all records are of the motor
+    side of coupled drives.
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted module.
-    records : sequence of Record or Stream
+    records : sequence of Prepared or Stream
         As they were read.
     study : Study
         Settings.
@@ -47,9 +58,15 @@ def coupling_fits(
         The rows of records that were read with another coupling.
     """
     read_with = [settings.coupling for settings in study.record]
-    if len(records) != len(study.record):  # a record that was split at gaps, or records from elsewhere
+    if len(records) != len(
+        study.record
+    ):  # a record that was split at gaps, or records from elsewhere
         read_with = [*set(read_with)] * len(records)
-    if model.DRIVES is None or any(settings.sides != ("motor", "motor") for settings in study.record) or len(read_with) != len(records):
+    if (
+        model.DRIVES is None
+        or any(settings.sides != ("motor", "motor") for settings in study.record)
+        or len(read_with) != len(records)
+    ):
         return {}
     drives = Drives.from_mapping(model.DRIVES)
     if not (drives.ratio - np.diag(np.diag(drives.ratio))).any():
@@ -58,7 +75,7 @@ def coupling_fits(
     method = linear_companion(study.estimate) if simulated else point_estimate(study.estimate)
     used = read_with[0] if len(set(read_with)) == 1 and not simulated else None
     rows = {} if used is None else {turned(used): observation}  # by whether positions are coupled
-    whole = [record for record in records if isinstance(record, Record)]
+    whole = [record for record in records if isinstance(record, Prepared)]
     fits: dict[Coupling, Estimate] = {}
     for coupling in COUPLINGS:
         changes = [Change(drives.decoupled(own), drives.decoupled(coupling)) for own in read_with]
@@ -66,10 +83,18 @@ def coupling_fits(
             fits[coupling] = fit
             continue
         if turned(coupling) in rows and len(whole) == len(records):
-            torques = [change.torque(record.tau) for change, record in zip(changes, whole, strict=True)]
-            own_rows = with_torques(rows[turned(coupling)], whole, torques, study)
+            torques = [
+                replace(own.record, tau=change.torque(own.record.tau)).torque
+                for change, own in zip(changes, whole, strict=True)
+            ]
+            own_rows = with_torques(rows[turned(coupling)], whole, torques)
         else:
-            own_rows = rows[turned(coupling)] = observed([recoupled(r, c.used, c.wanted) for r, c in zip(records, changes, strict=True)])
+            own_rows = rows[turned(coupling)] = observed(
+                [
+                    recoupled(record_of(r), c.used, c.wanted)
+                    for r, c in zip(records, changes, strict=True)
+                ]
+            )
         fits[coupling] = estimate_of(own_rows, method, model=model)
     return fits
 
@@ -81,7 +106,9 @@ def turned(coupling: Coupling) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """From the joint side by the drives that a record was read with to the joint side by other drives."""
+    """From the joint side by the drives that a record was read with to the joint side by other
+    drives.
+    """
 
     used: Drives
     wanted: Drives
@@ -100,10 +127,12 @@ def recoupled(record: Record, used: Drives, wanted: Drives) -> Record: ...
 @overload
 def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream: ...
 def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record | Stream:
-    """The record as the drives `wanted` would have turned its motor side into the joint side; `used` are those it was read with."""
+    """The record as the drives `wanted` would have turned its motor side into the joint side;
+    `used` are those it was read with.
+    """
 
     change = Change(used, wanted)
     if not isinstance(record, Record):
-        return ChangedStream.of(record, change)
+        return ChangedStream.of(record, change, wanted)
     q, tau = change(record.q, record.tau)
-    return replace(record, q=q, tau=tau)
+    return replace(record, q=q, tau=tau, origin=replace(record.origin, drives=wanted))

@@ -1,8 +1,10 @@
-"""The identification of many robots from their records, on several cores or a cluster, with one table at the end.
+"""The identification of many robots from their records, on several cores or a cluster, with one
+table at the end.
 
 symgen: 1
 jobs:
-  - {robot: tx40, record: tx40}                                # as on the command line of `symgen identify`
+  - {robot: tx40, record: tx40}
+          # as on the command line of `symgen identify`
   - {name: left arm, robot: my_arm.yaml, record: left.yaml}    # files: relative to this one
 """
 
@@ -12,7 +14,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from functools import cache
+from functools import cache, partial
 from io import StringIO
 from pathlib import Path
 from typing import TypeAlias
@@ -21,8 +23,9 @@ from runtime import parallel
 from runtime.errors import InputError
 from runtime.identification.identification import identify
 from runtime.identification.result import Identification
-from runtime.json_documents import json_text
-from runtime.model.generated import GeneratedModel, ModelText, load_model
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, load_model
 from runtime.records.datasets import DATASETS
 from runtime.records.named import study_of
 from runtime.records.reading import read_records
@@ -36,8 +39,6 @@ from runtime.table import aligned
 Files: TypeAlias = Mapping[str, str | bytes]
 
 FAILED = "failed"
-WAVE = 32
-"""Jobs whose records are in memory at a time."""
 
 
 class JobSettings(Settings):
@@ -59,7 +60,11 @@ class JobSettings(Settings):
 
     def __post_init__(self) -> None:
         for key in ("robot", "record"):
-            require(bool(getattr(self, key)), "missing; expected a name or a file, as for `symgen identify`", key)
+            require(
+                bool(getattr(self, key)),
+                "missing; expected a name or a file, as for `symgen identify`",
+                key,
+            )
 
 
 class FleetSettings(Settings):
@@ -76,7 +81,9 @@ class FleetSettings(Settings):
     jobs: tuple[JobSettings, ...] = ()
 
     def __post_init__(self) -> None:
-        require(self.symgen == SCHEMA, f"schema {self.symgen}; this version reads {SCHEMA}", "symgen")
+        require(
+            self.symgen == SCHEMA, f"schema {self.symgen}; this version reads {SCHEMA}", "symgen"
+        )
         require(bool(self.jobs), "no job; expected a list of {robot: ..., record: ...}", "jobs")
 
 
@@ -104,7 +111,7 @@ class Parcel:
     Attributes
     ----------
     job : Job
-    model : ModelText
+    model : GeneratedModel
     study : Study
     records, further : tuple of Record
         Records to fit, and those of study.validate.record.
@@ -115,7 +122,7 @@ class Parcel:
     """
 
     job: Job
-    model: ModelText
+    model: GeneratedModel
     study: Study
     records: tuple[Record, ...]
     further: tuple[Record, ...]
@@ -180,7 +187,7 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Fleet:
+class Fleet(Result, keys="jobs:rows", schema=1):
     """The lines of all jobs, in the order of the fleet file."""
 
     rows: tuple[Row, ...]
@@ -190,9 +197,6 @@ class Fleet:
         """Whether the estimator of every job ended well."""
         return all(row.status == "ok" for row in self.rows)
 
-    def __str__(self) -> str:
-        return self.to_text()
-
     def to_text(self) -> str:
         """The table, then the jobs that failed with their reasons."""
 
@@ -200,20 +204,53 @@ class Fleet:
             return "-" if value is None else format(value, form)
 
         lines: list[Sequence[str]] = [
-            ("job", "robot", "record", "rows", "parameters", "essential", "cond", "error %", "worst joint", "status")
+            (
+                "job",
+                "robot",
+                "record",
+                "rows",
+                "parameters",
+                "essential",
+                "cond",
+                "error %",
+                "worst joint",
+                "status",
+            )
         ]
         for row in self.rows:
-            worst = "-" if row.worst_joint is None else f"{row.worst_joint} ({number(row.worst_error, '.1f')} %)"
-            counts = (number(row.rows, "d"), number(row.parameters, "d"), number(row.essential, "d"))
-            names = (Path(row.robot).name, Path(row.record).name) if row.rows is None else (row.robot, row.record)
-            lines.append((row.name, *names, *counts, number(row.cond, ".1f"), number(row.relative_error, ".2f"), worst, row.status))
+            worst = (
+                "-"
+                if row.worst_joint is None
+                else f"{row.worst_joint} ({number(row.worst_error, '.1f')} %)"
+            )
+            counts = (
+                number(row.rows, "d"),
+                number(row.parameters, "d"),
+                number(row.essential, "d"),
+            )
+            names = (
+                (Path(row.robot).name, Path(row.record).name)
+                if row.rows is None
+                else (row.robot, row.record)
+            )
+            lines.append(
+                (
+                    row.name,
+                    *names,
+                    *counts,
+                    number(row.cond, ".1f"),
+                    number(row.relative_error, ".2f"),
+                    worst,
+                    row.status,
+                )
+            )
         first_sentence = re.compile(r"(?<=[.;]) |\n")
-        notes = [f"{row.name}: {first_sentence.split(row.message, maxsplit=1)[0]}" for row in self.rows if row.status != "ok"]
+        notes = [
+            f"{row.name}: {first_sentence.split(row.message, maxsplit=1)[0]}"
+            for row in self.rows
+            if row.status != "ok"
+        ]
         return "\n".join([aligned(lines), *([""] if notes else []), *notes])
-
-    def to_json(self) -> str:
-        """summary.json."""
-        return json_text({"schema": 1, "jobs": self.rows})
 
     def to_csv(self) -> str:
         """summary.csv: one line per job."""
@@ -234,7 +271,8 @@ def identify_fleet(
     scheduler: str | None = None,
     finished: Callable[[Finished, int, int], None] = lambda job, done, total: None,
 ) -> Fleet:
-    """Identify many robots from their records. A job that fails has its reason in the table and the others go on.
+    """Identify many robots from their records. A job that fails has its reason in the table and the
+    others go on.
 
     Parameters
     ----------
@@ -245,7 +283,8 @@ def identify_fleet(
     folder : str or Path
         Where the folders of the jobs are to lie.
     files : function of Identification and Path to mapping, optional
-        What makes the contents of a job's folder, such as `runtime.reporting.files.identification_files`; a function of a module.
+        What makes the contents of a job's folder, such as
+        `runtime.reporting.files.identification_files`; a function of a module.
     workers : int
         Processes, this one among them. The results do not depend on it.
     scheduler : str, optional
@@ -260,13 +299,14 @@ def identify_fleet(
     Raises
     ------
     InputError
-        A fleet file that cannot be read, workers besides a scheduler, or a scheduler without an answer.
+        A fleet file that cannot be read, workers besides a scheduler, or a scheduler without an
+        answer.
     """
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out --workers")
     jobs = jobs_of(Path(file))
     rows: dict[str, Row] = {}
-    pack = Packer(cache(lambda robot: _loaded(load, robot)), Path(folder), files)
+    pack = partial(packed, load=cache(load), folder=Path(folder), files=files)
     for job in _all_finished(jobs, pack, workers, scheduler):
         rows[job.row.name] = job.row
         finished(job, len(rows), len(jobs))
@@ -281,7 +321,10 @@ def jobs_of(path: Path) -> list[Job]:
     numbers: dict[str, int] = {}
     for settings in fleet.jobs:
         robot, record = (_relative(name, path.parent) for name in (settings.robot, settings.record))
-        wanted = settings.name or f"{Path(settings.robot).stem}-{Path(settings.record).name.split('.')[0]}"
+        wanted = (
+            settings.name
+            or f"{Path(settings.robot).stem}-{Path(settings.record).name.split('.')[0]}"
+        )
         name = folder = re.sub(r"[^\w.-]+", "_", wanted).strip(".") or "job"
         while name.lower() in taken:
             numbers[folder.lower()] = number = numbers.get(folder.lower(), 1) + 1
@@ -296,48 +339,45 @@ def _relative(name: str, folder: Path) -> str:
     return name if name in DATASETS or not Path(name).suffix else str(folder / name)
 
 
-def _loaded(load: Callable[[str], GeneratedModel], robot: str) -> tuple[GeneratedModel, ModelText]:
-    model = load(robot)
-    return model, ModelText.of(model)
-
-
-@dataclass(frozen=True, eq=False)
-class Packer:
-    """Reads what jobs need.
-
-    Attributes
-    ----------
-    load : function of str to (GeneratedModel, ModelText)
-        The model of a robot and its text.
-    folder : Path
-        Where the folders of the jobs are to lie.
-    files : function of Identification and Path to mapping, or None
-        As for `identify_fleet`.
+def packed(
+    job: Job,
+    load: Callable[[str], GeneratedModel],
+    folder: Path,
+    files: Callable[[Identification, Path], Files] | None,
+) -> Parcel | Finished:
+    """The parcel of a job; where it cannot be made, the line that says why. load : the model of a
+    robot; folder, files : as for `identify_fleet`.
     """
+    try:
+        model = load(job.robot)
+        study = located(*study_of(job.record))
+        if not study.record:
+            raise InputError(
+                "the study names no record; set record.files, or record.dataset with record.files",
+                file=job.record,
+            )
+        missing = study.signals.admits_missing
+        records, further = (
+            tuple(read_records(own, model, missing=missing))
+            for own in (study.record, study.validate.record)
+        )
+    except (InputError, OSError) as e:
+        return Finished(Row(job.name, job.robot, job.record, message=str(e)))
+    return Parcel(job, model, study, records, further, files, folder / job.name)
 
-    load: Callable[[str], tuple[GeneratedModel, ModelText]]
-    folder: Path
-    files: Callable[[Identification, Path], Files] | None
 
-    def __call__(self, job: Job) -> Parcel | Finished:
-        """The parcel of a job; where it cannot be made, the line that says why."""
-        try:
-            model, text = self.load(job.robot)
-            study = located(*study_of(job.record))
-            if not study.record:
-                raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=job.record)
-            missing = study.signals.admits_missing
-            records, further = (tuple(read_records(own, model, missing=missing)) for own in (study.record, study.validate.record))
-        except (InputError, OSError) as e:
-            return Finished(Row(job.name, job.robot, job.record, message=str(e)))
-        return Parcel(job, text, study, records, further, self.files, self.folder / job.name)
-
-
-def _all_finished(jobs: Sequence[Job], pack: Packer, workers: int, scheduler: str | None) -> Iterator[Finished]:
-    """Results as they come; the records of some jobs are read, sent and worked on, then those of the next."""
-    for start in range(0, len(jobs), WAVE):
+def _all_finished(
+    jobs: Sequence[Job],
+    pack: Callable[[Job], Parcel | Finished],
+    workers: int,
+    scheduler: str | None,
+) -> Iterator[Finished]:
+    """Results as they come; the records of some jobs are read, sent and worked on, then those of
+    the next.
+    """
+    for start in range(0, len(jobs), LIMIT.WAVE):
         parcels: list[Parcel] = []
-        for parcel in map(pack, jobs[start : start + WAVE]):
+        for parcel in map(pack, jobs[start : start + LIMIT.WAVE]):
             if isinstance(parcel, Finished):
                 yield parcel
             else:
@@ -349,7 +389,7 @@ def identified(context: None, parcel: Parcel) -> Finished:
     """The work of one job, in any process; whatever goes wrong stays in its line."""
     job = parcel.job
     try:
-        result = identify(parcel.model.load(), parcel.records, parcel.study, further=parcel.further)
+        result = identify(parcel.model, parcel.records, parcel.study, further=parcel.further)
         files = {} if parcel.files is None else parcel.files(result, parcel.folder)
     except Exception as e:  # one job must not end the others
         message = str(e) if isinstance(e, InputError) else f"{type(e).__name__}: {e}"

@@ -1,19 +1,28 @@
-"""The friction of every joint as a curve: what the rest of the model leaves of the torque, against velocity, and which law it follows.
+"""The friction of every joint as a curve: what the rest of the model leaves of the torque, against
+velocity, and which law it follows.
 
-    f_j = Y_j - W_j X without the friction and offset of joint j          (Y, W decimated, X of a fit of all parameters)
+    f_j = Y_j - W_j X without the friction and offset of joint j
+            (Y, W decimated, X of a fit of all parameters)
 
     coulomb+viscous   FS s + FV v + OFFSET                                  s = sign(v)
     asymmetric        FSP, FVP forward, FSN, FVN backward
-    stribeck          FS s + FV v + OFFSET + FST s exp(-(v/VS)^2)           FST the excess at standstill, VS its velocity
-    load              FS s + FV v + OFFSET + FL s |tau_r|                   tau_r the rigid-body torque the transmission carries
+    stribeck          FS s + FV v + OFFSET + FST s exp(-(v/VS)^2)
+            FST the excess at standstill, VS its velocity
+    load              FS s + FV v + OFFSET + FL s |tau_r|
+            tau_r the rigid-body torque the transmission carries
     stribeck+load     both
 
-Every term is built at the rate of the record and decimated like Y, so that the filter rounds sign(v) on both sides alike. Every law contains the
-first and is linear but for VS, which is searched (its F-test is approximate: VS means nothing where FST = 0). Residuals are correlated: deviations take blocks of time as independent, and the F-test and Akaike's
-criterion count N/T samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that did not fit it.
+Every term is built at the rate of the record and decimated like Y, so that the filter rounds
+sign(v) on both sides alike. Every law contains the
+first and is linear but for VS, which is searched (its F-test is approximate: VS means nothing where
+FST = 0). Residuals are correlated: deviations take blocks of time as independent, and the F-test
+and Akaike's
+criterion count N/T samples, T the correlation time of the residual in rows. The law is chosen on
+blocks of time that did not fit it.
 X is held: this says what form friction has, not what the other parameters would be with it.
 
-References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon, Gautier and Garrec (2010) for friction that
+References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon,
+Gautier and Garrec (2010) for friction that
 grows with the load.
 """
 
@@ -27,6 +36,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.linear import percent
 from runtime.identification.friction_laws import (
     LAWS,
     Terms,
@@ -36,26 +46,20 @@ from runtime.identification.friction_laws import (
     joined,
     law_torque,
     p_value,
-    percent,
 )
 from runtime.identification.residuals import correlation_time, residual_correlation
+from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, elements_of, joint_labels, require
 from runtime.model.inertia import physical_model
-from runtime.observation.filters import decimated
-from runtime.observation.observation import certain, decimated_torque, observation_from_states
-from runtime.observation.rows import select_rows
-from runtime.observation.states import observed_states
 from runtime.records.record import Record
+from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
+from runtime.signals.filters import decimated
 from runtime.table import aligned
 
 Array = np.ndarray
 
 OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
-BINS = 40
-NORMAL = 1.96  # half width of a 95 % interval in deviations
-GAIN = 0.01  # a law with more terms must lower the held-out error by this share, and pass the F-test at ...
-LEVEL = 0.01
 
 
 @dataclass(frozen=True)
@@ -130,17 +134,33 @@ class FrictionCurve:
 
     def to_table(self) -> str:
         """Laws line by line, then the parameters of the one that predicts."""
-        rows: list[Sequence[str]] = [(f"joint {self.joint}", "error %", "held out %", "AIC", "p of F", "")]
+        rows: list[Sequence[str]] = [
+            (f"joint {self.joint}", "error %", "held out %", "AIC", "p of F", "")
+        ]
         for law in self.laws:
-            cells = (f"{law.error:.3f}", f"{law.held_out:.3f}", f"{law.aic:+.1f}", f"{law.p_value:.2g}")
+            cells = (
+                f"{law.error:.3f}",
+                f"{law.held_out:.3f}",
+                f"{law.aic:+.1f}",
+                f"{law.p_value:.2g}",
+            )
             rows.append((law.name, *cells, "chosen" if law.name == self.law_name else ""))
-        values = ", ".join(f"{name} {x:.4g} +- {self.law.sigma[name]:.2g}" for name, x in self.law.parameters.items())
-        return f"{aligned(rows)}\n{self.law_name}: {values}" + (f"\n{self.note}" if self.note else "")
+        values = ", ".join(
+            f"{name} {x:.4g} +- {self.law.sigma[name]:.2g}"
+            for name, x in self.law.parameters.items()
+        )
+        return f"{aligned(rows)}\n{self.law_name}: {values}" + (
+            f"\n{self.note}" if self.note else ""
+        )
 
     @property
     def label(self) -> str:
         """Name of the law that predicts; says where its Stribeck term makes no peak."""
-        return f"{self.law_name} (no peak)" if self.law.parameters.get("FST", 1.0) < 0 else self.law_name
+        return (
+            f"{self.law_name} (no peak)"
+            if self.law.parameters.get("FST", 1.0) < 0
+            else self.law_name
+        )
 
     @property
     def note(self) -> str:
@@ -150,23 +170,44 @@ class FrictionCurve:
             return ""
         if excess > 0:
             return "friction is larger at standstill than in slow motion: the Stribeck effect"
-        return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
+        return (
+            "FST is negative: friction falls towards standstill, there is no Stribeck peak; "
+            "the "
+            "term bends the curve of viscous friction"
+        )
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
         curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
-        return {"joint": self.joint, "chosen": self.law_name, "note": self.note, "laws": self.laws, "curve": curve}
+        return {
+            "joint": self.joint,
+            "chosen": self.law_name,
+            "note": self.note,
+            "laws": self.laws,
+            "curve": curve,
+        }
 
 
-def friction_curves(model: GeneratedModel, records: Sequence[Record], study: Study, fit: Estimate) -> tuple[FrictionCurve, ...]:
-    """Friction against velocity, one curve per joint, from records of the joint side and an estimate of all parameters."""
+def friction_curves(
+    model: GeneratedModel, records: Sequence[Record | Prepared], study: Study, fit: Estimate
+) -> tuple[FrictionCurve, ...]:
+    """Friction against velocity, one curve per joint, from records of the joint side and an
+    estimate of all parameters.
+    """
     require(model, "inverse_dynamics")
-    parts = [_terms(model, record, study, fit, k) for k, record in enumerate(records)]
-    return tuple(_curve(label, joined([part[j] for part in parts])) for j, label in enumerate(joint_labels(model)))
+    parts = [
+        _terms(model, prepared(model, record, study), fit, k) for k, record in enumerate(records)
+    ]
+    return tuple(
+        _curve(label, joined([part[j] for part in parts]))
+        for j, label in enumerate(joint_labels(model))
+    )
 
 
 def own_friction(model: GeneratedModel, j: int) -> list[int]:
-    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its curve."""
+    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its
+    curve.
+    """
     physical = physical_model(model)
     elements = elements_of(model)
     own = [name in elements and elements[name][0] in OWN for name in physical.standard]
@@ -175,26 +216,30 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
     return [int(k) for k in np.flatnonzero(alone) if not physical.K[k][~np.array(own)].any()]
 
 
-def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, number: int) -> list[Terms]:
+def _terms(model: GeneratedModel, own: Prepared, fit: Estimate, number: int) -> list[Terms]:
     """Terms of every joint of one record."""
-    states = observed_states(model, record.q, record.rate, study.signals, missing=record.missing, name=record.name)
-    selection = certain(model, states, select_rows(record, states.qd, study.signals, study.rows))
-    observation = observation_from_states(model, states, decimated_torque(record.tau, selection), selection)
-    window = states[selection.samples]
+    selection, observation = own.certain(model), own.observation(model)
+    window = own.states[selection.samples]
     X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
     block = observation.blocks()
-    own = [own_friction(model, j) for j in range(observation.n)]
+    alone = [own_friction(model, j) for j in range(observation.n)]
     frictionless = X.copy()
-    frictionless[[k for columns in own for k in columns]] = 0.0  # each acts on its own joint alone
-    transmitted = np.abs(cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, frictionless))
+    frictionless[[k for columns in alone for k in columns]] = (
+        0.0  # each acts on its own joint alone
+    )
+    transmitted = np.abs(
+        cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, frictionless)
+    )
 
     def at_rows(signal: Array, j: int) -> Array:
-        return decimated(signal, selection.factor, selection.signals.decimate)[..., selection.mask[j]]
+        return decimated(signal, selection.factor, selection.signals.decimate)[
+            ..., selection.mask[j]
+        ]
 
     terms = []
     for j in range(observation.n):
         rest = X.copy()
-        rest[own[j]] = 0.0
+        rest[alone[j]] = 0.0
         rows, v = observation.joint(j), window.qd[:, j]
         s = np.sign(v)
         signals = {
@@ -213,13 +258,24 @@ def _terms(model: GeneratedModel, record: Record, study: Study, fit: Estimate, n
 
         linear = {name: at_rows(signal, j) for name, signal in signals.items()}
         own_block = block[rows] + (number << 32)
-        terms.append(Terms(observation.Y[rows] - observation.W[rows] @ rest, linear["FV"], own_block, linear, excess))
+        terms.append(
+            Terms(
+                observation.Y[rows] - observation.W[rows] @ rest,
+                linear["FV"],
+                own_block,
+                linear,
+                excess,
+            )
+        )
     return terms
 
 
 def _curve(joint: str, terms: Terms) -> FrictionCurve:
     if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
-        raise InputError(f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record (rows.window, rows.low_speed)")
+        raise InputError(
+            f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record "
+            "(rows.window, rows.low_speed)"
+        )
     all_rows = np.ones(len(terms.f), dtype=bool)
     even = terms.block % 2 == 0
     fits = {name: fitted(terms, names, all_rows) for name, names in LAWS.items()}
@@ -243,21 +299,35 @@ def _curve(joint: str, terms: Terms) -> FrictionCurve:
         )
     centre, mean, half, mean_of = _bins(terms)
     torques = {name: mean_of(law_torque(terms, fit)) for name, fit in fits.items()}
-    return FrictionCurve(joint, terms.v, terms.f, centre, mean, half, tuple(laws), _predicting(laws), torques)
+    return FrictionCurve(
+        joint, terms.v, terms.f, centre, mean, half, tuple(laws), _predicting(laws), torques
+    )
 
 
 def _predicting(laws: Sequence[FrictionLaw]) -> str:
-    """The smallest held-out error among the laws that are worth their terms; the first where none is."""
+    """The smallest held-out error among the laws that are worth their terms; the first where none
+    is.
+    """
     first, *others = laws
-    worth = [law for law in others if law.p_value < LEVEL and law.held_out < (1 - GAIN) * first.held_out]
+    worth = [
+        law
+        for law in others
+        if law.p_value < LIMIT.LAW_LEVEL and law.held_out < (1 - LIMIT.LAW_GAIN) * first.held_out
+    ]
     return min(worth, key=lambda law: law.held_out, default=first).name
 
 
 def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
-    """Centres, means and half intervals over bins of about equal numbers of rows, none across standstill; and the function that averages over them."""
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across
+    standstill; and the function that averages over them.
+    """
     sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
-    shares = [max(round(BINS * len(side) / len(terms.v)), 1) for side in sides]
-    inner = [np.quantile(side, np.linspace(0, 1, k + 1)) for side, k in zip(sides, shares, strict=True) if len(side)]
+    shares = [max(round(LIMIT.FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
+    inner = [
+        np.quantile(side, np.linspace(0, 1, k + 1))
+        for side, k in zip(sides, shares, strict=True)
+        if len(side)
+    ]
     edges = np.unique(np.concatenate([*inner, [0.0]]))
     which = np.clip(np.searchsorted(edges, terms.v, side="right") - 1, 0, max(len(edges) - 2, 0))
     count = np.bincount(which)
@@ -271,5 +341,7 @@ def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
     sums = np.bincount(cell, weights=terms.f - mean[which])  # of a bin in a block
     bin_of = np.zeros(len(sums), dtype=int)
     bin_of[cell] = which
-    variance = np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
-    return mean_of(terms.v), mean[used], NORMAL * np.sqrt(variance[used]), mean_of
+    variance = (
+        np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
+    )
+    return mean_of(terms.v), mean[used], LIMIT.INTERVAL * np.sqrt(variance[used]), mean_of

@@ -1,4 +1,5 @@
-"""Laws of friction as terms of a least-squares fit, and how well each predicts rows that did not fit it.
+"""Laws of friction as terms of a least-squares fit, and how well each predicts rows that did not
+fit it.
 
 Laws, signs and references: `runtime.identification.friction`.
 """
@@ -15,11 +16,11 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import f as fisher
 
 from runtime.estimators.block_covariance import block_covariance
-from runtime.observation.system import split_rows
+from runtime.estimators.linear import percent
+from runtime.limits import LIMIT
+from runtime.rows.observation import split_rows
 
 Array = np.ndarray
-
-SLOWEST, FASTEST, GRID = 0.005, 0.5, 16  # of the largest speed: where VS is searched, and at how many values first
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,13 @@ class Terms:
 
     @cached_property
     def grid(self) -> tuple[Array, Array]:
-        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for each, shape (k, N)."""
-        x = np.log(np.abs(self.v).max() * np.geomspace(SLOWEST, FASTEST, GRID))
+        """Logarithms of the VS among which a search begins, shape (k,), and the term of FST for
+        each, shape (k, N).
+        """
+        x = np.log(
+            np.abs(self.v).max()
+            * np.geomspace(LIMIT.STRIBECK_SLOWEST, LIMIT.STRIBECK_FASTEST, LIMIT.STRIBECK_GRID)
+        )
         return x, self.excess(np.exp(x))
 
 
@@ -64,15 +70,25 @@ LAWS: Mapping[str, tuple[str, ...]] = {
 
 def joined(parts: Sequence[Terms]) -> Terms:
     """The rows of several records."""
-    linear = {name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear}
+    linear = {
+        name: np.concatenate([part.linear[name] for part in parts]) for name in parts[0].linear
+    }
     _, block = np.unique(np.concatenate([part.block for part in parts]), return_inverse=True)
     f, v = (np.concatenate([getattr(part, name) for part in parts]) for name in ("f", "v"))
-    return Terms(f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts], axis=-1))
+    return Terms(
+        f, v, block, linear, lambda VS: np.concatenate([part.excess(VS) for part in parts], axis=-1)
+    )
 
 
 def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
     """The linear terms of a law, (N, terms)."""
-    return np.column_stack([terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name] for name in names if name != "VS"])
+    return np.column_stack(
+        [
+            terms.excess(cast(float, VS)) if name == "FST" else terms.linear[name]
+            for name in names
+            if name != "VS"
+        ]
+    )
 
 
 def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
@@ -84,7 +100,9 @@ def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
 
 
 def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
-    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes (e'r)^2 / e'e from the squares of their residual r."""
+    """VS of the least squares of a law: the term of FST, made orthogonal to the others, takes
+    (e'r)^2 / e'e from the squares of their residual r.
+    """
     others = _columns(terms, [name for name in names if name not in ("FST", "VS")], None)[rows]
     U, s, _ = np.linalg.svd(others, full_matrices=False)
     Q = U[:, s > s[0] * max(others.shape) * np.finfo(float).eps]
@@ -101,14 +119,21 @@ def _excess_velocity(terms: Terms, names: Sequence[str], rows: Array) -> float:
     grid, excesses = terms.grid
     best, step = grid[np.argmin(left(excesses))], grid[1] - grid[0]
     ends = (max(best - step, grid[0]), min(best + step, grid[-1]))
-    found = minimize_scalar(lambda x: float(left(terms.excess(float(np.exp(x))))), bounds=ends, method="bounded", options={"xatol": 1e-3})
+    found = minimize_scalar(
+        lambda x: float(left(terms.excess(float(np.exp(x))))),
+        bounds=ends,
+        method="bounded",
+        options={"xatol": 1e-3},
+    )
     return float(np.exp(found.x))
 
 
 def law_torque(terms: Terms, law: Mapping[str, float]) -> Array:
     """Torque of a law at the rows, shape (N,), by the values of its parameters."""
     names = tuple(law)
-    return np.asarray(_columns(terms, names, law.get("VS")) @ [law[name] for name in names if name != "VS"])
+    return np.asarray(
+        _columns(terms, names, law.get("VS")) @ [law[name] for name in names if name != "VS"]
+    )
 
 
 def held_out_error(terms: Terms, names: Sequence[str], even: Array) -> float:
@@ -124,21 +149,27 @@ def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[
     A = _columns(terms, tuple(law), law.get("VS"))
     if "VS" in law:
         VS, h = law["VS"], 1e-4 * law["VS"]
-        A = np.column_stack([A, law["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)])
+        A = np.column_stack(
+            [A, law["FST"] * (terms.excess(VS + h) - terms.excess(VS - h)) / (2 * h)]
+        )
     T = np.linalg.pinv(np.linalg.qr(A, mode="r"))
     blocks = split_rows(np.column_stack([A, residual]), terms.block)
-    return dict(zip(law, map(float, np.sqrt(np.diag(block_covariance(blocks, np.zeros(A.shape[1]), T)))), strict=True))
+    return dict(
+        zip(
+            law,
+            map(float, np.sqrt(np.diag(block_covariance(blocks, np.zeros(A.shape[1]), T)))),
+            strict=True,
+        )
+    )
 
 
-def p_value(squares_first: float, squares: float, terms_first: int, terms: int, count: float) -> float:
-    """Of the F-test of a law against the first one, from their squared residuals, numbers of terms, and independent samples."""
+def p_value(
+    squares_first: float, squares: float, terms_first: int, terms: int, count: float
+) -> float:
+    """Of the F-test of a law against the first one, from their squared residuals, numbers of terms,
+    and independent samples.
+    """
     if terms == terms_first or squares <= 0 or count <= terms:
         return 1.0
     F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
     return float(fisher.sf(F, terms - terms_first, count - terms))
-
-
-def percent(residual: Array, of: Array) -> float:
-    """100 ||residual|| / ||of||, in %."""
-    norm = float(np.linalg.norm(of))
-    return 100 * float(np.linalg.norm(residual)) / norm if norm > 0 else float("nan")

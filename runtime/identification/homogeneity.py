@@ -1,14 +1,20 @@
 """Do several records of one robot tell the same parameters, within their stated deviations?
 
-Each record k is fitted alone with the same b columns: X_k, and S_k = D C_k D, the covariance of eq. (10) with the corrected deviations, which take blocks of
+Each record k is fitted alone with the same b columns: X_k, and S_k = D C_k D, the covariance of eq.
+(10) with the corrected deviations, which take blocks of
 time as independent, on its diagonal.
 
-    per parameter    z = (X_ik - X_i,-k)/sqrt(s_ik^2 + s_i,-k^2),  X_i,-k the mean of the other records weighted by their deviations; Student's t with the
+    per parameter    z = (X_ik - X_i,-k)/sqrt(s_ik^2 + s_i,-k^2),
+            X_i,-k the mean of the other records weighted by their deviations; Student's t with the
                      blocks of the record less one as degrees of freedom; probabilities by Holm
-    in all           Q = sum_k (X_k - X)' S_k^-1 (X_k - X),  X = (sum_k S_k^-1)^-1 sum_k S_k^-1 X_k: (K - 1) b F((K - 1) b, least number of blocks less b)
+    in all           Q = sum_k (X_k - X)' S_k^-1 (X_k - X),
+            X = (sum_k S_k^-1)^-1 sum_k S_k^-1 X_k: (K - 1) b F((K - 1) b, least number of blocks
+            less b)
 
-Each test has half of the level. The second is left out where a record has fewer than 2 b blocks: S_k is then known too badly to be inverted.
-Records that differ say that the robot changed (load, temperature, wear), that something in one record is wrong, or that the model leaves out what their motions do
+Each test has half of the level. The second is left out where a record has fewer than 2 b blocks:
+S_k is then known too badly to be inverted.
+Records that differ say that the robot changed (load, temperature, wear), that something in one
+record is wrong, or that the model leaves out what their motions do
 not share: the stated deviations know nothing of model error.
 
 References: Rao (1973), section 4b.3, for the likelihood of homogeneity; Holm (1979).
@@ -18,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import f as fisher
@@ -26,16 +31,16 @@ from scipy.stats import t as student
 
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of, linear_companion
+from runtime.estimators.method import linear_companion
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
-from runtime.observation.system import Observation
+from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
 from runtime.table import Table
 
 Array = np.ndarray
-
-LEVEL = 0.05
-"""Probability of saying that records which agree do not; half of it for each of the two tests."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
-class Homogeneity:
+class Homogeneity(Result, keys="records parameters p agree disagreements untested"):
     """Whether records agree.
 
     Attributes
@@ -73,7 +78,8 @@ class Homogeneity:
     records, parameters : tuple of str
         What was compared.
     p : float
-        Probability of differences as large between records of one robot: twice the smaller of the two tests.
+        Probability of differences as large between records of one robot: twice the smaller of the
+        two tests.
     disagreements : tuple of Disagreement
         Parameters that differ, the most certain first.
     untested : tuple of str
@@ -89,12 +95,17 @@ class Homogeneity:
     @property
     def agree(self) -> bool:
         """Whether neither test rejects."""
-        return not self.p < LEVEL
+        return not self.p < LIMIT.AGREEMENT_LEVEL
 
     @property
     def largest(self) -> float:
-        """Largest difference among the disagreements, % of the larger value; inf where the test in all alone rejects."""
-        differences = [100 * abs(d.value - d.others) / max(abs(d.value), abs(d.others)) for d in self.disagreements]
+        """Largest difference among the disagreements, % of the larger value; inf where the test in
+        all alone rejects.
+        """
+        differences = [
+            100 * abs(d.value - d.others) / max(abs(d.value), abs(d.others))
+            for d in self.disagreements
+        ]
         return max(differences, default=0.0 if self.agree else float("inf"))
 
     @property
@@ -105,37 +116,53 @@ class Homogeneity:
             return f"Whether the records agree cannot be told.{left_out}"
         names = ", ".join(self.records)
         if self.agree:
-            return f"The records {names} agree within their stated deviations (p {self.p:.2g} for {len(self.parameters)} parameters).{left_out}"
+            return (
+                f"The records {names} agree within their stated deviations (p {self.p:.2g} for "
+                f"{len(self.parameters)} parameters).{left_out}"
+            )
         told: dict[str, list[str]] = {}
         for one in self.disagreements:
             told.setdefault(one.record, []).append(
-                f"{one.parameter} ({one.value:.3g}, elsewhere {one.others:.3g}, {abs(one.z):.1f} deviations)"
+                f"{one.parameter} ({one.value:.3g}, elsewhere {one.others:.3g}, {abs(one.z):.1f} "
+                "deviations)"
             )
-        where = "; ".join(f"{record}: {', '.join(own[:4])}{' ...' if len(own) > 4 else ''}" for record, own in told.items())
-        return f"The records {names} do NOT agree within their stated deviations (p {self.p:.1g}). {where or 'No single parameter stands out'}.{left_out}"
+        where = "; ".join(
+            f"{record}: {', '.join(own[:4])}{' ...' if len(own) > 4 else ''}"
+            for record, own in told.items()
+        )
+        return (
+            f"The records {names} do NOT agree within their stated deviations (p "
+            f"{self.p:.1g}). "
+            f"{where or 'No single parameter stands out'}.{left_out}"
+        )
 
     def table(self) -> Table:
         """Parameters that differ."""
         rows = [
-            (d.record, d.parameter, f"{d.value:.4g}", f"{d.deviation:.2g}", f"{d.others:.4g}", f"{d.z:+.1f}", f"{d.p:.1g}")
+            (
+                d.record,
+                d.parameter,
+                f"{d.value:.4g}",
+                f"{d.deviation:.2g}",
+                f"{d.others:.4g}",
+                f"{d.z:+.1f}",
+                f"{d.p:.1g}",
+            )
             for d in self.disagreements
         ]
-        return Table("Parameters in which records differ", ("record", "parameter", "value", "deviation", "other records", "z", "p"), rows)
-
-    def summary(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "records": self.records,
-            "parameters": self.parameters,
-            "p": self.p,
-            "agree": self.agree,
-            "disagreements": self.disagreements,
-            "untested": self.untested,
-        }
+        return Table(
+            "Parameters in which records differ",
+            ("record", "parameter", "value", "deviation", "other records", "z", "p"),
+            rows,
+        )
 
 
 def homogeneity(
-    parts: Mapping[str, Observation], names: Sequence[str], settings: EstimateSettings | None = None, *, model: GeneratedModel | None = None
+    parts: Mapping[str, Observation],
+    names: Sequence[str],
+    settings: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
 ) -> Homogeneity:
     """Whether records agree.
 
@@ -163,9 +190,15 @@ def homogeneity(
             continue
         if fit.status != "ok" or not np.isfinite(fit.sigma_corrected).all() or not fit.sigma.all():
             lost = ", ".join(name for group in fit.groups for name in group)
-            untested.append(f"{record}, which alone does not determine {lost or 'the parameters and their deviations'}")
+            untested.append(
+                f"{record}, which alone does not determine "
+                f"{lost or 'the parameters and their deviations'}"
+            )
             continue
-        fits[record], blocks[record] = fit, sum(1 for _ in part.block_rows(names, np.ones(part.n), part.residual_block))
+        fits[record], blocks[record] = (
+            fit,
+            sum(1 for _ in part.block_rows(names, np.ones(part.n), part.residual_block)),
+        )
     if len(fits) < 2:
         return Homogeneity(tuple(fits), tuple(names), float("nan"), (), tuple(untested))
     X = np.array([fit.X for fit in fits.values()])
@@ -179,13 +212,26 @@ def homogeneity(
     order = np.argsort(p, axis=None)
     records = tuple(fits)
     named = [
-        Disagreement(records[k], names[i], float(X[k, i]), float(s[k, i]), float(others[k, i]), float(z[k, i]), float(corrected[k, i]))
+        Disagreement(
+            records[k],
+            names[i],
+            float(X[k, i]),
+            float(s[k, i]),
+            float(others[k, i]),
+            float(z[k, i]),
+            float(corrected[k, i]),
+        )
         for k, i in zip(*np.unravel_index(order, p.shape), strict=True)
-        if corrected[k, i] < LEVEL / 2 and (len(fits) > 2 or k == 1)
+        if corrected[k, i] < LIMIT.AGREEMENT_LEVEL / 2 and (len(fits) > 2 or k == 1)
     ]
     least = min(blocks.values())
-    tests = [float(corrected.min()), _overall(X, s, list(fits.values()), least) if least >= 2 * len(names) else 1.0]
-    return Homogeneity(records, tuple(names), min(1.0, 2 * min(tests)), tuple(named), tuple(untested))
+    tests = [
+        float(corrected.min()),
+        _overall(X, s, list(fits.values()), least) if least >= 2 * len(names) else 1.0,
+    ]
+    return Homogeneity(
+        records, tuple(names), min(1.0, 2 * min(tests)), tuple(named), tuple(untested)
+    )
 
 
 def _against_others(X: Array, s: Array) -> tuple[Array, Array]:
@@ -213,6 +259,8 @@ def _overall(X: Array, s: Array, fits: Sequence[Estimate], blocks: int) -> float
         scale = own / np.sqrt(np.diag(fit.covariance))
         inverses.append(np.linalg.inv(fit.covariance * np.outer(scale, scale)))
     mean = np.linalg.solve(np.sum(inverses, axis=0), np.einsum("kij,kj->i", np.array(inverses), X))
-    Q = sum(float((x - mean) @ inverse @ (x - mean)) for x, inverse in zip(X, inverses, strict=True))
+    Q = sum(
+        float((x - mean) @ inverse @ (x - mean)) for x, inverse in zip(X, inverses, strict=True)
+    )
     q = (K - 1) * b
     return float(fisher.sf(Q / q, q, max(blocks - b, 1)))

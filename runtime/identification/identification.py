@@ -1,7 +1,9 @@
-"""The identification of one robot from its records: one call, with everything a report says about it.
+"""The identification of one robot from its records: one call, with everything a report says about
+it.
 
 model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
-                      -> measured beside predicted torques, windows of the records against each other, parameters that trade, coupling
+                      -> measured beside predicted torques, windows of the records against each
+                      other, parameters that trade, coupling
                       -> where they are asked for: a load, feasibility, friction curves
 """
 
@@ -13,34 +15,42 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from runtime.blas import single_threaded
+from runtime.checks.plausibility import plausibility
 from runtime.errors import InputError
-from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.essential import essential_of
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import LINEAR, estimate_of, linear_companion, simulator_of
-from runtime.estimators.methods import observed as method_observation
+from runtime.estimators.method import LINEAR, linear_companion
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.friction import friction_curves
 from runtime.identification.homogeneity import homogeneity
 from runtime.identification.parameter_sets import SetName, best_set, parameter_sets
 from runtime.identification.payload_study import payload_study
-from runtime.identification.plausibility.plausibility import PlausibilityTask
 from runtime.identification.result import Identification
 from runtime.identification.uncertainty import uncertainty
-from runtime.identification.validation import CrossValidation, cross_validation, direct_comparison, split_validation, weak_directions
+from runtime.identification.validation import (
+    CrossValidation,
+    cross_validation,
+    direct_comparison,
+    split_validation,
+    weak_directions,
+)
+from runtime.loop.methods import estimate_of, simulator_of
+from runtime.loop.methods import observed as method_observation
 from runtime.model.generated import GeneratedModel
 from runtime.model.inertia import physical_model
-from runtime.observation.system import halves
 from runtime.parallel import Workers, started
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
 from runtime.records.record import Record
 from runtime.records.stream import Stream
+from runtime.rows.observation import halves
+from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
+    from runtime.loop.simulation import Simulator
 
 __all__ = ["Identification", "feasibility_of", "identify", "whole_records"]
 
@@ -52,7 +62,7 @@ def identify(
     study: Study | None = None,
     *,
     further: Sequence[Record | Stream] | None = None,
-    simulator: LoopSimulator | None = None,
+    simulator: Simulator | None = None,
     physical: bool = False,
     friction: bool = False,
     variants: GeneratedModel | None = None,
@@ -71,19 +81,24 @@ def identify(
     study : Study, optional
         Settings; default: Study().
     further : sequence of Record or Stream, optional
-        Records that the parameters predict; default: those of study.validate.record, read from their files.
-    simulator : LoopSimulator, optional
-        The closed loop, which iv, didim and cloe need; default: that of study.controller, with the CasADi module that lies with `model`.
+        Records that the parameters predict; default: those of study.validate.record, read from
+        their files.
+    simulator : Simulator, optional
+        The closed loop, which iv, didim and cloe need; default: that of study.controller, with the
+        CasADi module that lies with `model`.
     physical : bool
         Whether a physical robot can have the parameters.
     friction : bool
         Curves of friction against velocity, joint by joint.
     variants : GeneratedModel, optional
-        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
+        The module of `symgen.variants`: other tables of frames and directions of gravity are tried
+        on the records.
     plausible : bool, optional
-        Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
+        Whether record, study and robot file suit each other (`runtime.plausibility`); default:
+        where `variants` is given.
     workers : int or Workers, optional
-        Processes, this one among them, that read and filter long records by blocks. The results do not depend on it in any bit; a record in memory, or of one
+        Processes, this one among them, that read and filter long records by blocks. The results do
+        not depend on it in any bit; a record in memory, or of one
         piece, takes one process.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
@@ -99,17 +114,33 @@ def identify(
     """
     study = study or Study()
     records = tuple(records) if isinstance(records, Sequence) else (records,)
+    own = tuple(
+        record if isinstance(record, Stream) else prepared(model, record, study)
+        for record in records
+    )
     provenance = {**origin(records), **(provenance or {})}
     simulator = simulator or simulator_of(model, study)
     if further is None:
-        further = records_or_streams(study.validate.record, model, study.stream, missing=study.signals.admits_missing)
+        further = records_or_streams(
+            study.validate.record, model, study.stream, missing=study.signals.admits_missing
+        )
     asked = variants is not None if plausible is None else plausible
     with started(workers) as processes:
-        judged = processes.meanwhile(PlausibilityTask(model, records, study, variants)) if asked else None
+        judged = (
+            processes.meanwhile(partial(plausibility, model, own, study, variants=variants))
+            if asked
+            else None
+        )
         observed = partial(method_observation, model, study=study, workers=processes)
-        observation = observed(records, simulator=simulator)
+        observation = observed(own, simulator=simulator)
         at("least squares, essential parameters")
-        reduced = essential_of(observation, study.essential, linear_companion(study.estimate), model=model, provenance=provenance)
+        reduced = essential_of(
+            observation,
+            study.essential,
+            linear_companion(study.estimate),
+            model=model,
+            provenance=provenance,
+        )
         sets: dict[SetName, Estimate] = {}
         missing: list[str] = []
         if study.estimate.method in LINEAR:
@@ -118,12 +149,17 @@ def identify(
         else:
             at(study.estimate.method)
             fit = estimate_of(observation, study.estimate, model=model, provenance=provenance)
-            how = {"all": study.estimate, "essential": replace(study.estimate, columns=reduced.names)}
+            how = {
+                "all": study.estimate,
+                "essential": replace(study.estimate, columns=reduced.names),
+            }
         windows = study.validate.split or halves(*observation.span)
         names = record_names([*records, *further])
         fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
         validation: list[CrossValidation] = []
-        ended = fit.status == "ok" or study.estimate.method in LINEAR  # else each validation would simulate a loop that is wrong once more
+        ended = (
+            fit.status == "ok" or study.estimate.method in LINEAR
+        )  # else each validation would simulate a loop that is wrong once more
         if ended:
             at("validation")
             try:
@@ -131,39 +167,59 @@ def identify(
             except InputError as e:
                 missing = [*missing, f"validation between windows of the record: {e}"]
         else:
-            missing = [*missing, f"validation: {study.estimate.method} ended with status {fit.status}"]
-        parts = {name: observed([record], windows=()) for name, record in zip(others, further, strict=True)}
+            missing = [
+                *missing,
+                f"validation: {study.estimate.method} ended with status {fit.status}",
+            ]
+        parts = {
+            name: observed([record], windows=())
+            for name, record in zip(others, further, strict=True)
+        }
         if parts and ended:
             known = sets or {"all": fit}
-            validation.append(cross_validation(observation, parts, how, name=fitted, model=model, fitted=known))
+            validation.append(
+                cross_validation(observation, parts, how, name=fitted, model=model, fitted=known)
+            )
         missing += [text for part in validation for text in part.missing]
         best = best_set(validation[-1].errors() if validation and sets else {})
         if best == "feasible" and sets:
             at("physical parameters, records of resampled blocks")
             options = {key: value for key, value in how[best].options.items() if key != "bootstrap"}
-            sets[best] = estimate_of(observation, replace(how[best], options=options), model=model, provenance=provenance)
+            sets[best] = estimate_of(
+                observation, replace(how[best], options=options), model=model, provenance=provenance
+            )
         comparison = direct_comparison(observation.first_rows, sets[best] if sets else fit)
-        each = {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])} if len(names) > 1 else {}
+        each = (
+            {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])}
+            if len(names) > 1
+            else {}
+        )
         result = Identification(
             model=model,
             study=study,
-            records=records,
+            prepared=own,
             observation=observation,
             estimate=fit,
             essential=reduced,
             comparison=comparison,
             validation=tuple(validation),
             sets=sets,
-            homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model) if each else None,
+            homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model)
+            if each
+            else None,
             missing=tuple(missing),
             correlations=weak_directions(observation, study.estimate),
-            coupling=coupling_fits(model, records, study, observation, fit, partial(observed, windows=())),
+            coupling=coupling_fits(
+                model, own, study, observation, fit, partial(observed, windows=())
+            ),
             uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
         )
-        whole = whole_records(records) if friction or study.payload is not None else []
+        whole = whole_records(own) if friction or study.payload is not None else []
         return replace(
             result,
-            payload=None if study.payload is None else payload_study(model, whole, study, provenance=origin(records)),
+            payload=None
+            if study.payload is None
+            else payload_study(model, whole, study, provenance=origin(records)),
             feasibility=feasibility_of(result) if physical and not result.feasible else None,
             friction=friction_curves(model, whole, study, fit) if friction else (),
             plausibility=judged() if judged else None,
@@ -177,9 +233,9 @@ def feasibility_of(result: Identification) -> Feasibility:
     return feasibility(physical_model(result.model), result.estimate.names, result.estimate.X)
 
 
-def whole_records(records: Sequence[Record | Stream]) -> list[Record]:
+def whole_records(records: Sequence[Prepared | Stream]) -> list[Prepared]:
     """The records, all of them in memory; InputError where one is read by blocks."""
-    whole = [record for record in records if isinstance(record, Record)]
+    whole = [record for record in records if isinstance(record, Prepared)]
     if len(whole) < len(records):
         raise InputError("a load and friction curves need whole records; set stream: off")
     return whole

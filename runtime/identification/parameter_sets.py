@@ -1,11 +1,15 @@
-"""Nested sets of parameters of one robot: essential, feasible, all. Which predicts data it has not seen best?
+"""Nested sets of parameters of one robot: essential, feasible, all. Which predicts data it has not
+seen best?
 
     essential    fewest columns, the others zero
-    feasible     all columns, among physical robots, pulled to the values of the robot file where there are any
+    feasible     all columns, among physical robots, pulled to the values of the robot file where
+                 there are any
     all          least squares
 
-More columns explain the record that gave them better and another one worse, as soon as the motion does not determine them. The first set whose error on
-unseen data is within PREFERRED of the smallest stands for the robot: the essential one, then the feasible one.
+More columns explain the record that gave them better and another one worse, as soon as the motion
+does not determine them. The first set whose error on
+unseen data is within LIMIT.PREFERRED_SET of the smallest stands for the robot: the essential one,
+then the feasible one.
 """
 
 from __future__ import annotations
@@ -18,56 +22,84 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
-from runtime.observation.system import Observation
 from runtime.progress import at
+from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
 
 SetName = Literal["essential", "feasible", "all"]
 ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
-PREFERRED = 1.05
-"""Error over the smallest one, up to which a set of fewer or physical parameters is preferred."""
 
 
 def parameter_sets(
-    observation: Observation, settings: EstimateSettings, reduced: Essential, *, model: GeneratedModel
+    observation: Observation,
+    settings: EstimateSettings,
+    reduced: Essential,
+    *,
+    model: GeneratedModel,
 ) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings], str]:
-    """The sets of a linear method that can be had, the settings that give each, and why one is missing ("": none is).
+    """The sets of a linear method that can be had, the settings that give each, and why one is
+    missing ("": none is).
 
-    The weight of the prior that the whole of the rows asks for is kept in the settings of the feasible set, for fits of parts of them.
+    The weight of the prior that the whole of the rows asks for is kept in the settings of the
+    feasible set, for fits of parts of them.
     """
     sets: dict[SetName, Estimate] = {"essential": reduced.estimate, "all": reduced.all_parameters}
     how: dict[SetName, EstimateSettings] = {
-        "essential": EstimateSettings(settings.method, settings.weights, reduced.names, settings.options),
+        "essential": EstimateSettings(
+            settings.method, settings.weights, reduced.names, settings.options
+        ),
         "all": settings,
     }
-    if settings.columns != "all" or settings.weights == "covariance" or reduced.all_parameters.status != "ok" or observation.reduced:
+    if (
+        settings.columns != "all"
+        or settings.weights == "covariance"
+        or reduced.all_parameters.status != "ok"
+        or observation.reduced
+    ):
         return sets, how, ""
     at("physical parameters")
     options = {"bootstrap": 0, **({"linear": settings.options} if settings.options else {})}
-    own = EstimateSettings("feasible", "none" if settings.method == "ols" else "joint", "all", options)
+    own = EstimateSettings(
+        "feasible", "none" if settings.method == "ols" else "joint", "all", options
+    )
     try:
         fit = estimate_of(observation, own, model=model)
     except InputError as e:
         return sets, how, f"physical parameters: {e}"
     sets["feasible"] = fit
     prior = fit.details["options"]["prior"] != "none"
-    how["feasible"] = EstimateSettings("feasible", own.weights, "all", {**options, "weight": fit.details["weight"]} if prior else options)
+    how["feasible"] = EstimateSettings(
+        "feasible",
+        own.weights,
+        "all",
+        {**options, "weight": fit.details["weight"]} if prior else options,
+    )
     return sets, how, ""
 
 
 def best_set(errors: Mapping[Any, float]) -> SetName:
-    """The set that stands for the robot, by the error of each on unseen data, %; essential where no error is known."""
+    """The set that stands for the robot, by the error of each on unseen data, %; essential where no
+    error is known.
+    """
     known = {name: error for name, error in errors.items() if np.isfinite(error)}
     if not known:
         return "essential"
     least = min(known.values())
-    return next(name for name in ORDER if name in known and known[name] <= PREFERRED * least)
+    return next(
+        name for name in ORDER if name in known and known[name] <= LIMIT.PREFERRED_SET * least
+    )
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:
     """The sets in the order of their errors on unseen data, in words."""
     ranked = sorted((error, name) for name, error in errors.items() if np.isfinite(error))
     parts = [f"{name} ({counts[name]}) {error:.1f} %" for error, name in ranked]
-    return f"Predicts {where} best: {parts[0]}" + (f"; then {', '.join(parts[1:])}." if parts[1:] else ".") if parts else ""
+    return (
+        f"Predicts {where} best: {parts[0]}"
+        + (f"; then {', '.join(parts[1:])}." if parts[1:] else ".")
+        if parts
+        else ""
+    )

@@ -1,16 +1,17 @@
-"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it, known or unknown.
+"""A mass fixed to a link, or to a frame of it: its parameters from records with and without it,
+known or unknown.
 
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
-a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L are XX ... M of the load alone at the frame of
-that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M) move to the left. A parameter of the load is reported
-only if it has an effect; its deviation says whether the motion excites it. Where friction changes with the load, rows b have friction columns of their own.
+a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L
+are XX ... M of the load alone at the frame of
+that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M)
+move to the left. A parameter of the load is reported
+only if it has an effect; its deviation says whether the motion excites it. Where friction changes
+with the load, rows b have friction columns of their own.
 
-    X_b - X_a = K_L chi_L,    covariance C_a + C_b
-
-is the alternative from two estimates, for records that are gone: less precise, as every other parameter is fitted twice.
-
-Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of industrial manipulators.
+Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of
+industrial manipulators.
 """
 
 from __future__ import annotations
@@ -23,13 +24,12 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
-from runtime.estimators.solution import Solution, solve
+from runtime.json_documents import Result
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.model.mount import Mount, load_vector, mount
-from runtime.observation.observation import Observation, stack
-from runtime.observation.qr_factor import Factor, triangularise
+from runtime.rows.observation import Observation, stack
 from runtime.settings.study import EstimateSettings, PayloadSettings
 from runtime.table import aligned
 
@@ -41,8 +41,9 @@ FRICTION = ("viscous", "coulomb")
 
 
 @dataclass(frozen=True, eq=False)
-class Payload:
-    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed to it.
+class Payload(Result):
+    """A load fixed to a link: ten inertial parameters at the frame of the link, or at a frame fixed
+    to it.
 
     Attributes
     ----------
@@ -53,10 +54,10 @@ class Payload:
     value : ndarray, shape (u,), kg m^2, kg m or kg
     sigma : ndarray, shape (u,)
         Deviations by blocks of time where known, else eq. (10).
-    known : mapping of str to float
+    given : mapping of str to float
         Parameters that were given, by family.
-    estimate : Estimate or None
-        All base parameters and those of the load, fitted together; None of a difference of two estimates.
+    estimate : Estimate
+        All base parameters and those of the load, fitted together.
     frame : int or None
         Number of the frame at which the parameters are meant; None: that of the link.
     """
@@ -65,34 +66,50 @@ class Payload:
     names: tuple[str, ...]
     value: Array
     sigma: Array
-    known: Mapping[str, float]
-    estimate: Estimate | None = None
+    given: Mapping[str, float]
+    estimate: Estimate
     frame: int | None = None
 
     @property
     def place(self) -> str:
         """Where it is fixed, in words."""
-        return f"link {self.link}" if self.frame in (None, self.link) else f"frame {self.frame} of link {self.link}"
+        return (
+            f"link {self.link}"
+            if self.frame in (None, self.link)
+            else f"frame {self.frame} of link {self.link}"
+        )
 
     def __getitem__(self, family: str) -> float:
         """Value of one parameter by family: payload["M"]."""
-        return float(self.known[family]) if family in self.known else float(self.value[self.names.index(family)])
-
-    def __str__(self) -> str:
-        return self.to_table()
+        return (
+            float(self.given[family])
+            if family in self.given
+            else float(self.value[self.names.index(family)])
+        )
 
     def to_table(self) -> str:
         """One line per parameter."""
         rows: list[Sequence[str]] = [(f"load on {self.place}", "value", "sigma", "unit")]
-        rows += [(name, f"{self.known[name]:.6g}", "given", _unit(name)) for name in self.known]
+        rows += [(name, f"{self.given[name]:.6g}", "given", _unit(name)) for name in self.given]
         estimates = zip(self.names, self.value, self.sigma, strict=True)
-        rows += [(name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name)) for name, x, s in estimates]
+        rows += [
+            (name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name))
+            for name, x, s in estimates
+        ]
         return aligned(rows)
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
-        parameters = {n: {"value": x, "sigma": s} for n, x, s in zip(self.names, self.value, self.sigma, strict=True)}
-        return {"link": self.link, "frame": self.frame or self.link, "known": dict(self.known), "parameters": parameters}
+        parameters = {
+            n: {"value": x, "sigma": s}
+            for n, x, s in zip(self.names, self.value, self.sigma, strict=True)
+        }
+        return {
+            "link": self.link,
+            "frame": self.frame or self.link,
+            "known": dict(self.given),
+            "parameters": parameters,
+        }
 
 
 def payload(
@@ -118,48 +135,55 @@ def payload(
         Further entries of the provenance of the estimate.
     """
     if not without or not loaded:
-        raise InputError("a payload needs a record without it and one with it (record, payload.record)")
+        raise InputError(
+            "a payload needs a record without it and one with it (record, payload.record)"
+        )
     physical = physical_model(model)
     load = load_columns(model, physical, settings)
     friction = friction_columns(model, physical) if settings.friction else []
-    names = (*model.BASE_PARAMETERS, *(f"{family}{LOAD}" for family in load.unknown), *(model.BASE_PARAMETERS[k] + LOAD for k in friction))
+    names = (
+        *model.BASE_PARAMETERS,
+        *(f"{family}{LOAD}" for family in load.unknown),
+        *(model.BASE_PARAMETERS[k] + LOAD for k in friction),
+    )
 
     def extended(rows: Observation, mounted: float) -> Observation:
-        """Columns of the load behind W, zero where it is not mounted; the torque of its known part moved to Y."""
+        """Columns of the load behind W, zero where it is not mounted; the torque of its known part
+        moved to Y.
+        """
         of_load = mounted * np.hstack([rows.W @ load.columns, rows.W[:, friction]])
-        Y = rows.Y - mounted * (rows.W @ load.known)
+        Y = rows.Y - mounted * (rows.W @ load.torque)
         return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
     fit = estimate_of(both, method, model=model, provenance=provenance)
     units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
-    units |= {model.BASE_PARAMETERS[k] + LOAD: fit.units.get(model.BASE_PARAMETERS[k], "") for k in friction}
+    units |= {
+        model.BASE_PARAMETERS[k] + LOAD: fit.units.get(model.BASE_PARAMETERS[k], "")
+        for k in friction
+    }
     fit = replace(fit, units=units)
     place = [fit.names.index(f"{family}{LOAD}") for family in load.unknown]
-    sigma = np.where(np.isnan(fit.sigma_corrected), fit.sigma, np.fmax(fit.sigma, fit.sigma_corrected))
-    return Payload(load.mount.link, load.unknown, fit.X[place], sigma[place], dict(settings.known), fit, load.mount.frame)
-
-
-def payload_difference(model: GeneratedModel, without: Estimate, loaded: Estimate, settings: PayloadSettings) -> Payload:
-    """The load from two estimates of all base parameters, weighted by the inverse of C_a + C_b."""
-    physical = physical_model(model)
-    load = load_columns(model, physical, settings)
-    for fit in (without, loaded):
-        if fit.names != physical.base or not np.isfinite(fit.covariance).all():
-            raise InputError("the difference needs estimates of all base parameters of the model, each with a full covariance")
-    L = np.linalg.cholesky(without.covariance + loaded.covariance)
-    dX = loaded.X - without.X - load.known
-    solution = _least_squares(np.linalg.solve(L, load.columns), np.linalg.solve(L, dX), load.unknown)
-    sigma = np.sqrt(solution.variances())
-    for group in solution.groups:
-        sigma[[load.unknown.index(name) for name in group]] = np.nan
-    return Payload(load.mount.link, load.unknown, solution.X, sigma, dict(settings.known), frame=load.mount.frame)
+    sigma = np.where(
+        np.isnan(fit.sigma_corrected), fit.sigma, np.fmax(fit.sigma, fit.sigma_corrected)
+    )
+    return Payload(
+        load.mount.link,
+        load.unknown,
+        fit.X[place],
+        sigma[place],
+        dict(settings.known),
+        fit,
+        load.mount.frame,
+    )
 
 
 def friction_columns(model: GeneratedModel, physical: PhysicalModel) -> list[int]:
     """Base parameters that are made of viscous and Coulomb friction alone."""
     elements = elements_of(model)
-    friction = np.array([name in elements and elements[name][0] in FRICTION for name in physical.standard])
+    friction = np.array(
+        [name in elements and elements[name][0] in FRICTION for name in physical.standard]
+    )
     return [k for k, row in enumerate(physical.K) if not row[~friction].any()]
 
 
@@ -175,29 +199,33 @@ class LoadColumns:
         Families of the unknown parameters that have an effect.
     columns : ndarray, shape (b, u)
         dX/dchi of the unknown parameters.
-    known : ndarray, shape (b,)
+    torque : ndarray, shape (b,)
         Base parameters of the given ones.
     """
 
     mount: Mount
     unknown: tuple[str, ...]
     columns: Array
-    known: Array
+    torque: Array
 
 
-def load_columns(model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings) -> LoadColumns:
+def load_columns(
+    model: GeneratedModel, physical: PhysicalModel, settings: PayloadSettings
+) -> LoadColumns:
     """Columns of the load of the settings; SettingsError where there is no such link or frame."""
     try:
         place = mount(model, settings.frame, settings.link)
     except InputError as e:
-        raise SettingsError(e.message, path=("payload", "frame" if settings.frame is not None else "link")) from e
+        raise SettingsError(
+            e.message, path=("payload", "frame" if settings.frame is not None else "link")
+        ) from e
     K = place.columns(physical)
-    free = [k for k, family in enumerate(INERTIAL) if family not in settings.known and K[:, k].any()]
-    return LoadColumns(place, tuple(INERTIAL[k] for k in free), K[:, free], K @ load_vector(settings.known))
-
-
-def _least_squares(A: Array, y: Array, names: Sequence[str]) -> Solution:
-    return solve(Factor(tuple(names), triangularise(np.column_stack([A, y])), ()), tolerance=1e-10)
+    free = [
+        k for k, family in enumerate(INERTIAL) if family not in settings.known and K[:, k].any()
+    ]
+    return LoadColumns(
+        place, tuple(INERTIAL[k] for k in free), K[:, free], K @ load_vector(settings.known)
+    )
 
 
 def _unit(family: str) -> str:

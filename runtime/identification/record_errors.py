@@ -1,4 +1,5 @@
-"""How well one set of parameters explains each of several records: the record that fits worse than the others is the one to look at.
+"""How well one set of parameters explains each of several records: the record that fits worse than
+the others is the one to look at.
 
 e_k = 100 ||Y_k - W_k X|| / ||Y_k||     over the rows of record k
 """
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 from runtime.estimators.estimate import Estimate
 from runtime.identification.validation import prediction_errors
-from runtime.observation.system import Observation
+from runtime.rows.observation import Observation
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,14 @@ class RecordError:
     per_joint: tuple[float, ...]
 
 
-def record_errors(observation: Observation, fit: Estimate, names: Sequence[str]) -> tuple[RecordError, ...]:
-    """Errors of the records called `names`, in the order in which `observation` holds them, with the parameters of `fit`."""
+def record_errors(
+    observation: Observation, fit: Estimate, names: Sequence[str]
+) -> tuple[RecordError, ...]:
+    """Errors of the records called `names`, in the order in which `observation` holds them, with
+    the parameters of `fit`.
+    """
     parts = [observation.of_record(k) for k in range(len(names))]
-    return tuple(RecordError(name, sum(part.rows), *prediction_errors(part, fit)) for name, part in zip(names, parts, strict=True))
+    return tuple(
+        RecordError(name, sum(part.rows), *prediction_errors(part, fit))
+        for name, part in zip(names, parts, strict=True)
+    )

@@ -1,11 +1,15 @@
 """Are the residuals white? Joint by joint, in time and in frequency.
 
-Eqs. (9), (10) take the residuals of a joint as independent. With rho_k their correlation at a distance of k rows,
+Eqs. (9), (10) take the residuals of a joint as independent. With rho_k their correlation at a
+distance of k rows,
 
-    Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m        chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
-    N_eff = N / (1 + 2 sum_k rho_k)                            rows that say as much about a mean; the sum ends before the first rho_k <= 0
+    Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m
+            chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
+    N_eff = N / (1 + 2 sum_k rho_k)
+            rows that say as much about a mean; the sum ends before the first rho_k <= 0
 
-Rows left out and other records are gaps: a pair counts only where both its rows exist, in one record. The spectrum tells what is left over: a peak at the frequency
+Rows left out and other records are gaps: a pair counts only where both its rows exist, in one
+record. The spectrum tells what is left over: a peak at the frequency
 of the motion is model error, one near the cut-off is filtered noise.
 """
 
@@ -20,16 +24,9 @@ from scipy.signal import welch
 from scipy.special import chdtrc
 
 from runtime.identification.validation import Comparison, JointComparison
+from runtime.limits import LIMIT
 
 Array = np.ndarray
-
-LAGS = 20
-SIGNIFICANT = 0.05
-"""p-value below which residuals are not white."""
-SEGMENT = 256
-"""Samples of one segment of the spectrum."""
-SEPARATE = 1000
-"""Rows of one joint left out one after the other from which the next one counts as of another record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +69,7 @@ class Whiteness:
     @property
     def white(self) -> bool:
         """Ljung-Box does not reject independence at 5 %."""
-        return self.p >= SIGNIFICANT
+        return bool(self.p >= LIMIT.SIGNIFICANT)
 
 
 def whiteness(comparison: Comparison, rate: float) -> tuple[Whiteness, ...]:
@@ -80,21 +77,29 @@ def whiteness(comparison: Comparison, rate: float) -> tuple[Whiteness, ...]:
     return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
 
 
-def joint_whiteness(joint: JointComparison, rate: float, lags: int = LAGS) -> Whiteness:
+def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS) -> Whiteness:
     """Correlation, Ljung-Box and spectrum of one joint's residuals."""
     N = len(joint.t)
     m = max(1, min(lags, N // 5))
     error = joint.error - joint.error.mean()
     steps = np.rint(np.diff(joint.t) * rate).astype(np.intp)
-    apart = (steps <= 0) | (steps > SEPARATE)  # other records: time goes back, or much later
-    place = np.concatenate([[0], np.cumsum(np.where(apart, m + 1, steps))])  # on a grid of period 1/rate
+    apart = (steps <= 0) | (steps > LIMIT.SEPARATE)  # other records: time goes back, or much later
+    place = np.concatenate(
+        [[0], np.cumsum(np.where(apart, m + 1, steps))]
+    )  # on a grid of period 1/rate
     products, pairs = _lagged(error, place, np.flatnonzero(apart) + 1)
     rho, pairs = correlation(products, pairs), pairs[1 : m + 1]
     first, used = rho[:m], pairs > 0
-    Q = float(N * (N + 2) * np.sum(first[: len(pairs)][used] ** 2 / np.maximum(N - np.flatnonzero(used) - 1, 1)))
+    Q = float(
+        N
+        * (N + 2)
+        * np.sum(first[: len(pairs)][used] ** 2 / np.maximum(N - np.flatnonzero(used) - 1, 1))
+    )
     grid = np.zeros(place[-1] + 1)
     grid[place] = error
-    frequency, density = welch(grid, fs=rate, nperseg=min(SEGMENT, len(grid)), detrend=False)
+    frequency, density = welch(
+        grid, fs=rate, nperseg=min(LIMIT.SPECTRUM_SEGMENT, len(grid)), detrend=False
+    )
     power = np.cumsum(density)
     return Whiteness(
         joint=joint.joint,
@@ -112,18 +117,24 @@ def joint_whiteness(joint: JointComparison, rate: float, lags: int = LAGS) -> Wh
 
 def residual_correlation(residual: Array) -> Array:
     """rho_k, k = 1 ... N - 1, of residuals, shape (N,), at even distances."""
-    return correlation(*_lagged(residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp)))
+    return correlation(
+        *_lagged(residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp))
+    )
 
 
 def correlation(products: Array, pairs: Array) -> Array:
-    """rho_k, k = 1, 2 ..., from sums of products at distances k = 0, 1 ... and the numbers of their pairs; 0 where there is no pair."""
+    """rho_k, k = 1, 2 ..., from sums of products at distances k = 0, 1 ... and the numbers of their
+    pairs; 0 where there is no pair.
+    """
     if not products[0] > 0:
         return np.zeros(len(products) - 1)
     return np.asarray(products[1:] / np.maximum(pairs[1:], 1) / (products[0] / pairs[0]))
 
 
 def correlation_time(rho: Array) -> float:
-    """1 + 2 sum of rho_k, k = 1, 2 ..., before the first that is not positive, in rows: at least 1."""
+    """1 + 2 sum of rho_k, k = 1, 2 ..., before the first that is not positive, in rows: at
+    least 1.
+    """
     end = np.flatnonzero(rho <= 0)
     return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
 
@@ -134,7 +145,9 @@ def effective_share(joints: Sequence[Whiteness]) -> float:
 
 
 def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
-    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a grid. No pair spans `starts` of other records."""
+    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a
+    grid. No pair spans `starts` of other records.
+    """
     records = np.split(np.arange(len(x)), starts)
     longest = max(int(place[rows[-1]] - place[rows[0]]) + 1 for rows in records)
     sums = np.zeros((2, longest))

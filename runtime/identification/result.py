@@ -1,8 +1,11 @@
-"""What `identify` returns: the parameters of one robot, and everything that its records say about them."""
+"""What `identify` returns: the parameters of one robot, and everything that its records say about
+them.
+"""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from runtime.checks.plausibility import Plausibility
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import LINEAR
+from runtime.estimators.method import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
 from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
 from runtime.identification.payload_study import PayloadStudy
-from runtime.identification.plausibility.plausibility import Plausibility
 from runtime.identification.record_errors import RecordError, record_errors
 from runtime.identification.torque_unit import torque_unit_doubt
 from runtime.identification.uncertainty import Uncertainty
@@ -28,19 +31,24 @@ from runtime.json_documents import json_text
 from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
-from runtime.observation.encoder_advice import encoder_sentences
-from runtime.observation.observation import Observation
-from runtime.observation.rows import unused_joints
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream
 from runtime.resolution.advice import Advice
 from runtime.resolution.result import Cestac
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import Prepared, record_of
+from runtime.rows.selection import unused_joints
 from runtime.settings.study import Study
+from runtime.signals.encoder_advice import encoder_sentences
 from runtime.table import Table, notebook
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
+
+
+PART_NUMBER = re.compile(r" \(\d+ of \d+\)$")
+"""What the name of a record that was split at gaps ends in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +60,25 @@ class Identification:
     model : GeneratedModel
     study : Study
         Settings, complete; its files relative to the current folder.
-    records : tuple of Record or Stream
-        Joint side, SI.
+    prepared : tuple of Prepared or Stream
+        The records, joint side, SI, as the study reads them.
     observation : Observation
         Y = W X + rho of all records.
     estimate : Estimate
         All parameters, by the method of the study.
     essential : Essential
-        The essential parameters and the trail from all parameters to them; by the linear companion of a method that is not linear.
+        The essential parameters and the trail from all parameters to them; by the linear companion
+        of a method that is not linear.
     comparison : Comparison
         Torques by joint beside W X of `model_estimate`.
     validation : tuple of CrossValidation
-        One part of the data predicts the others: windows of the records first, then further records.
+        One part of the data predicts the others: windows of the records first, then further
+        records.
     correlations : WeakDirections
         Parameters that trade against each other.
     coupling : mapping of Coupling to Estimate
-        All parameters with the off-diagonal part of the drives used for "both", "position", "torque" or "none"; empty where there is none.
+        All parameters with the off-diagonal part of the drives used for "both", "position",
+        "torque" or "none"; empty where there is none.
     uncertainty : Uncertainty
         Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
     payload : PayloadStudy or None
@@ -83,7 +94,8 @@ class Identification:
     plausibility : Plausibility or None
         Whether record, study and robot file suit each other; None where it was not asked for.
     sets : mapping of str to Estimate
-        The essential, the feasible and all parameters (`runtime.identification.parameter_sets`); empty where the method of the study is not linear.
+        The essential, the feasible and all parameters (`runtime.identification.parameter_sets`);
+        empty where the method of the study is not linear.
     homogeneity : Homogeneity or None
         Whether several records, further ones included, agree; None for one record.
     missing : tuple of str
@@ -92,7 +104,7 @@ class Identification:
 
     model: GeneratedModel
     study: Study
-    records: tuple[Record | Stream, ...]
+    prepared: tuple[Prepared | Stream, ...]
     observation: Observation
     estimate: Estimate
     essential: Essential
@@ -112,6 +124,11 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     @property
+    def records(self) -> tuple[Record | Stream, ...]:
+        """The records."""
+        return tuple(map(record_of, self.prepared))
+
+    @property
     def name(self) -> str:
         """Names of the records."""
         return ", ".join(record_names(self.records))
@@ -119,7 +136,11 @@ class Identification:
     @property
     def _of_record(self) -> str:
         """The record by its name, in a sentence; one without a name is "record" alone."""
-        return "record" if self.name == UNNAMED else f"record{'s' if len(self.records) > 1 else ''} {self.name}"
+        return (
+            "record"
+            if self.name == UNNAMED
+            else f"record{'s' if len(self.records) > 1 else ''} {self.name}"
+        )
 
     @property
     def source(self) -> Literal["measured", "simulated"]:
@@ -138,25 +159,35 @@ class Identification:
 
     @property
     def set_errors(self) -> dict[SetName, float]:
-        """Largest error on unseen data, %, by set of parameters; empty where nothing was predicted."""
+        """Largest error on unseen data, %, by set of parameters; empty where nothing was
+        predicted.
+        """
         judged = self.validation[-1].errors() if self.validation else {}
         return {name: judged[name] for name in ORDER if name in judged}
 
     @property
     def unseen(self) -> str:
-        """The data that the sets are judged by, in words: the validation records of the study where it has some, else a part of the records."""
-        parts = dict.fromkeys(p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted)
+        """The data that the sets are judged by, in words: the validation records of the study where
+        it has some, else a part of the records.
+        """
+        parts = dict.fromkeys(
+            p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted
+        )
         further = len(self.validation) > 1 or not any(part.startswith("[") for part in parts)
         return f"{', '.join(parts)}" if further else "a part of the record that it has not seen"
 
     @property
     def model_columns(self) -> SetName:
-        """Which parameters stand for the robot: the set that predicts unseen data best, or all where the method of the study is not linear."""
+        """Which parameters stand for the robot: the set that predicts unseen data best, or all
+        where the method of the study is not linear.
+        """
         return best_set(self.set_errors) if self.study.estimate.method in LINEAR else "all"
 
     @property
     def model_estimate(self) -> Estimate:
-        """The estimate that stands for the robot: that of `model_columns`, or `estimate` where the method of the study is not linear."""
+        """The estimate that stands for the robot: that of `model_columns`, or `estimate` where the
+        method of the study is not linear.
+        """
         return self.sets.get(self.model_columns, self.estimate)
 
     @property
@@ -167,27 +198,48 @@ class Identification:
 
     @cached_property
     def record_errors(self) -> tuple[RecordError, ...]:
-        """Error of each record with the parameters that stand for the robot; empty where there is one record."""
+        """Error of each record with the parameters that stand for the robot; empty where there is
+        one record.
+        """
         names = record_names(self.records)
         return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """What time stamps and encoders of the records were like, those of one file once, and the known torques that were subtracted."""
-        texts = {(record.name.split(" (")[0], text): None for record in self.records if (text := getattr(record, "time", ""))}
-        known = [f"{record.name}: {text}." for record in self.records if (text := getattr(record, "known", ""))]
-        whole = [record for record in self.records if isinstance(record, Record)]
-        encoders = [text for record in whole for text in encoder_sentences(self.model, record, self.study.signals)]
-        return (*(f"Time stamps of {name}: {text}." for name, text in texts), *known, *self.observation.findings, *encoders)
+        """What time stamps and encoders of the records were like, those of one file once, and the
+        known torques that were subtracted.
+        """
+        texts = {
+            (PART_NUMBER.sub("", record.name), record.origin.time): None
+            for record in self.records
+            if record.origin.time
+        }
+        known = [f"{r.name}: {r.subtracted}." for r in self.records if r.subtracted]
+        encoders = [
+            text
+            for own in self.prepared
+            if isinstance(own, Prepared) and own.study.signals.reader == "lowpass"
+            for text in encoder_sentences(own.record, own.states, own.study.signals, own.drives)
+        ]
+        return (
+            *(f"Time stamps of {name}: {text}." for name, text in texts),
+            *known,
+            *self.observation.findings,
+            *encoders,
+        )
 
     @property
     def prediction_error(self) -> float:
-        """Largest relative error, %, of `model_estimate` on the validation records, or else on parts of the records that did not give it; nan: on none."""
+        """Largest relative error, %, of `model_estimate` on the validation records, or else on
+        parts of the records that did not give it; nan: on none.
+        """
         return self.set_errors.get(self.model_columns, float("nan"))
 
     @property
     def compared_rows(self) -> int:
-        """Rows of the comparison, which holds the first instants alone of records that were read by blocks."""
+        """Rows of the comparison, which holds the first instants alone of records that were read by
+        blocks.
+        """
         return sum(len(joint.t) for joint in self.comparison)
 
     @property
@@ -197,7 +249,9 @@ class Identification:
 
     @property
     def feasible(self) -> bool:
-        """Whether the parameters that stand for the robot were fitted under the conditions of a physical one."""
+        """Whether the parameters that stand for the robot were fitted under the conditions of a
+        physical one.
+        """
         return "standard" in self.model_estimate.details
 
     @cached_property
@@ -208,7 +262,9 @@ class Identification:
             self.estimate,
             self.model_estimate,
             self.verdict,
-            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True)) if self.model_columns == "essential" else {},
+            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True))
+            if self.model_columns == "essential"
+            else {},
             prediction_error=self.prediction_error,
             halves=self.unseen.startswith("a part"),
             negative=self.negative if self.determined else (),
@@ -224,32 +280,53 @@ class Identification:
         if not self.determined:
             names = "; ".join(", ".join(group) for group in self.estimate.groups)
             return (
-                f"The {self._of_record} does not determine {self.model.NAME}: rank {self.estimate.rank} for {len(self.estimate.names)} "
+                f"The {self._of_record} does not determine {self.model.NAME}: rank "
+                f"{self.estimate.rank} for {len(self.estimate.names)} "
                 f"parameters, cannot be told apart: {names}."
             )
         fit = self.model_estimate
         if not self.usable:
             reason = self.estimate.message.split(". ")[0].rstrip(".")
-            return f"No values of {self.model.NAME}: {self.estimate.method} ended with status {self.estimate.status}. {reason}."
+            return (
+                f"No values of {self.model.NAME}: {self.estimate.method} ended with status "
+                f"{self.estimate.status}. {reason}."
+            )
         worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
-        by_joint = f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)" if self.observation.n > 1 else ""
-        unseen = f", and {self.prediction_error:.1f} % of {self.unseen}" if np.isfinite(self.prediction_error) else ""
+        by_joint = (
+            f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)"
+            if self.observation.n > 1
+            else ""
+        )
+        unseen = (
+            f", and {self.prediction_error:.1f} % of {self.unseen}"
+            if np.isfinite(self.prediction_error)
+            else ""
+        )
         return (
-            f"The model of {self.model.NAME} with {len(fit.names)} of {len(self.estimate.names)} parameters leaves {fit.relative_error:.1f} % "
+            f"The model of {self.model.NAME} with {len(fit.names)} of {len(self.estimate.names)} "
+            f"parameters leaves {fit.relative_error:.1f} % "
             f"of the torques of the {self._of_record} unexplained{by_joint}{unseen}."
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: joints without rows, signs that no drive has, torques that may be currents, lost joints, parameters that trade."""
+        """What to look at before the values are used, in sentences: joints without rows, signs that
+        no drive has, torques that may be currents, lost joints, parameters that trade.
+        """
         signs = (
-            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a sign of the joint is wrong (ratio, torque constant or "
+            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a "
+            "sign of the joint is wrong (ratio, torque constant or "
             "column), or its coupling, unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
         unit = torque_unit_doubt(self.model, self.observation)
         unused = unused_joints(self.observation.rows, self.observation.dropped, self.model.JOINTS)
-        sentences = (unused, signs if self.negative else "", f"{unit}." if unit else "", f"{lost}." if lost else "")
+        sentences = (
+            unused,
+            signs if self.negative else "",
+            f"{unit}." if unit else "",
+            f"{lost}." if lost else "",
+        )
         return (*(sentence for sentence in sentences if sentence), *self.correlations.warnings)
 
     def __str__(self) -> str:
@@ -260,67 +337,103 @@ class Identification:
         return notebook([self.verdict, *self.warnings], parameters, joints)
 
     def to_text(self) -> str:
-        """Parameters, trail, validation, parameters that trade, uncertainty, coupling, what was asked for besides, then the verdict."""
+        """Parameters, trail, validation, parameters that trade, uncertainty, coupling, what was
+        asked for besides, then the verdict.
+        """
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
             f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
         ]
-        parts = [fit.to_table(), self.essential.to_table(), *(part.to_table() for part in self.validation)]
-        parts += ["\n".join([*self._record_lines(), *self.time_stamps]), "\n".join(trade), "\n".join(self._direction_lines())]
-        parts += [
+        records = [
+            f"error in {one.name}: {one.relative_error:.2f} % in total, per joint "
+            + _percents(one.per_joint)
+            for one in self.record_errors
+        ]
+        weak = [
+            f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items())
+            for d in self.correlations.directions
+        ]
+        head = "directions that W sees least (singular value over the largest, unit columns)"
+        coupled = [
+            f"coupling of the drives in {key}: {own.relative_error:.2f} % in total, per joint "
+            + _percents(tuple(joint.relative_error for joint in own.per_joint))
+            for key, own in self.coupling.items()
+        ]
+        tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
+        last: tuple[Any, ...] = (self.payload, *self.friction)
+        parts = [
+            *(table.to_table() for table in tables),
+            "\n".join([*records, *self.time_stamps]),
+            "\n".join(trade),
+            "\n".join([head, *weak]),
             self.ranking,
             self.homogeneity.text if self.homogeneity else "",
             self.motion_table().to_text() if self.motion_table().rows else "",
+            self.uncertainty.to_text(),
+            "\n".join(coupled),
+            self.eigenvalue_table().to_text() if self.feasible else "",
+            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
+            *(table.to_table() for table in last if table is not None),
+            self.advice.verdict if self.advice else "",
+            self.resolution.to_table() if self.resolution else "",
+            *self.missing,
+            self.plausibility.line if self.plausibility else "",
+            self.verdict,
         ]
-        parts += [self.uncertainty.to_text(), "\n".join(self._coupling_lines())]
-        parts += [self.eigenvalue_table().to_text()] if self.feasible else []
-        parts += [] if self.feasibility is None else [f"The parameters are {self.feasibility.text}."]
-        parts += [] if self.payload is None else [self.payload.to_table()]
-        parts += [curve.to_table() for curve in self.friction]
-        parts += [] if self.advice is None else [self.advice.verdict]
-        parts += [] if self.resolution is None else [self.resolution.to_table()]
-        worst = self.plausibility.line if self.plausibility is not None else ""
-        return "\n\n".join(part for part in (*parts, *self.missing, worst, self.verdict) if part)
+        return "\n\n".join(part for part in parts if part)
 
     @property
     def ranking(self) -> str:
         """Which set of parameters predicts best, a sentence; "" where there is one set."""
-        return ranking_text(self.set_errors, {name: len(fit.names) for name, fit in self.sets.items()}, self.unseen) if self.sets else ""
+        return (
+            ranking_text(
+                self.set_errors,
+                {name: len(fit.names) for name, fit in self.sets.items()},
+                self.unseen,
+            )
+            if self.sets
+            else ""
+        )
 
     def motion_table(self) -> Table:
-        """Simulated minus measured motion, joint by joint, of a method that simulates the loop; else without rows."""
+        """Simulated minus measured motion, joint by joint, of a method that simulates the loop;
+        else without rows.
+        """
         rows = [
-            (m["joint"], f"{m['rms']:.3g}", *(number(m[key], ".3g") for key in ("position", "tracking", "torque")))
+            (
+                m["joint"],
+                f"{m['rms']:.3g}",
+                *(number(m[key], ".3g") for key in ("position", "tracking", "torque")),
+            )
             for m in self.estimate.details.get("motion", ())
         ]
-        header = ("joint", "rms of q_s - q, rad or m", "of the motion, %", "of the tracking error, %", "torque, %")
+        header = (
+            "joint",
+            "rms of q_s - q, rad or m",
+            "of the motion, %",
+            "of the tracking error, %",
+            "torque, %",
+        )
         return Table("Simulated minus measured motion", header, rows)
 
     def eigenvalue_table(self) -> Table:
-        """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that was made under them."""
+        """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that
+        was made under them.
+        """
         details = self.model_estimate.details
         active, eigenvalues = details["active"], details["smallest_eigenvalues"]
-        rows = [(name, f"{value:.4e}", "at its limit" if name in active else "") for name, value in eigenvalues.items()]
-        return Table("Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows)
-
-    def _record_lines(self) -> list[str]:
-        return [
-            f"error in {one.name}: {one.relative_error:.2f} % in total, per joint {_percents(one.per_joint)}" for one in self.record_errors
+        rows = [
+            (name, f"{value:.4e}", "at its limit" if name in active else "")
+            for name, value in eigenvalues.items()
         ]
-
-    def _direction_lines(self) -> list[str]:
-        lines = [f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()) for d in self.correlations.directions]
-        return ["directions that W sees least (singular value over the largest, unit columns)", *lines]
-
-    def _coupling_lines(self) -> list[str]:
-        return [
-            f"coupling of the drives in {key}: {fit.relative_error:.2f} % in total, per joint "
-            + _percents(tuple(joint.relative_error for joint in fit.per_joint))
-            for key, fit in self.coupling.items()
-        ]
+        return Table(
+            "Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows
+        )
 
     def to_json(self) -> str:
-        """estimate.json: the Estimate of all parameters, and beside it everything else that was computed."""
+        """estimate.json: the Estimate of all parameters, and beside it everything else that was
+        computed.
+        """
         return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
 
     def summary(self) -> dict[str, Any]:
@@ -336,29 +449,49 @@ class Identification:
                 "relative_error": fit.relative_error,
                 "per_joint": fit.per_joint,
             },
-            "validation": [part.summary() for part in self.validation],
-            "weak_directions": {name: getattr(self.correlations, name) for name in ("threshold", "pairs", "groups", "directions")},
+            "validation": self.validation,
+            "weak_directions": {
+                name: getattr(self.correlations, name)
+                for name in ("threshold", "pairs", "groups", "directions")
+            },
             "warnings": self.warnings,
-            "trust": self.uncertainty.summary(),
-            "coupling": {key: {"relative_error": e.relative_error, "per_joint": e.per_joint} for key, e in self.coupling.items()},
+            "trust": self.uncertainty,
+            "coupling": {
+                key: {"relative_error": e.relative_error, "per_joint": e.per_joint}
+                for key, e in self.coupling.items()
+            },
             **({"by_record": self.record_errors} if self.record_errors else {}),
             "verdict": self.verdict,
             "sets": [
-                {"name": name, "count": len(fit.names), "relative_error": fit.relative_error, "unseen": self.set_errors.get(name)}
+                {
+                    "name": name,
+                    "count": len(fit.names),
+                    "relative_error": fit.relative_error,
+                    "unseen": self.set_errors.get(name),
+                }
                 for name, fit in self.sets.items()
             ],
             "model_columns": self.model_columns,
         }
         if self.homogeneity is not None:
-            summary["homogeneity"] = self.homogeneity.summary()
+            summary["homogeneity"] = self.homogeneity
         if self.feasibility is not None:
-            blocking = [{"condition": name, "margin": margin} for name, margin in self.feasibility.blocking]
-            summary["feasibility"] = {"feasible": self.feasibility.feasible, "margin": self.feasibility.margin, "blocking": blocking}
+            blocking = [
+                {"condition": name, "margin": margin} for name, margin in self.feasibility.blocking
+            ]
+            summary["feasibility"] = {
+                "feasible": self.feasibility.feasible,
+                "margin": self.feasibility.margin,
+                "blocking": blocking,
+            }
         if self.payload is not None:
             summary |= self.payload.summary()
         if self.plausibility is not None:
-            summary["plausibility"] = self.plausibility.summary()
-        return {**summary, **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {})}
+            summary["plausibility"] = self.plausibility
+        return {
+            **summary,
+            **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {}),
+        }
 
 
 def _percents(errors: tuple[float, ...]) -> str:

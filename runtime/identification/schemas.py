@@ -1,4 +1,6 @@
-"""Layouts of estimate.json and cestac.json as types, and the JSON Schemas made from them and from the settings."""
+"""Layouts of estimate.json and cestac.json as types, and the JSON Schemas made from them and from
+the settings.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,12 @@ from runtime.resolution.result import LevelResult, Verdict
 from runtime.resolution.runs import Run
 from runtime.settings.study import Study
 
-RESULT = "SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist is null. Readers leave out keys they do not know; keys may be added under the same version."
+RESULT = (
+    "SI units, rad, joint side. Equation numbers are those of the chapter. A number that "
+    "does "
+    "not exist is null. Readers leave out keys they do not know; keys may be added under the "
+    "same version."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +81,8 @@ class CouplingDocument:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentificationDocument(Estimate):
-    """Parameters of a robot with their uncertainty; with the keys from `essential` on where a whole identification is written.
+    """Parameters of a robot with their uncertainty; with the keys from `essential` on where a whole
+    identification is written.
 
     Attributes
     ----------
@@ -98,8 +106,6 @@ class IdentificationDocument(Estimate):
         Whether a physical robot can have the parameters.
     payload : mapping
         Parameters of the load, from records without and with it.
-    payload_difference : mapping or None
-        The same from the difference of two estimates.
     drive_gains : mapping or None
         Torque constants of the drives, from the load.
     friction : tuple of mapping
@@ -118,7 +124,6 @@ class IdentificationDocument(Estimate):
     verdict: str
     feasibility: dict[str, Any]
     payload: dict[str, Any]
-    payload_difference: dict[str, Any] | None
     drive_gains: dict[str, Any] | None
     friction: tuple[dict[str, Any], ...]
     plausibility: dict[str, Any]
@@ -184,7 +189,8 @@ def schemas() -> dict[str, str]:
     """The JSON Schemas of study files, estimate.json and cestac.json, by kind."""
     optional = {f.name for f in fields(IdentificationDocument)} - {f.name for f in fields(Estimate)}
     study = (
-        "Everything about an experiment that is not the robot. SI units and rad; numbers may be arithmetic texts such as 2*pi/10000, and one "
+        "Everything about an experiment that is not the robot. SI units and rad; numbers may be "
+        "arithmetic texts such as 2*pi/10000, and one "
         "value stands for a list of one."
     )
     return {
@@ -192,7 +198,11 @@ def schemas() -> dict[str, str]:
         "estimate": json_schema(
             IdentificationDocument,
             ESTIMATE,
-            f"Parameters of a robot with their uncertainty: Estimate.to_json, and estimate.json of `symgen identify`. {RESULT}",
+            (
+                "Parameters of a robot with their uncertainty: Estimate.to_json, and estimate.json "
+                "of "
+                f"`symgen identify`. {RESULT}"
+            ),
             const=ESTIMATE,
             computed=("relative_sigma", "rows"),
             optional=optional,
@@ -200,7 +210,11 @@ def schemas() -> dict[str, str]:
         "cestac": json_schema(
             CestacDocument,
             CESTAC,
-            f"Resolution study of encoders and torques: Cestac.to_json, and cestac.json of `symgen cestac`. {RESULT}",
+            (
+                "Resolution study of encoders and torques: Cestac.to_json, and cestac.json of "
+                "`symgen "
+                f"cestac`. {RESULT}"
+            ),
             const=CESTAC,
         ),
     }

@@ -1,13 +1,17 @@
 """What eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
 
-    bootstrap     blocks of time drawn again with replacement, least squares each time: deviations without the assumption of independent residuals,
+    bootstrap     blocks of time drawn again with replacement, least squares each time: deviations
+                  without the assumption of independent residuals,
                   beside sigma (10) and the corrected one
     whiteness     are the residuals of every joint independent (`runtime.identification.residuals`)?
-    F-test        does a parameter that was removed carry something? Removing q of b raises the squared residual norm S from S_0 to S_q:
-                  F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the rows that are worth one (N_eff)
+    F-test        does a parameter that was removed carry something? Removing q of b raises the
+                  squared residual norm S from S_0 to S_q:
+                  F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the
+                  rows that are worth one (N_eff)
     sensitivity   which parameters come and go when the threshold on sigma_rho moves
 
-S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of `runtime.estimators.essential` holds.
+S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of
+`runtime.estimators.essential` holds.
 
 References: Seber and Lee (2003), section 4.3, for F.
 """
@@ -21,20 +25,20 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtrc
 
-from runtime.estimators.block_covariance import drawn_again
+from runtime.estimators.block_covariance import gram_solution, scatter
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import linear_companion, linear_system
-from runtime.identification.residuals import SIGNIFICANT, Whiteness, effective_share, whiteness
+from runtime.estimators.method import linear_companion, linear_system
+from runtime.identification.residuals import Whiteness, effective_share, whiteness
 from runtime.identification.validation import Comparison
-from runtime.observation.system import Observation
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
 from runtime.table import aligned
 
 Array = np.ndarray
 
-RUNS = 200
-"""Draws of blocks: sigma is then known to 5 %."""
 SEED = 1
 
 
@@ -66,7 +70,7 @@ class BlockBootstrap:
     drawn: Array
     blocks: int
     length: float
-    runs: int = RUNS
+    runs: int = LIMIT.BOOTSTRAP_RUNS
     seed: int = SEED
 
     @property
@@ -105,11 +109,11 @@ class FTest:
     @property
     def significant(self) -> bool:
         """p below 5 %: the parameters removed so far carry something."""
-        return self.p < SIGNIFICANT
+        return bool(self.p < LIMIT.SIGNIFICANT)
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(Result):
     """Checks of the essential parameters of one identification.
 
     Attributes
@@ -121,7 +125,8 @@ class Uncertainty:
     f_tests : tuple of FTest
         Steps of the trail.
     sets : tuple of (float, int, tuple of str)
-        By threshold: count, and names that differ from the set used ("-": removed besides, "+": kept besides).
+        By threshold: count, and names that differ from the set used ("-": removed besides, "+":
+        kept besides).
     all_count : int
         Number of all parameters.
     """
@@ -135,24 +140,39 @@ class Uncertainty:
     @property
     def kept_by_f_test(self) -> int:
         """Parameters left before the first significant removal."""
-        return self.all_count - next((k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests))
-
-    def __str__(self) -> str:
-        return self.to_table()
+        return self.all_count - next(
+            (k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests)
+        )
 
     @property
     def verdict(self) -> tuple[str, ...]:
         """One sentence for each check."""
         ratio = self.bootstrap.ratio[np.isfinite(self.bootstrap.ratio)]
-        spread = f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}" if len(ratio) else "unknown"
+        spread = (
+            f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}"
+            if len(ratio)
+            else "unknown"
+        )
         coloured = [w.joint for w in self.whiteness if not w.white]
         white = f"not white on joint {', '.join(coloured)}" if coloured else "white on every joint"
         share = 100 * effective_share(self.whiteness)
         kept = self.all_count - sum(test.removed for test in self.f_tests)
         return (
-            f"Deviations by blocks drawn again are {spread} times sigma (10): {self.bootstrap.blocks} blocks of {self.bootstrap.length:.3g} s, {self.bootstrap.runs} draws.",
-            f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of their number.",
-            f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count keeps {self.kept_by_f_test}.",
+            (
+                f"Deviations by blocks drawn again are {spread} times sigma (10): "
+                f"{self.bootstrap.blocks} blocks of {self.bootstrap.length:.3g} s, "
+                f"{self.bootstrap.runs} draws."
+            ),
+            (
+                f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of "
+                "their "
+                "number."
+            ),
+            (
+                f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count "
+                "keeps "
+                f"{self.kept_by_f_test}."
+            ),
         )
 
     def to_table(self) -> str:
@@ -161,20 +181,44 @@ class Uncertainty:
 
     def to_text(self) -> str:
         """Sentences, deviations and whiteness."""
-        return "\n\n".join(["\n".join(self.verdict), aligned(self.bootstrap_lines()), aligned(self.whiteness_lines())])
+        return "\n\n".join(
+            [
+                "\n".join(self.verdict),
+                aligned(self.bootstrap_lines()),
+                aligned(self.whiteness_lines()),
+            ]
+        )
 
     def bootstrap_lines(self) -> list[Sequence[str]]:
         """Deviations, header first."""
-        lines: list[Sequence[str]] = [("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)")]
+        lines: list[Sequence[str]] = [
+            ("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)")
+        ]
         for row in zip(
-            self.bootstrap.names, self.bootstrap.sigma, self.bootstrap.corrected, self.bootstrap.drawn, self.bootstrap.ratio, strict=True
+            self.bootstrap.names,
+            self.bootstrap.sigma,
+            self.bootstrap.corrected,
+            self.bootstrap.drawn,
+            self.bootstrap.ratio,
+            strict=True,
         ):
             lines.append((row[0], *(f"{x:.3g}" for x in row[1:4]), f"{row[4]:.2f}"))
         return lines
 
     def whiteness_lines(self) -> list[Sequence[str]]:
         """Residuals by joint, header first."""
-        lines: list[Sequence[str]] = [("joint", "rows", "rho_1", "Q", "p", "worth rows", "peak Hz", "half of the power below Hz")]
+        lines: list[Sequence[str]] = [
+            (
+                "joint",
+                "rows",
+                "rho_1",
+                "Q",
+                "p",
+                "worth rows",
+                "peak Hz",
+                "half of the power below Hz",
+            )
+        ]
         for w in self.whiteness:
             lines.append(
                 (
@@ -192,16 +236,33 @@ class Uncertainty:
 
     def test_lines(self) -> list[Sequence[str]]:
         """F-tests along the trail, header first."""
-        lines: list[Sequence[str]] = [("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one")]
+        lines: list[Sequence[str]] = [
+            ("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one")
+        ]
         for t in self.f_tests:
             name = t.name if t.removed else f"{t.name} (kept)"
-            lines.append((name, f"{t.ratio:.5f}", f"{t.F:.3g}", f"{t.p:.2g}", f"{t.F_step:.3g}", f"{t.p_step:.2g}"))
+            lines.append(
+                (
+                    name,
+                    f"{t.ratio:.5f}",
+                    f"{t.F:.3g}",
+                    f"{t.p:.2g}",
+                    f"{t.F_step:.3g}",
+                    f"{t.p_step:.2g}",
+                )
+            )
         return lines
 
     def set_lines(self) -> list[Sequence[str]]:
         """Sets by threshold, header first."""
         lines: list[Sequence[str]] = [("threshold", "parameters", "against the set used")]
-        return [*lines, *((f"{threshold:g}", str(count), " ".join(names) or "the same") for threshold, count, names in self.sets)]
+        return [
+            *lines,
+            *(
+                (f"{threshold:g}", str(count), " ".join(names) or "the same")
+                for threshold, count, names in self.sets
+            ),
+        ]
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
@@ -211,11 +272,19 @@ class Uncertainty:
             "whiteness": [{**vars(w), "white": w.white} for w in self.whiteness],
             "f_tests": self.f_tests,
             "kept_by_f_test": self.kept_by_f_test,
-            "sets": [{"threshold": threshold, "count": count, "difference": names} for threshold, count, names in self.sets],
+            "sets": [
+                {"threshold": threshold, "count": count, "difference": names}
+                for threshold, count, names in self.sets
+            ],
         }
 
 
-def uncertainty(observation: Observation, settings: EstimateSettings, essential: Essential, comparison: Comparison) -> Uncertainty:
+def uncertainty(
+    observation: Observation,
+    settings: EstimateSettings,
+    essential: Essential,
+    comparison: Comparison,
+) -> Uncertainty:
     """Checks of the essential parameters of an observation.
 
     Parameters
@@ -240,20 +309,28 @@ def uncertainty(observation: Observation, settings: EstimateSettings, essential:
 
 
 def block_bootstrap(
-    observation: Observation, settings: EstimateSettings, fit: Estimate, *, runs: int = RUNS, seed: int = SEED
+    observation: Observation,
+    settings: EstimateSettings,
+    fit: Estimate,
+    *,
+    runs: int = LIMIT.BOOTSTRAP_RUNS,
+    seed: int = SEED,
 ) -> BlockBootstrap:
     """Deviations of `fit` by `runs` draws of its blocks of residuals; weights stay."""
     system = linear_system(observation, linear_companion(settings)).select(fit.names)
-    length = float(fit.settings["residual_block"])
-    blocks = list(observation.block_rows(fit.names, 1 / np.array(system.scales), length, system.whitener))
-    drawn = np.full(len(fit.names), np.nan)
+    blocks, drawn = list(system.block_rows()), np.full(len(fit.names), np.nan)
     if len(blocks) > 1 and fit.status == "ok":
-        drawn = np.std(drawn_again(blocks, _solved, runs, seed), axis=0, ddof=1)
-    return BlockBootstrap(fit.names, fit.sigma, fit.sigma_corrected, drawn, len(blocks), length, runs, seed)
+        drawn = scatter(blocks, gram_solution, runs, seed)
+    length = float(fit.settings["residual_block"])
+    return BlockBootstrap(
+        fit.names, fit.sigma, fit.sigma_corrected, drawn, len(blocks), length, runs, seed
+    )
 
 
 def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
-    """Tests along the trail, none where there are no more rows than parameters; share : rows that count over rows."""
+    """Tests along the trail, none where there are no more rows than parameters; share : rows that
+    count over rows.
+    """
     r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
     if r <= b:
         return ()
@@ -285,13 +362,8 @@ def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]
     by_threshold = []
     for threshold, count in essential.counts.items():
         gone = [step.name for step in steps[: len(names) - count]]
-        differs = [f"-{name}" for name in gone if name in essential.names] + [f"+{name}" for name in essential.removed if name not in gone]
+        differs = [f"-{name}" for name in gone if name in essential.names] + [
+            f"+{name}" for name in essential.removed if name not in gone
+        ]
         by_threshold.append((threshold, count, tuple(differs)))
     return tuple(by_threshold)
-
-
-def _solved(gram: Array) -> Array:
-    """X of one draw, shape (b,), columns scaled."""
-    A, y = gram[:-1, :-1], gram[:-1, -1]
-    D = 1 / np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
-    return np.asarray(D * np.linalg.lstsq(A * np.outer(D, D), D * y, rcond=None)[0])

@@ -1,8 +1,10 @@
 """Does the model predict, and which parameters trade against each other?
 
     direct comparison    measured Y beside W X, joint by joint (chapter, Fig. 4)
-    cross-validation     fit on one part of the data, predict the others: 100 ||Y_j - W_j X|| / ||Y_j|| for every joint
-    weak directions      parameters whose errors are correlated, eq. (10), and the combinations that W hardly sees
+    cross-validation     fit on one part of the data, predict the others: 100 ||Y_j - W_j X|| /
+                         ||Y_j|| for every joint
+    weak directions      parameters whose errors are correlated, eq. (10), and the combinations that
+                         W hardly sees
 
 Errors are reported per joint since a wrong wrist hides in a total that the shoulder dominates.
 """
@@ -18,21 +20,19 @@ from scipy.sparse.csgraph import connected_components
 
 from runtime.errors import InputError, instant
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of, linear_companion, linear_system, point_estimate
+from runtime.estimators.linear import percent
+from runtime.estimators.method import linear_companion, linear_system
 from runtime.estimators.solution import unit_columns
-from runtime.json_documents import json_text
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of, point_estimate
 from runtime.model.generated import GeneratedModel
-from runtime.observation.segments import Window
-from runtime.observation.system import Observation
+from runtime.rows.observation import Observation
+from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings
 from runtime.table import aligned
 
 Array = np.ndarray
-
-CORRELATION = 0.9
-"""|correlation| of two estimates above which they are reported to trade against each other."""
-PARTICIPATION = 0.3
-"""Entries of a singular vector below this fraction of its largest are not named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class JointComparison:
     @property
     def relative_error(self) -> float:
         """100 ||measured - predicted|| / ||measured||, in %."""
-        return _percent(self.error, self.measured)
+        return percent(self.error, self.measured)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +77,20 @@ class Comparison:
     @property
     def relative_error(self) -> float:
         """100 ||Y - W X|| / ||Y|| over all joints, in %."""
-        return _percent(np.concatenate([j.error for j in self.joints]), np.concatenate([j.measured for j in self.joints]))
+        return percent(
+            np.concatenate([j.error for j in self.joints]),
+            np.concatenate([j.measured for j in self.joints]),
+        )
 
 
 def predicted_torque(observation: Observation, fit: Estimate) -> Array:
     """W X, shape (r,), with the columns of the Estimate."""
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
-        raise InputError(f"the observation has no columns {', '.join(missing)}; it has {', '.join(observation.names)}")
+        raise InputError(
+            f"the observation has no columns {', '.join(missing)}; it has "
+            f"{', '.join(observation.names)}"
+        )
     columns = [observation.names.index(name) for name in fit.names]
     return np.asarray(observation.W[:, columns] @ fit.X)
 
@@ -96,7 +102,9 @@ def direct_comparison(observation: Observation, fit: Estimate) -> Comparison:
     for j in range(observation.n):
         rows = observation.joint(j)
         label = fit.per_joint[j].joint if len(fit.per_joint) == observation.n else str(j + 1)
-        parts.append(JointComparison(label, observation.t[rows], observation.Y[rows], predicted[rows]))
+        parts.append(
+            JointComparison(label, observation.t[rows], observation.Y[rows], predicted[rows])
+        )
     return Comparison(tuple(parts))
 
 
@@ -129,8 +137,10 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class CrossValidation:
-    """Predictions for every part and every set of columns; joints are their labels; `missing`: sets that could not be fitted, each with its reason."""
+class CrossValidation(Result):
+    """Predictions for every part and every set of columns; joints are their labels; `missing`: sets
+    that could not be fitted, each with its reason.
+    """
 
     joints: tuple[str, ...]
     predictions: tuple[Prediction, ...]
@@ -140,33 +150,38 @@ class CrossValidation:
         """Largest relative error on unseen data, %, by set of columns."""
         unseen = [p for p in self.predictions if not p.fitted]
         return {
-            columns: max(p.relative_error for p in unseen if p.columns == columns) for columns in dict.fromkeys(p.columns for p in unseen)
+            columns: max(p.relative_error for p in unseen if p.columns == columns)
+            for columns in dict.fromkeys(p.columns for p in unseen)
         }
-
-    def __str__(self) -> str:
-        return self.to_table()
 
     def to_table(self) -> str:
         """One line per part and set of columns, errors in %."""
-        lines: list[Sequence[str]] = [("part", "columns", "use", "total %", *(f"joint {j} %" for j in self.joints))]
+        lines: list[Sequence[str]] = [
+            ("part", "columns", "use", "total %", *(f"joint {j} %" for j in self.joints))
+        ]
         for p in self.predictions:
             errors = [f"{value:.3f}" for value in (p.relative_error, *p.per_joint)]
-            lines.append((p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted", *errors))
+            lines.append(
+                (p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted", *errors)
+            )
         return "\n".join([aligned(lines), *self.missing])
-
-    def to_json(self) -> str:
-        """JSON text of the predictions."""
-        return json_text(self.summary())
 
     def summary(self) -> dict[str, Any]:
         """What `to_json` writes, as a mapping."""
-        return {"schema": 1, "joints": self.joints, "predictions": self.predictions, **({"missing": self.missing} if self.missing else {})}
+        return {
+            "schema": 1,
+            "joints": self.joints,
+            "predictions": self.predictions,
+            **({"missing": self.missing} if self.missing else {}),
+        }
 
 
 def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, tuple[float, ...]]:
     """100 ||Y - W X|| / ||Y||, in %, over all joints and by joint."""
     residual, measured = observation.norms(fit.names, fit.X)
-    return _percent(residual, measured), tuple(_percent(e, m) for e, m in zip(residual, measured, strict=True))
+    return percent(residual, measured), tuple(
+        percent(e, m) for e, m in zip(residual, measured, strict=True)
+    )
 
 
 def cross_validation(
@@ -178,7 +193,8 @@ def cross_validation(
     model: GeneratedModel | None = None,
     fitted: Mapping[Any, Estimate] | None = None,
 ) -> CrossValidation:
-    """Fit every set of columns on one observation, predict others; a set whose fit fails is left out and told.
+    """Fit every set of columns on one observation, predict others; a set whose fit fails is left
+    out and told.
 
     Parameters
     ----------
@@ -201,25 +217,44 @@ def cross_validation(
     for columns, settings in choices.items():
         try:
             known = (fitted or {}).get(columns)
-            estimate = known if known is not None else estimate_of(fit, point_estimate(settings), model=model)
+            estimate = (
+                known
+                if known is not None
+                else estimate_of(fit, point_estimate(settings), model=model)
+            )
         except InputError as e:
             missing.append(f"validation of {columns} parameters, fitted on {name}: {e}")
             continue
         labels = tuple(joint.joint for joint in estimate.per_joint)
         for part, observation in {name: fit, **predict}.items():
             total, errors = prediction_errors(observation, estimate)
-            predictions.append(Prediction(part, columns, len(estimate.names), observation is fit, total, errors))
+            predictions.append(
+                Prediction(part, columns, len(estimate.names), observation is fit, total, errors)
+            )
     return CrossValidation(labels, tuple(predictions), tuple(missing))
 
 
 def split_validation(
-    observation: Observation, windows: Sequence[Window], choices: Mapping[Any, EstimateSettings], *, model: GeneratedModel | None = None
+    observation: Observation,
+    windows: Sequence[Window],
+    choices: Mapping[Any, EstimateSettings],
+    *,
+    model: GeneratedModel | None = None,
 ) -> CrossValidation:
-    """`cross_validation` between windows in s of one record: the first is fitted, the others are predicted."""
+    """`cross_validation` between windows in s of one record: the first is fitted, the others are
+    predicted.
+    """
     if len(windows) < 2:
-        raise InputError(f"{len(windows)} window; expected at least two, the first to fit, the others to predict (validate.split)")
-    labels = [f"[{', '.join('' if t is None else instant(t) for t in window)}] s" for window in windows]
-    parts = {label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)}
+        raise InputError(
+            f"{len(windows)} window; expected at least two, the first to fit, the others to "
+            "predict (validate.split)"
+        )
+    labels = [
+        f"[{', '.join('' if t is None else instant(t) for t in window)}] s" for window in windows
+    ]
+    parts = {
+        label: observation.between(t0, t1) for label, (t0, t1) in zip(labels, windows, strict=True)
+    }
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}
     return cross_validation(parts[first], others, choices, name=first, model=model)
@@ -251,28 +286,33 @@ class Direction:
 
 
 @dataclass(frozen=True)
-class WeakDirections:
-    """What the record separates badly: correlated pairs, the groups they form, the smallest singular directions."""
+class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
+    """What the record separates badly: correlated pairs, the groups they form, the smallest
+    singular directions.
+    """
 
     pairs: tuple[Pair, ...]
     groups: tuple[tuple[str, ...], ...]
     directions: tuple[Direction, ...]
     threshold: float
 
-    def __str__(self) -> str:
-        return self.to_table()
-
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence per group: which parameters trade against each other, how strongly, and what to do."""
+        """One sentence per group: which parameters trade against each other, how strongly, and what
+        to do.
+        """
         return tuple(self._warning(group) for group in self.groups)
 
     def _warning(self, group: Sequence[str]) -> str:
-        strongest = max((p for p in self.pairs if p.first in group), key=lambda p: abs(p.correlation))
+        strongest = max(
+            (p for p in self.pairs if p.first in group), key=lambda p: abs(p.correlation)
+        )
         between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
         return (
-            f"{' and '.join([', '.join(group[:-1]), group[-1]])} trade against each other on this record (correlation {between}"
-            f"{strongest.correlation:+.2f}): what they do together is known better than each value. Set one of them to a value known otherwise, or "
+            f"{' and '.join([', '.join(group[:-1]), group[-1]])} trade against each other on this "
+            f"record (correlation {between}"
+            f"{strongest.correlation:+.2f}): what they do together is known better than each "
+            "value. Set one of them to a value known otherwise, or "
             "record a motion that tells them apart (symgen excite)."
         )
 
@@ -281,19 +321,23 @@ class WeakDirections:
         lines: list[Sequence[str]] = [("pair", "correlation")]
         lines += [(f"{p.first} {p.second}", f"{p.correlation:+.4f}") for p in self.pairs]
         weak: list[Sequence[str]] = [("singular value ratio", "direction (unit columns)")]
-        weak += [(f"{d.ratio:.3e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items())) for d in self.directions]
-        head = f"groups with |correlation| above {self.threshold}: {'; '.join(', '.join(g) for g in self.groups) or 'none'}"
-        return "\n\n".join([head, aligned(lines), aligned(weak)])
-
-    def to_json(self) -> str:
-        """JSON text of pairs, groups and directions."""
-        return json_text(
-            {"schema": 1, "threshold": self.threshold, "pairs": self.pairs, "groups": self.groups, "directions": self.directions}
+        weak += [
+            (f"{d.ratio:.3e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()))
+            for d in self.directions
+        ]
+        head = (
+            f"groups with |correlation| above {self.threshold}: "
+            f"{'; '.join(', '.join(g) for g in self.groups) or 'none'}"
         )
+        return "\n\n".join([head, aligned(lines), aligned(weak)])
 
 
 def weak_directions(
-    observation: Observation, settings: EstimateSettings | None = None, *, threshold: float = CORRELATION, count: int = 3
+    observation: Observation,
+    settings: EstimateSettings | None = None,
+    *,
+    threshold: float = LIMIT.CORRELATION,
+    count: int = 3,
 ) -> WeakDirections:
     """Parameters that trade against each other on this observation.
 
@@ -308,7 +352,10 @@ def weak_directions(
     correlation = (T @ T.T) / np.outer(norms, norms).clip(min=np.finfo(float).tiny)
     linked = np.abs(correlation) > threshold
     np.fill_diagonal(linked, False)
-    pairs = [Pair(names[i], names[k], float(correlation[i, k])) for i, k in zip(*np.nonzero(np.triu(linked)), strict=True)]
+    pairs = [
+        Pair(names[i], names[k], float(correlation[i, k]))
+        for i, k in zip(*np.nonzero(np.triu(linked)), strict=True)
+    ]
     components, label = connected_components(linked, directed=False)
     groups = [tuple(names[i] for i in np.flatnonzero(label == c)) for c in range(components)]
     weakest = range(len(names) - 1, max(len(names) - 1 - count, -1), -1)
@@ -324,9 +371,8 @@ def _named(v: Array, names: Sequence[str]) -> dict[str, float]:
     """Entries of a singular vector worth a name, largest first, the largest positive."""
     order = np.argsort(-np.abs(v), kind="stable")
     v = v * np.sign(v[order[0]])
-    return {names[i]: float(v[i]) for i in order if abs(v[i]) >= PARTICIPATION * abs(v[order[0]])}
-
-
-def _percent(error: Array, measured: Array) -> float:
-    norm = float(np.linalg.norm(measured))
-    return 100 * float(np.linalg.norm(error)) / norm if norm > 0 else float("nan")
+    return {
+        names[i]: float(v[i])
+        for i in order
+        if abs(v[i]) >= LIMIT.DIRECTION_PARTICIPATION * abs(v[order[0]])
+    }

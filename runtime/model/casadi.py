@@ -1,8 +1,10 @@
-"""The CasADi module of a model at the border: of the same robot file as the NumPy module beside which it stands, and checked.
+"""The CasADi module of a model at the border: of the same robot file as the NumPy module beside
+which it stands, and checked.
 
     symbolic = load_symbolic("tx40")        # generated/tx40_casadi.py
 
-It is parsed before it runs (`runtime.model.loading`) and imports casadi itself; this file does not.
+Like every module it runs where it was emitted here, or is trusted (`runtime.model.loading`). It
+imports casadi itself; this file does not.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import Any, Protocol, cast
 
 from runtime.errors import InputError, ModelError
 from runtime.model.generated import GeneratedModel, file_of
-from runtime.model.loading import module_of
+from runtime.model.loading import is_trusted, module_of
 
 CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "CONSTANTS", "LIMITS", "VALUES", "SOURCE_SHA256")
 FUNCTIONS = {  # columns read, before the constants
@@ -28,7 +30,9 @@ FUNCTIONS = {  # columns read, before the constants
 
 
 class SymbolicModel(Protocol):
-    """What `runtime` uses of a CasADi module: ca.Function objects of columns, called by name; n joints, b base parameters."""
+    """What `runtime` uses of a CasADi module: ca.Function objects of columns, called by name; n
+    joints, b base parameters.
+    """
 
     NAME: str
     JOINTS: tuple[int, ...]
@@ -46,7 +50,11 @@ class SymbolicModel(Protocol):
 
 
 def load_symbolic(
-    model: str | Path | ModuleType | SymbolicModel, *, of: GeneratedModel | None = None, folder: str | Path | None = None
+    model: str | Path | ModuleType | SymbolicModel,
+    *,
+    of: GeneratedModel | None = None,
+    folder: str | Path | None = None,
+    trust: bool = False,
 ) -> SymbolicModel:
     """The CasADi model of a name (generated/NAME_casadi.py), of a path, or of an imported module.
 
@@ -57,41 +65,60 @@ def load_symbolic(
         The NumPy model that it must belong to.
     folder : str or Path, optional
         Where names are looked up; default: ./generated.
+    trust : bool
+        As for `load_model`; a trusted `of` has trusted files beside it.
 
     Raises
     ------
     ModelError
-        No such file, or no such model.
+        No such file, one that was not emitted here, or no such model.
     """
     if not isinstance(model, str | Path):
         return _checked(cast(ModuleType, model), of)
     path = file_of(model, "_casadi", folder)
     if not path.is_file():
         robot = path.stem.removesuffix("_casadi")
-        raise ModelError(f"no CasADi model {path}; emit it with `symgen generate {robot} --target numpy,casadi -o {path.parent}`")
-    return _checked(module_of(path), of)
+        raise ModelError(
+            f"no CasADi model {path}; emit it with `symgen generate {robot} --target numpy,casadi "
+            f"-o {path.parent}`"
+        )
+    trust = trust or (of is not None and is_trusted(of))
+    return _checked(module_of(path, trust=trust), of)
 
 
 def casadi_path(model: GeneratedModel) -> Path:
-    """The CasADi file that `symgen.model` emits on request, or else the one in the folder of the NumPy module; InputError for a model that has no file."""
+    """The CasADi file that `symgen.model` emits on request, or else the one in the folder of the
+    NumPy module; InputError for a model that has no file.
+    """
     emitted = getattr(model, "casadi_file", None)
     if emitted is not None:
         return Path(emitted())
     file = getattr(model, "__file__", None)
     if file is None:
-        raise InputError(f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`")
+        raise InputError(
+            f"{model.NAME} has no file to look beside for its CasADi module; pass it as `symbolic`"
+        )
     return Path(file).with_name(f"{model.NAME}_casadi.py")
 
 
 def _checked(module: ModuleType, of: GeneratedModel | None) -> SymbolicModel:
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
-        raise ModelError(f"no {', '.join(missing)}; expected an emitted CasADi module, emit it again", file=module.__name__)
+        raise ModelError(
+            f"no {', '.join(missing)}; expected an emitted CasADi module, emit it again",
+            file=module.__name__,
+        )
     for name, columns in FUNCTIONS.items():
         function = getattr(module, name)
         names = list(function.name_in()) if hasattr(function, "name_in") else None
         if names != [*columns, *module.CONSTANTS]:
-            raise ModelError(f"{name} takes {names}; expected {', '.join([*columns, *module.CONSTANTS])}", file=module.__name__)
+            raise ModelError(
+                f"{name} takes {names}; expected {', '.join([*columns, *module.CONSTANTS])}",
+                file=module.__name__,
+            )
     if of is not None and module.SOURCE_SHA256 != of.SOURCE_SHA256:
-        raise ModelError("NumPy and CasADi module stem from different robot files; emit both again", file=module.__name__)
+        raise ModelError(
+            "NumPy and CasADi module stem from different robot files; emit both again",
+            file=module.__name__,
+        )
     return cast(SymbolicModel, module)

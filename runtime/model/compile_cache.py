@@ -1,7 +1,9 @@
 """C files compiled on first use into a cache that is checked.
 
-The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (`SYMGEN_CACHE`, else that of the platform). Its name
-holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a damaged file is not loaded; it is
+The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder
+(compiled in `SYMGEN_CACHE`, else that of the platform). Its name
+holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a
+damaged file is not loaded; it is
 written under another name and moved, so that processes may compile at once.
 """
 
@@ -14,23 +16,42 @@ import platform
 import shlex
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-FLAGS = ("-std=c11", "-O2", "-ftree-vectorize", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-shared", "-fPIC")
+from runtime.limits import LIMIT
+from runtime.model.loading import is_writable_by_all
+
+FLAGS = (
+    "-std=c11",
+    "-O2",
+    "-ftree-vectorize",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ffp-contract=off",
+    "-shared",
+    "-fPIC",
+)
 LIBRARIES = ("-lm",)
-WIDTHS = {"avx512f": 8, "avx2": 4}  # of vectors on x86-64, widest first, and how many doubles they hold
+WIDTHS = {
+    "avx512f": 8,
+    "avx2": 4,
+}  # of vectors on x86-64, widest first, and how many doubles they hold
 VECTOR_SINES = "-fveclib=libmvec"
-QUICK = (  # of gcc: half of its time here without these; nothing that it emits is slower, and the bits are the same
+# of gcc: half of its time here without these; nothing that it emits is slower, and the bits are the
+# same
+QUICK = (
     "--param=max-combine-insns=2",  # instructions merged by pairs, not by threes and fours
     "-fno-gcse",
     "--param=lra-max-considered-reload-pseudos=5",  # rounds of spilling on code of one long block
 )
-UNSAFE = ("-ffast-math", "-Ofast", "-funsafe-math-optimizations")  # set flush-to-zero in the process that loads the object
-TIME = 120.0  # s, of one compilation
+UNSAFE = (
+    "-ffast-math",
+    "-Ofast",
+    "-funsafe-math-optimizations",
+)  # set flush-to-zero in the process that loads the object
 
 
 class FallbackWarning(UserWarning):
@@ -41,21 +62,15 @@ class NotCompiledError(Exception):
     """Why there is no C."""
 
 
-def cache_folder() -> Path:
-    """SYMGEN_CACHE, or the folder of the platform for files that can be made again."""
-    if given := os.environ.get("SYMGEN_CACHE"):
-        return Path(given)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "symgen" / "compiled"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "symgen" / "compiled"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "compiled"
-
-
 def shared_object(
-    path: Path, text: bytes, folder: Path, opened: Callable[[Path], ctypes.CDLL], flags: Sequence[str] = FLAGS
+    path: Path,
+    text: bytes,
+    folder: Path,
+    opened: Callable[[Path], ctypes.CDLL],
+    flags: Sequence[str] = FLAGS,
 ) -> ctypes.CDLL:
-    """The shared object of a C file, from the cache or compiled; one that does not open is compiled again, once.
+    """The shared object of a C file, from the cache or compiled; one that does not open is compiled
+    again, once.
 
     Parameters
     ----------
@@ -66,7 +81,8 @@ def shared_object(
     folder : Path
         The cache.
     opened : callable
-        Loads and checks an object; raises NotCompiledError or OSError where it is not the one wanted.
+        Loads and checks an object; raises NotCompiledError or OSError where it is not the one
+        wanted.
     flags : sequence of str
 
     Raises
@@ -76,15 +92,27 @@ def shared_object(
     """
     command, version = compiler()
     flags = (*flags, *_width())
-    parts = (text, " ".join((*flags, *LIBRARIES)).encode(), " ".join(command).encode(), version.encode(), _processor().encode())
+    parts = (
+        text,
+        " ".join((*flags, *LIBRARIES)).encode(),
+        " ".join(command).encode(),
+        version.encode(),
+        _processor().encode(),
+    )
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if os.name == "posix" and folder.stat().st_mode & 0o002:
-            raise NotCompiledError(f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE")
-        return _cached(folder, key[:32], opened) or opened(_compiled(command, flags, path, text, folder, key[:32]))
+        if is_writable_by_all(folder):
+            raise NotCompiledError(
+                f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE"
+            )
+        return _cached(folder, key[:32], opened) or opened(
+            _compiled(command, flags, path, text, folder, key[:32])
+        )
     except OSError as e:  # no right to write, full, or mounted without the right to execute
-        raise NotCompiledError(f"cache folder {folder}: {e.strerror or e}; choose another by SYMGEN_CACHE") from e
+        raise NotCompiledError(
+            f"cache folder {folder}: {e.strerror or e}; choose another by SYMGEN_CACHE"
+        ) from e
 
 
 def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ctypes.CDLL | None:
@@ -99,16 +127,34 @@ def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ct
     return None
 
 
-def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: bytes, folder: Path, key: str) -> Path:
+def _compiled(
+    command: Sequence[str], flags: Sequence[str], path: Path, text: bytes, folder: Path, key: str
+) -> Path:
     for left in folder.glob(".compiling-*"):  # by a process that was killed
-        if time.time() - left.stat().st_mtime > 2 * TIME:
+        if time.time() - left.stat().st_mtime > 2 * LIMIT.COMPILE_TIME:
             shutil.rmtree(left, ignore_errors=True)
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)
         try:
-            line = [*command, *flags, *_own_options(command), source.name, "-o", target.name, *LIBRARIES]
-            done = subprocess.run(line, cwd=scratch, capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+            line = [
+                *command,
+                *flags,
+                *_own_options(command),
+                source.name,
+                "-o",
+                target.name,
+                *LIBRARIES,
+            ]
+            done = subprocess.run(
+                line,
+                cwd=scratch,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=LIMIT.COMPILE_TIME,
+                check=False,
+            )
         except (OSError, subprocess.TimeoutExpired) as e:
             raise NotCompiledError(f"{' '.join(command)} did not run: {e}") from e
         if done.returncode or not target.is_file():
@@ -120,7 +166,9 @@ def _compiled(command: Sequence[str], flags: Sequence[str], path: Path, text: by
 
 
 def _width() -> tuple[str, ...]:
-    """Macros WIDTH and DOUBLES: the widest vectors of this processor and their numbers, as the C files ask for one width instead of several."""
+    """Macros WIDTH and DOUBLES: the widest vectors of this processor and their numbers, as the C
+    files ask for one width instead of several.
+    """
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return ()
     known = _cpuinfo("flags").split()
@@ -129,7 +177,9 @@ def _width() -> tuple[str, ...]:
 
 
 def _own_options(command: Sequence[str]) -> tuple[str, ...]:
-    """Options of gcc, and of clang that of the vector functions of glibc, where it knows it; gcc has a declaration in the C file."""
+    """Options of gcc, and of clang that of the vector functions of glibc, where it knows it; gcc
+    has a declaration in the C file.
+    """
     predefined = _predefined(command)
     if b"__clang__" not in predefined:
         return QUICK if b"__GNUC__" in predefined else ()
@@ -139,35 +189,63 @@ def _own_options(command: Sequence[str]) -> tuple[str, ...]:
 
 def _predefined(command: Sequence[str]) -> bytes:
     """Macros that a compiler defines; nothing where it refuses an option."""
-    done = subprocess.run([*command, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, timeout=TIME, check=False)
+    done = subprocess.run(
+        [*command, "-dM", "-E", "-x", "c", os.devnull],
+        capture_output=True,
+        timeout=LIMIT.COMPILE_TIME,
+        check=False,
+    )
     return b"" if done.returncode else done.stdout
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
     """Command of the C compiler and what it says of its version; raises where there is none."""
     given = shlex.split(os.environ.get("CC", ""))
-    program = shutil.which(given[0]) if given else next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    program = (
+        shutil.which(given[0])
+        if given
+        else next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    )
     if program is None:
-        raise NotCompiledError(f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH")
+        raise NotCompiledError(
+            f"no C compiler {given[0]} (CC)" if given else "no C compiler cc, gcc or clang on PATH"
+        )
     unsafe = [flag for flag in given[1:] if flag in UNSAFE]
     if unsafe:
-        raise NotCompiledError(f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process")
+        raise NotCompiledError(
+            f"CC holds {', '.join(unsafe)}, which changes the arithmetic of the whole process"
+        )
     command = (program, *given[1:])
     try:
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", timeout=TIME, check=False)
+        done = subprocess.run(
+            [*command, "--version"],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=LIMIT.COMPILE_TIME,
+            check=False,
+        )
     except (OSError, subprocess.TimeoutExpired) as e:
         raise NotCompiledError(f"{program} did not run: {e}") from e
     return command, done.stdout
 
 
 def processor() -> str:
-    """Machine and name of the processor, as far as the system tells: what results depend on in their last bits."""
-    return f"{platform.machine()} {_cpuinfo('model name').partition(':')[2].strip() or platform.processor()}".strip()
+    """Machine and name of the processor, as far as the system tells: what results depend on in
+    their last bits.
+    """
+    return (
+        f"{platform.machine()} "
+        f"{_cpuinfo('model name').partition(':')[2].strip() or platform.processor()}"
+    ).strip()
 
 
 def _processor() -> str:
     """What the code may depend on: machine, system, processor flags."""
-    return f"{platform.system()} {platform.machine()} {platform.architecture()[0]} {_cpuinfo('flags', 'Features')}"
+    return (
+        f"{platform.system()} {platform.machine()} {platform.architecture()[0]} "
+        f"{_cpuinfo('flags', 'Features')}"
+    )
 
 
 def _cpuinfo(*starts: str) -> str:

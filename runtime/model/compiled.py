@@ -1,11 +1,15 @@
-"""The C file of a model, compiled on first use and called like the NumPy module; without a compiler the NumPy module serves.
+"""The C file of a model, compiled on first use and called like the NumPy module; without a compiler
+the NumPy module serves.
 
     model = compiled_model(load_model("tx40"))          # generated/tx40.c beside generated/tx40.py
 
-The object lies in a cache that is checked (`runtime.model.compile_cache`). One tile of every function is compared with NumPy. A study that needs some
+The object lies in a cache that is checked (`runtime.model.compile_cache`). One tile of every
+function is compared with NumPy. A study that needs some
 columns alone has their signals compiled apart (`CompiledModel.signals_alone`).
 
-A C file runs as it is, unlike a module (`runtime.model.loading`): compile only what you emitted yourself.
+A C file is code as a module is: it is compiled where it was emitted here, or where the module
+beside
+it is trusted (`runtime.model.loading`).
 """
 
 from __future__ import annotations
@@ -22,15 +26,20 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.compile_cache import FLAGS, FallbackWarning, NotCompiledError, cache_folder, shared_object
-from runtime.model.generated import GeneratedModel, ModelText
+from runtime.limits import LIMIT
+from runtime.model.compile_cache import (
+    FLAGS,
+    FallbackWarning,
+    NotCompiledError,
+    shared_object,
+)
+from runtime.model.generated import GeneratedModel
+from runtime.model.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
 from runtime.model.narrowing import narrowed_source
 
 Array = np.ndarray
 
 ABI = 2
-TOLERANCE = 1e-10  # of the largest entry: the self-check looks for wrong code, not for rounding
-SHARE = 32 << 20  # bytes of the last cache that one core may count on at most
 STATES = {
     "regressor": ("q", "qd", "qdd"),
     "inverse_dynamics": ("q", "qd", "qdd"),
@@ -40,8 +49,11 @@ STATES = {
 }
 
 
-def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
-    """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where that cannot be had.
+def compiled_model(
+    model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None
+) -> GeneratedModel:
+    """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where
+    that cannot be had.
 
     Parameters
     ----------
@@ -49,21 +61,31 @@ def compiled_model(model: GeneratedModel, *, source: Path | None = None, cache: 
     source : Path, optional
         The C file; default: beside the file of the model, .c for .py.
     cache : Path, optional
-        Folder of the compiled objects; default: `compile_cache.cache_folder`.
+        Folder of the compiled objects; default: `loading.cache_folder`.
     """
     return _compiled(CompiledModel, model, source, cache)
 
 
-def compiled_signals(model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None) -> GeneratedModel:
-    """`model` with the distinct signals of its regressor in C, all else in NumPy: half the time of compiling. Otherwise as `compiled_model`."""
+def compiled_signals(
+    model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None
+) -> GeneratedModel:
+    """`model` with the distinct signals of its regressor in C, all else in NumPy: half the time of
+    compiling. Otherwise as `compiled_model`.
+    """
     return _compiled(CompiledSignals, model, source, cache)
 
 
-def _compiled(kind: type[CompiledSignals], model: GeneratedModel, source: Path | None, cache: Path | None) -> GeneratedModel:
+def _compiled(
+    kind: type[CompiledSignals], model: GeneratedModel, source: Path | None, cache: Path | None
+) -> GeneratedModel:
     try:
         path = source or _beside(model)
         text, folder = _text(path), cache or cache_folder()
-        library = shared_object(path, text, folder, lambda opened: _opened(opened, model, kind.FUNCTIONS), kind.OPTIONS)
+        if not (is_trusted(model) or is_emitted(text)):
+            raise NotCompiledError(f"{path} {UNTRUSTED}")
+        library = shared_object(
+            path, text, folder, lambda opened: _opened(opened, model, kind.FUNCTIONS), kind.OPTIONS
+        )
         compiled = kind(model, library, text, folder)
         compiled.check()
         return cast(GeneratedModel, compiled)
@@ -79,14 +101,18 @@ def target_of(model: GeneratedModel) -> str:
 
 @dataclass(frozen=True)
 class SignalTable:
-    """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code: S[column, row] = sign U[signal].
+    """The distinct rows of the store S, shape (b, n, N), as a C function, for other C code:
+    S[column, row] = sign U[signal].
 
     Attributes
     ----------
     address : int
-        Of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t stride, const double *constants,
-        double *U, int64_t ustride), which fills U[s*ustride + t], t < m, from states of which joint j has m samples from j*stride on and
-        returns 0, or 1 if a pointer is missing or m exceeds ustride. It allocates nothing and may run in many threads.
+        Of int32_t f(int64_t m, const double *q, const double *qd, const double *qdd, int64_t
+        stride, const double *constants,
+        double *U, int64_t ustride), which fills U[s*ustride + t], t < m, from states of which joint
+        j has m samples from j*stride on and
+        returns 0, or 1 if a pointer is missing or m exceeds ustride. It allocates nothing and may
+        run in many threads.
     count : int
         Number of signals s; those of constant entries are filled too.
     tile : int
@@ -108,12 +134,16 @@ class SignalTable:
 
 
 class CompiledSignals:
-    """The generated module `module`, the distinct signals of its regressor in C. `signals`: for other C code. `source`: the C file's text."""
+    """The generated module `module`, the distinct signals of its regressor in C. `signals`: for
+    other C code. `source`: the C file's text.
+    """
 
     FUNCTIONS: ClassVar[tuple[str, ...]] = ("signals",)
     OPTIONS: ClassVar[tuple[str, ...]] = (*FLAGS, "-DSIGNALS_ONLY")
 
-    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path) -> None:
+    def __init__(
+        self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path
+    ) -> None:
         self.module, self._library, self.source, self._cache = model, library, source, cache
         self.signals = _signals(library, model)
         self._n, self._b = len(model.JOINTS), len(model.BASE_PARAMETERS)
@@ -123,8 +153,14 @@ class CompiledSignals:
             raise AttributeError(name)
         return getattr(self.module, name)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes: the module and the C file."""
+        return _compiled_again, (self.module, self.source)
+
     def check(self) -> None:
-        """Raise unless the signals agree with the regressor in NumPy on a tile and some samples more."""
+        """Raise unless the signals agree with the regressor in NumPy on a tile and some samples
+        more.
+        """
         (q, qd, qdd), table = _probes(self._n), self.signals
         expected = np.asarray(self.module.regressor(q, qd, qdd)).transpose(2, 1, 0)
         rows = self.signal_rows(q, qd, qdd, np.empty((table.count, len(q))))
@@ -133,25 +169,44 @@ class CompiledSignals:
         _require_equal("signals", store, expected)
 
     def signal_rows(self, q: Array, qd: Array, qdd: Array, out: Array, **constants: float) -> Array:
-        """The distinct signals of the regressor, shape (signals.count, N), in `out`, a float64 array in C order."""
+        """The distinct signals of the regressor, shape (signals.count, N), in `out`, a float64
+        array in C order.
+        """
         states = [np.ascontiguousarray(x.T) for x in self._states("regressor", (q, qd, qdd))]
         N = states[0].shape[1]
-        if out.shape != (self.signals.count, N) or out.dtype != np.float64 or not out.flags.c_contiguous:
-            raise InputError(f"out {out.dtype} {out.shape}; expected float64 {(self.signals.count, N)} in C order")
+        if (
+            out.shape != (self.signals.count, N)
+            or out.dtype != np.float64
+            or not out.flags.c_contiguous
+        ):
+            raise InputError(
+                f"out {out.dtype} {out.shape}; expected float64 {(self.signals.count, N)} in C "
+                "order"
+            )
         inputs = [ctypes.c_void_p(x.ctypes.data) for x in states]
         values, length = self._constants("signals", constants), ctypes.c_int64(N)
         others = ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data)
-        if status := getattr(self._library, f"{self.module.NAME}_signals")(length, *inputs, length, *others, length):
-            raise InputError(f"{self.module.NAME}: signals in C refused its arguments with {status}")
+        if status := getattr(self._library, f"{self.module.NAME}_signals")(
+            length, *inputs, length, *others, length
+        ):
+            raise InputError(
+                f"{self.module.NAME}: signals in C refused its arguments with {status}"
+            )
         return out
 
     def signals_alone(self, wanted: Sequence[int]) -> SignalTable:
-        """The table of signals, whose function fills the rows `wanted` alone, in the same bits; `signals` where they cannot be compiled."""
+        """The table of signals, whose function fills the rows `wanted` alone, in the same bits;
+        `signals` where they cannot be compiled.
+        """
         text = narrowed_source(self.source.decode(), wanted).encode()
         path, functions = Path(f"{self.module.NAME}.c"), CompiledSignals.FUNCTIONS
         try:
             library = shared_object(
-                path, text, self._cache, lambda opened: _opened(opened, self.module, functions), CompiledSignals.OPTIONS
+                path,
+                text,
+                self._cache,
+                lambda opened: _opened(opened, self.module, functions),
+                CompiledSignals.OPTIONS,
             )
         except (NotCompiledError, OSError):
             return self.signals
@@ -159,11 +214,14 @@ class CompiledSignals:
 
     def _states(self, name: str, given: Sequence[Array]) -> tuple[Array, ...]:
         """Contiguous (N, n) arrays of one shape: C reads past the end of any other."""
-        states = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given)
+        states = tuple(
+            np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given
+        )
         for label, x in zip(STATES[name], states, strict=True):
             if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
                 raise InputError(
-                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; expected (N, {self._n}), the same for all"
+                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; "
+                    f"expected (N, {self._n}), the same for all"
                 )
         return states
 
@@ -172,7 +230,8 @@ class CompiledSignals:
         unknown = set(constants) - set(self.module.CONSTANTS)
         if unknown:
             raise TypeError(
-                f"{name}() got unexpected keywords {sorted(unknown)}; constants are {', '.join(self.module.CONSTANTS) or 'none'}"
+                f"{name}() got unexpected keywords {sorted(unknown)}; constants are "
+                f"{', '.join(self.module.CONSTANTS) or 'none'}"
             )
         return np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
 
@@ -183,20 +242,28 @@ class CompiledModel(CompiledSignals):
     FUNCTIONS = tuple(STATES)
     OPTIONS = FLAGS
 
-    def __init__(self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path) -> None:
+    def __init__(
+        self, model: GeneratedModel, library: ctypes.CDLL, source: bytes, cache: Path
+    ) -> None:
         super().__init__(model, library, source, cache)
         self._large = _large()
 
-    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+    def regressor(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
         """D, shape (N, n, b): a view on one store of shape (b, n, N)."""
         D = self._filled_store(q, qd, qdd, out, constants).transpose(2, 1, 0)
         return cast(Array, D[0]) if np.ndim(q) == 1 else D
 
-    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+    def observation_matrix(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
         """W, shape (n*N, b), rows joint-major, Fortran order: the same store, no copy."""
         return self._filled_store(q, qd, qdd, out, constants).reshape(self._b, -1).T
 
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array, X: Array, **constants: float) -> Array:
+    def inverse_dynamics(
+        self, q: Array, qd: Array, qdd: Array, X: Array, **constants: float
+    ) -> Array:
         """Gamma, shape (N, n)."""
         return self._dynamics("inverse_dynamics", (q, qd, qdd), X, constants, 1)
 
@@ -212,7 +279,9 @@ class CompiledModel(CompiledSignals):
         """Gamma at rest without friction, shape (N, n)."""
         return self._dynamics("gravity", (q,), X, constants, 1)
 
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array, X: Array, **constants: float) -> Array:
+    def forward_dynamics(
+        self, q: Array, qd: Array, tau: Array, X: Array, **constants: float
+    ) -> Array:
         """qdd = A(q)**-1 (tau - bias), shape (N, n)."""
         A, H = self.inertia_matrix(q, X, **constants), self.bias(q, qd, X, **constants)
         return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
@@ -224,19 +293,28 @@ class CompiledModel(CompiledSignals):
             arguments = [*states[: len(used)], *([] if name == "regressor" else [X])]
             _require_equal(name, *(getattr(m, name)(*arguments) for m in (self, self.module)))
 
-    def _filled_store(self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]) -> Array:
+    def _filled_store(
+        self, q: Array, qd: Array, qdd: Array, out: Array | None, constants: Mapping[str, float]
+    ) -> Array:
         states = self._states("regressor", (q, qd, qdd))
         N = len(states[0])
         if out is None:
             out = self.module.store(N)
-        elif not (isinstance(out, cast(Any, self.module).Store) and cast(Any, out).ready and out.shape == (self._b, self._n, N)):
+        elif not (
+            isinstance(out, cast(Any, self.module).Store)
+            and cast(Any, out).ready
+            and out.shape == (self._b, self._n, N)
+        ):
             raise ValueError(
-                f"out: expected store({N}) of shape {(self._b, self._n, N)}, found {type(out).__name__} of shape {np.shape(out)}"
+                f"out: expected store({N}) of shape {(self._b, self._n, N)}, found "
+                f"{type(out).__name__} of shape {np.shape(out)}"
             )
         self._call("regressor", states, constants, out)
         return out.view(np.ndarray)
 
-    def _dynamics(self, name: str, given: Sequence[Array], X: Array, constants: Mapping[str, float], axes: int) -> Array:
+    def _dynamics(
+        self, name: str, given: Sequence[Array], X: Array, constants: Mapping[str, float], axes: int
+    ) -> Array:
         states = self._states(name, given)
         X = np.ascontiguousarray(X, dtype=float)
         if X.shape != (self._b,):
@@ -246,13 +324,24 @@ class CompiledModel(CompiledSignals):
         result = np.moveaxis(result, -1, 0)
         return cast(Array, result[0]) if np.ndim(given[0]) == 1 else result
 
-    def _call(self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array) -> None:
+    def _call(
+        self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array
+    ) -> None:
         values = self._constants(name, constants)
-        if not (result.flags.c_contiguous and result.flags.aligned and result.flags.writeable and result.dtype == np.float64):
-            raise InputError(f"{self.module.NAME}: the store is not a writeable float64 array in C order")
+        if not (
+            result.flags.c_contiguous
+            and result.flags.aligned
+            and result.flags.writeable
+            and result.dtype == np.float64
+        ):
+            raise InputError(
+                f"{self.module.NAME}: the store is not a writeable float64 array in C order"
+            )
         stream = result.nbytes > self._large
         pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*inputs, values, result)]
-        status = getattr(self._library, f"{self.module.NAME}_{name}")(ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream))
+        status = getattr(self._library, f"{self.module.NAME}_{name}")(
+            ctypes.c_int64(result.shape[-1]), *pointers, ctypes.c_int32(stream)
+        )
         if status:
             raise InputError(f"{self.module.NAME}: {name} in C refused its arguments with {status}")
 
@@ -264,56 +353,58 @@ def _probes(n: int) -> Array:
 
 def _require_equal(name: str, result: Array, expected: Array) -> None:
     """NotCompiledError where C and NumPy differ by more than rounding."""
-    if not np.abs(result - expected).max(initial=0.0) <= TOLERANCE * np.abs(expected).max(initial=1.0):
+    if not np.abs(result - expected).max(initial=0.0) <= LIMIT.C_AGREES * np.abs(expected).max(
+        initial=1.0
+    ):
         raise NotCompiledError(f"{name} in C differs from NumPy; report compiler and robot file")
 
 
-@dataclass(frozen=True)
-class CompiledText(ModelText):
-    """Module and C file of a model as text, for another process, which compiles into its own cache."""
-
-    source: bytes = b""
-
-    def load(self) -> GeneratedModel:
-        """The compiled model; InputError where it cannot be compiled there, as NumPy would not give the same bits."""
-        module = super().load()
-        with TemporaryDirectory(prefix="symgen-") as folder:
-            path = Path(folder) / Path(self.name).with_suffix(".c")
-            path.write_bytes(self.source)
-            model = compiled_model(module, source=path)
-        if not isinstance(model, CompiledModel):
-            raise InputError(
-                f"a worker has no compiled {module.NAME} (its log says why); use --target numpy, or install a C compiler there"
-            )
-        return model
-
-
-def text_of(model: GeneratedModel | ModelText) -> ModelText:
-    """The model as text, for another process: module and, of a compiled model, C file."""
-    if isinstance(model, ModelText):
-        return model
-    module = ModelText.of(model)
-    return CompiledText(module.name, module.text, module.digest, model.source) if isinstance(model, CompiledSignals) else module
+def _compiled_again(module: GeneratedModel, source: bytes) -> CompiledModel:
+    """The compiled model in another process; InputError where it cannot be compiled there, as NumPy
+    would not give the same bits.
+    """
+    with TemporaryDirectory(prefix="symgen-") as folder:
+        path = Path(folder) / f"{module.NAME}.c"
+        path.write_bytes(source)
+        model = compiled_model(module, source=path)
+    if not isinstance(model, CompiledModel):
+        raise InputError(
+            f"a worker has no compiled {module.NAME} (its log says why); use --target numpy, "
+            "or install a C compiler there"
+        )
+    return model
 
 
 def _signals(library: ctypes.CDLL, model: GeneratedModel) -> SignalTable:
     tile, count, entries = (
-        ctypes.c_int32.in_dll(library, f"{model.NAME}_{name}").value for name in ("tile", "signal_count", "entry_count")
+        ctypes.c_int32.in_dll(library, f"{model.NAME}_{name}").value
+        for name in ("tile", "signal_count", "entry_count")
     )
-    place, signal, sign = np.array((ctypes.c_int32 * 3 * entries).in_dll(library, f"{model.NAME}_entries"), dtype=np.intp).reshape(-1, 3).T
+    place, signal, sign = (
+        np.array(
+            (ctypes.c_int32 * 3 * entries).in_dll(library, f"{model.NAME}_entries"), dtype=np.intp
+        )
+        .reshape(-1, 3)
+        .T
+    )
     column, row = np.divmod(place, len(model.JOINTS))
     address = ctypes.cast(getattr(library, f"{model.NAME}_signals"), ctypes.c_void_p).value
-    constant = np.arange(entries) >= ctypes.c_int32.in_dll(library, f"{model.NAME}_varying_count").value
+    constant = (
+        np.arange(entries) >= ctypes.c_int32.in_dll(library, f"{model.NAME}_varying_count").value
+    )
     return SignalTable(cast(int, address), count, tile, column, row, signal, sign, constant)
 
 
 def _large() -> int:
-    """Bytes beyond which a result should not pass through the caches: a third of the last one, of which a large one is shared by many cores."""
+    """Bytes beyond which a result should not pass through the caches: a third of the last one, of
+    which a large one is shared by many cores.
+    """
     try:
         size = os.sysconf("SC_LEVEL3_CACHE_SIZE")
     except (AttributeError, ValueError, OSError):
         size = 0
-    return min(size if size > 0 else SHARE, SHARE) // 3
+    share: int = LIMIT.CACHE_OF_A_CORE
+    return min(size if size > 0 else share, share) // 3
 
 
 def _beside(model: GeneratedModel) -> Path:
@@ -326,16 +417,22 @@ def _beside(model: GeneratedModel) -> Path:
 def _text(path: Path) -> bytes:
     if not path.is_file():
         raise NotCompiledError(
-            f"there is no {path}; `symgen generate {path.stem} --target numpy,c` writes it, except where loops need iteration"
+            f"there is no {path}; `symgen generate {path.stem} --target numpy,c` writes it, except "
+            "where loops need iteration"
         )
     return path.read_bytes()
 
 
 def _opened(path: Path, model: GeneratedModel, functions: Iterable[str]) -> ctypes.CDLL:
-    """The object, if it speaks this ABI, stems from the robot file of the model and has the functions."""
+    """The object, if it speaks this ABI, stems from the robot file of the model and has the
+    functions.
+    """
     library = ctypes.CDLL(str(path))
     try:
-        abi, sha256 = getattr(library, f"{model.NAME}_abi"), getattr(library, f"{model.NAME}_source_sha256")
+        abi, sha256 = (
+            getattr(library, f"{model.NAME}_abi"),
+            getattr(library, f"{model.NAME}_source_sha256"),
+        )
         for name in functions:
             getattr(library, f"{model.NAME}_{name}").restype = ctypes.c_int32
     except AttributeError as e:

@@ -2,8 +2,10 @@
 
     qm  = R (q - offset)                    tau = R' (torque_constant * u)
 
-so that the power tau' qd is that of the motors. Off-diagonal elements of R are couplings: motor 6 of a wrist also turns with joint 5. Leaving
-them out of the position, the torque or both changes the total error of a fit little and ruins the joints concerned, hence `decoupled`, for
+so that the power tau' qd is that of the motors. Off-diagonal elements of R are couplings: motor 6
+of a wrist also turns with joint 5. Leaving
+them out of the position, the torque or both changes the total error of a fit little and ruins the
+joints concerned, hence `decoupled`, for
 reports that compare.
 """
 
@@ -48,17 +50,25 @@ class Drives:
         if ratio.shape != (n, n) or n == 0:
             raise InputError(f"drives: ratio has shape {ratio.shape}; expected (n, n)")
         offset, constant = (
-            np.broadcast_to(np.asarray(x, dtype=float), (n,)) if np.ndim(x) == 0 else np.array(x, dtype=float)
+            np.broadcast_to(np.asarray(x, dtype=float), (n,))
+            if np.ndim(x) == 0
+            else np.array(x, dtype=float)
             for x in (self.offset, self.torque_constant)
         )
         for name, x in (("offset", offset), ("torque_constant", constant)):
             if x.shape != (n,):
-                raise InputError(f"drives: {name} has shape {x.shape}; expected ({n},), one per joint")
+                raise InputError(
+                    f"drives: {name} has shape {x.shape}; expected ({n},), one per joint"
+                )
         if not all(np.isfinite(x).all() for x in (ratio, offset, constant)) or not constant.all():
-            raise InputError("drives: ratio, offset and torque_constant must be finite, and no torque constant zero")
+            raise InputError(
+                "drives: ratio, offset and torque_constant must be finite, and no torque constant "
+                "zero"
+            )
         if not (np.diag(ratio).all() and np.linalg.matrix_rank(ratio) == n):
             raise InputError(
-                f"drives: ratio is singular or has a zero on its diagonal {np.diag(ratio)}; motor positions must determine joint positions"
+                f"drives: ratio is singular or has a zero on its diagonal {np.diag(ratio)}; motor "
+                "positions must determine joint positions"
             )
         for name, x in (("ratio", ratio), ("offset", offset), ("torque_constant", constant)):
             object.__setattr__(self, name, x)
@@ -66,7 +76,9 @@ class Drives:
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Drives:
         """Drives of the DRIVES constant of an emitted module."""
-        return cls(mapping["ratio"], mapping.get("offset", 0.0), mapping.get("torque_constant", 1.0))
+        return cls(
+            mapping["ratio"], mapping.get("offset", 0.0), mapping.get("torque_constant", 1.0)
+        )
 
     @property
     def n(self) -> int:
@@ -74,12 +86,16 @@ class Drives:
         return len(self.ratio)
 
     def decoupled(self, coupling: Coupling) -> Drives:
-        """The same drives with the coupling in `both` directions, in the `position` or the `torque` alone, or in `none`."""
+        """The same drives with the coupling in `both` directions, in the `position` or the `torque`
+        alone, or in `none`.
+        """
         return replace(self, coupling=coupling)
 
     def joint_position(self, qm: Array) -> Array:
         """q = R^-1 qm + offset; qm, shape (N, n), rad."""
-        return np.asarray(np.linalg.solve(self._matrix("position"), self._checked(qm).T).T + self.offset)
+        return np.asarray(
+            np.linalg.solve(self._matrix("position"), self._checked(qm).T).T + self.offset
+        )
 
     def motor_position(self, q: Array) -> Array:
         """qm = R (q - offset), rad; q, shape (N, n)."""
@@ -91,11 +107,15 @@ class Drives:
 
     def motor_command(self, tau: Array) -> Array:
         """u = R'^-1 tau / torque_constant, A, V or N m; tau, shape (N, n), N m or N."""
-        return np.asarray(np.linalg.solve(self._matrix("torque").T, self._checked(tau).T).T / self.torque_constant)
+        return np.asarray(
+            np.linalg.solve(self._matrix("torque").T, self._checked(tau).T).T / self.torque_constant
+        )
 
     @property
     def motion(self) -> Array:
-        """Turns of the motors by turns of the joints, shape (n, n): R, or its diagonal where positions are taken as decoupled."""
+        """Turns of the motors by turns of the joints, shape (n, n): R, or its diagonal where
+        positions are taken as decoupled.
+        """
         return self._matrix("position")
 
     def _matrix(self, quantity: str) -> Array:
@@ -104,5 +124,8 @@ class Drives:
     def _checked(self, x: Array) -> Array:
         x = np.asarray(x, dtype=float)
         if x.ndim != 2 or x.shape[1] != self.n:
-            raise InputError(f"drives of {self.n} joints given an array of shape {x.shape}; expected (N, {self.n})")
+            raise InputError(
+                f"drives of {self.n} joints given an array of shape {x.shape}; expected (N, "
+                f"{self.n})"
+            )
         return x

@@ -1,18 +1,18 @@
-"""The border to emitted modules: their functions, loading and checking one, and checks of the states given to it.
+"""The border to emitted modules: their functions, loading and checking one, and checks of the
+states given to it.
 
-A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads generated/tx40.py of the current folder. A
-module given by path is parsed before it runs (`runtime.model.loading`), so that a file received from elsewhere cannot act behind its formulas.
+A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads
+generated/tx40.py of the current folder. A module is code: a file runs where this installation has
+emitted and certified it, or with trust=True (`runtime.model.loading`).
 """
 
 from __future__ import annotations
 
+import copyreg
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from hashlib import sha256
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any, Protocol, cast
 
@@ -20,18 +20,34 @@ import numpy as np
 
 from runtime.errors import InputError, ModelError, SettingsError
 from runtime.model.drives import Drives
-from runtime.model.loading import module_of
+from runtime.model.loading import module_of, run
 
 Array = np.ndarray
 
 FOLDER = Path("generated")  # of the current folder
-CONSTANTS = ("NAME", "JOINTS", "BASE_PARAMETERS", "STRUCTURE", "DRIVES", "LIMITS", "VALUES", "CONSTANTS", "SOURCE_SHA256")
+CONSTANTS = (
+    "NAME",
+    "JOINTS",
+    "BASE_PARAMETERS",
+    "STRUCTURE",
+    "DRIVES",
+    "LIMITS",
+    "VALUES",
+    "CONSTANTS",
+    "SOURCE_SHA256",
+)
 SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
-FUNCTIONS = ("store", "regressor", "observation_matrix")  # what identification needs; `require` checks others where they are used
+FUNCTIONS = (
+    "store",
+    "regressor",
+    "observation_matrix",
+)  # what identification needs; `require` checks others where they are used
 
 
 class GeneratedModel(Protocol):
-    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape (N, n); `require` checks the dynamics before use."""
+    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape
+    (N, n); `require` checks the dynamics before use.
+    """
 
     NAME: str
     JOINTS: tuple[int, ...]
@@ -50,36 +66,51 @@ class GeneratedModel(Protocol):
     def store(self, N: int) -> Array:
         """Workspace of shape (b, n, N) for `out`, structural zeros written."""
 
-    def regressor(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+    def regressor(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
         """D, shape (N, n, b), eq. (5)."""
 
-    def observation_matrix(self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float) -> Array:
+    def observation_matrix(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
         """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
 
 
-def load_model(model: str | Path | ModuleType, *, folder: str | Path | None = None) -> GeneratedModel:
-    """The emitted model of a name (generated/NAME.py), of a path to a .py file, or of an imported module, checked before use.
+def load_model(
+    model: str | Path | ModuleType, *, folder: str | Path | None = None, trust: bool = False
+) -> GeneratedModel:
+    """The emitted model of a name (generated/NAME.py), of a path to a .py file, or of an imported
+    module, checked before use.
 
     Parameters
     ----------
     model : str, Path or module
     folder : str or Path, optional
         Where names are looked up; default: ./generated.
+    trust : bool
+        Run a file that this installation has not emitted and certified, and the C and CasADi files
+        beside it: a module is code (`runtime.model.loading`).
 
     Raises
     ------
     ModelError
-        No such file, a file that no emitter writes, or no such model.
+        No such file, one that was not emitted here, or no such model.
     """
     if isinstance(model, ModuleType):
         return checked_model(model)
     path = file_of(model, "", folder)
     if not path.is_file():
-        present = sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__") if path.parent.is_dir() else []
-        raise ModelError(
-            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it with `symgen generate {path.stem}`"
+        present = (
+            sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__")
+            if path.parent.is_dir()
+            else []
         )
-    return checked_model(module_of(path))
+        raise ModelError(
+            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it "
+            f"with `symgen generate {path.stem}`"
+        )
+    return checked_model(module_of(path, trust=trust))
 
 
 def file_of(model: str | Path, ending: str, folder: str | Path | None) -> Path:
@@ -89,71 +120,57 @@ def file_of(model: str | Path, ending: str, folder: str | Path | None) -> Path:
     return Path(model)
 
 
-@dataclass(frozen=True)
-class ModelText:
-    """An emitted module as text: what another process or machine is sent, and checks like any file given by path.
-
-    Attributes
-    ----------
-    name : str
-        File name.
-    text : str
-        What the file holds.
-    digest : str
-        SHA-256 of the text.
+def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
+    """How modules are pickled: an emitted one as text, since the process that receives it trusts
+    the one
+    that sends it; any other by name. InputError for an emitted one without a file.
     """
-
-    name: str
-    text: str
-    digest: str
-
-    @classmethod
-    def of(cls, model: GeneratedModel) -> ModelText:
-        """The text of the file that the model was loaded from; InputError for a model without one."""
-        path = getattr(model, "__file__", None)
-        if not path:
-            raise InputError("this model was not loaded from a file, which other processes need; use workers=0")
-        text = Path(path).read_text(encoding="utf-8")
-        return cls(Path(path).name, text, sha256(text.encode("utf-8")).hexdigest())
-
-    def load(self) -> GeneratedModel:
-        """The model; ModelError where the text is not the one that was sent, or not an emitted one."""
-        with self.stored() as path:
-            return load_model(path)
-
-    @contextmanager
-    def stored(self) -> Iterator[Path]:
-        """A file of the text, while the context lasts; ModelError where the text is not the one that was sent."""
-        if sha256(self.text.encode("utf-8")).hexdigest() != self.digest:
-            raise ModelError(f"the text that arrived is not the one that was sent, SHA-256 {self.digest[:12]}", file=self.name)
-        with TemporaryDirectory(prefix="symgen-") as folder:
-            path = Path(folder) / self.name
-            path.write_text(self.text, encoding="utf-8")
-            yield path
+    if not hasattr(module, "SOURCE_SHA256"):
+        return import_module, (module.__name__,)
+    file = getattr(module, "__file__", None)
+    if not file:
+        raise InputError(
+            "this model was not loaded from a file, which other processes need; use workers=0"
+        )
+    return run, (Path(file).read_text(encoding="utf-8"), Path(file))
 
 
-def loaded(model: GeneratedModel | ModelText) -> GeneratedModel:
-    """The model of a text that another process sent; a model as it is."""
-    return model.load() if isinstance(model, ModelText) else model
+copyreg.pickle(ModuleType, _reduced)
 
 
 def checked_model(module: ModuleType) -> GeneratedModel:
-    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError otherwise."""
+    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError
+    otherwise.
+    """
     label = module.__name__
     missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
     if missing:
-        raise ModelError(f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label)
+        raise ModelError(
+            f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label
+        )
     model = cast(GeneratedModel, module)
     _check_names(model, label)
     require(model, *FUNCTIONS)
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
     if n == 0 or b == 0 or len(set(model.BASE_PARAMETERS)) != b:
         raise ModelError(
-            f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least one of each, names once", file=label
+            (
+                f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least "
+                "one "
+                "of "
+                "each, names once"
+            ),
+            file=label,
         )
     structure = np.asarray(model.STRUCTURE)
     if structure.shape != (b, n) or structure.dtype != np.bool_:
-        raise ModelError(f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base parameters by joints", file=label)
+        raise ModelError(
+            (
+                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base "
+                "parameters by joints"
+            ),
+            file=label,
+        )
     drives = drives_of(model)
     if drives is not None and drives.n != n:
         raise ModelError(f"DRIVES of {drives.n} joints; expected {n}", file=label)
@@ -165,7 +182,10 @@ def require(model: GeneratedModel, *functions: str) -> None:
     """Raise ModelError unless the model offers all the named functions."""
     missing = [name for name in functions if not callable(getattr(model, name, None))]
     if missing:
-        raise ModelError(f"no function {', '.join(missing)}; emit the model again with the target that has them", file=model.NAME)
+        raise ModelError(
+            f"no function {', '.join(missing)}; emit the model again with the target that has them",
+            file=model.NAME,
+        )
 
 
 def drives_of(model: GeneratedModel) -> Drives | None:
@@ -174,20 +194,32 @@ def drives_of(model: GeneratedModel) -> Drives | None:
 
 
 def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
-    """Geometry and gravity in the order of CONSTANTS, `constants` in place of the robot file's; InputError for names that the model does not have."""
+    """Geometry and gravity in the order of CONSTANTS, `constants` in place of the robot file's;
+    InputError for names that the model does not have.
+    """
     if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
-        raise InputError(f"{model.NAME} has no constant {', '.join(unknown)}; there are {', '.join(model.CONSTANTS) or 'none'}")
+        raise InputError(
+            f"{model.NAME} has no constant {', '.join(unknown)}; there are "
+            f"{', '.join(model.CONSTANTS) or 'none'}"
+        )
     return {**model.CONSTANTS, **constants}
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
-    """What results call the joints: the number of each, and its name where the robot file has one."""
+    """What results call the joints: the number of each, and its name where the robot file has
+    one.
+    """
     names = getattr(model, "LABELS", {})
-    return tuple(f"{j} {name}" if isinstance(name := names.get(j), str) else str(j) for j in model.JOINTS)
+    return tuple(
+        f"{j} {name}" if isinstance(name := names.get(j), str) else str(j) for j in model.JOINTS
+    )
 
 
-def elements_of(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> Mapping[str, Any]:
-    """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form by joint, of each parameter.
+def elements_of(
+    model: GeneratedModel, constants: Mapping[str, float] | None = None
+) -> Mapping[str, Any]:
+    """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form
+    by joint, of each parameter.
 
     Parameters
     ----------
@@ -202,40 +234,76 @@ def elements_of(model: GeneratedModel, constants: Mapping[str, float] | None = N
     """
     table = "elements" if constants else "ELEMENTS"
     if not hasattr(model, table):
-        raise ModelError(f"no {table}, which say what friction acts along; emit it again with this version of symgen", file=model.NAME)
+        raise ModelError(
+            (
+                f"no {table}, which say what friction acts along; emit it again with this version "
+                "of "
+                "symgen"
+            ),
+            file=model.NAME,
+        )
     emitted = cast(Any, model)
     return cast(Mapping[str, Any], emitted.elements(**constants) if constants else emitted.ELEMENTS)
 
 
-def base_columns(model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str) -> tuple[str, ...]:
-    """Columns of the setting at `path`: the `essential` ones, "all", or names; SettingsError for a name that is no base parameter."""
-    wanted = {"essential": essential, "all": model.BASE_PARAMETERS}[names] if isinstance(names, str) else names
+def base_columns(
+    model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str
+) -> tuple[str, ...]:
+    """Columns of the setting at `path`: the `essential` ones, "all", or names; SettingsError for a
+    name that is no base parameter.
+    """
+    wanted = (
+        {"essential": essential, "all": model.BASE_PARAMETERS}[names]
+        if isinstance(names, str)
+        else names
+    )
     if unknown := [name for name in wanted if name not in model.BASE_PARAMETERS]:
-        raise SettingsError(f"no parameter {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}", path=path)
+        raise SettingsError(
+            (
+                f"no parameter {', '.join(unknown)}; {model.NAME} has "
+                f"{', '.join(model.BASE_PARAMETERS)}"
+            ),
+            path=path,
+        )
     return tuple(wanted)
 
 
 def joint_units(model: GeneratedModel) -> tuple[str, ...]:
     """Unit of each joint position, "rad" or "m", in the order of JOINTS.
 
-    A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of one that slides; without such elements, where no
+    A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of
+    one that slides; without such elements, where no
     moment of inertia acts on it, since a force depends on masses and first moments alone.
     """
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
     for row, joint in enumerate(model.JOINTS):
         acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
-        own = {units.get(name, "") for name in acting if set(elements.get(name.removesuffix("R"), (0, 0, ()))[2]) == {joint}}
-        slides = bool(own & SLIDING) if own else not any(units.get(name) == "kg*m**2" for name in acting)
+        own = {
+            units.get(name, "")
+            for name in acting
+            if set(elements.get(name.removesuffix("R"), (0, 0, ()))[2]) == {joint}
+        }
+        slides = (
+            bool(own & SLIDING) if own else not any(units.get(name) == "kg*m**2" for name in acting)
+        )
         result.append("m" if slides else "rad")
     return tuple(result)
 
 
 def _check_names(model: GeneratedModel, label: str) -> None:
-    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and joints whole numbers."""
+    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and
+    joints whole numbers.
+    """
     names = (model.NAME, *model.BASE_PARAMETERS)
-    if wrong := [name for name in names if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))]:
-        raise ModelError(f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label)
+    if wrong := [
+        name
+        for name in names
+        if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))
+    ]:
+        raise ModelError(
+            f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label
+        )
     if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
         raise ModelError(f"JOINTS hold {strange[0]!r:.60}; expected numbers of joints", file=label)
 
@@ -247,23 +315,37 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
     try:
         shape = np.shape(model.store(N))
         with np.errstate(all="ignore"):
-            shapes = np.shape(model.regressor(rest, rest, rest)), np.shape(model.observation_matrix(rest, rest, rest))
+            shapes = (
+                np.shape(model.regressor(rest, rest, rest)),
+                np.shape(model.observation_matrix(rest, rest, rest)),
+            )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
-        raise ModelError(f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label) from e
+        raise ModelError(
+            f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label
+        ) from e
     if shape != (b, n, N):
         raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
     if shapes != ((N, n, b), (n * N, b)):
-        raise ModelError(f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and {(n * N, b)}", file=label)
+        raise ModelError(
+            (
+                f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and "
+                f"{(n * N, b)}"
+            ),
+            file=label,
+        )
 
 
 def check_states(model: GeneratedModel, q: Array, qd: Array, qdd: Array) -> None:
-    """Raise ValueError unless q, qd, qdd are real arrays of one shape (N, n), n the joints of the model."""
+    """Raise ValueError unless q, qd, qdd are real arrays of one shape (N, n), n the joints of the
+    model.
+    """
     n = len(model.JOINTS)
     for name, x in (("q", q), ("qd", qd), ("qdd", qdd)):
         x = np.asarray(x)
         if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != np.shape(q):
             raise InputError(
-                f"{model.NAME}: {name} has shape {x.shape}, q {np.shape(q)}; expected (N, {n}) or ({n},), the same for q, qd and qdd"
+                f"{model.NAME}: {name} has shape {x.shape}, q {np.shape(q)}; expected (N, {n}) or "
+                f"({n},), the same for q, qd and qdd"
             )
         if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
             raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")

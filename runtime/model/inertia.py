@@ -1,17 +1,24 @@
-"""Conditions on the standard parameters of a physical robot: every link has a mass density, actuators have inertia, friction takes power.
+"""Conditions on the standard parameters of a physical robot: every link has a mass density,
+actuators have inertia, friction takes power.
 
-Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor about the origin of its frame (the elements XX .. ZZ
+Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
+about the origin of its frame (the elements XX .. ZZ
 as they are) and l = (MX, MY, MZ), the pseudo-inertia
 
     P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
 
-is the matrix of second moments of the density in homogeneous coordinates: a density exists if and only if P_j is positive semidefinite, which holds
-the triangle inequalities of the moments of inertia. Every element along s = G q (inertia, viscous, Coulomb) asks for c >= 0. Elements given as forms
-q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive semidefinite (the inertia of a coupled wrist,
-the power its viscous friction takes). Friction of one direction of motion counts in that direction and leaves forms alone. Offsets and springs
+is the matrix of second moments of the density in homogeneous coordinates: a density exists if and
+only if P_j is positive semidefinite, which holds
+the triangle inequalities of the moments of inertia. Every element along s = G q (inertia, viscous,
+Coulomb) asks for c >= 0. Elements given as forms
+q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive
+semidefinite (the inertia of a coupled wrist,
+the power its viscous friction takes). Friction of one direction of motion counts in that direction
+and leaves forms alone. Offsets and springs
 have no sign.
 
-References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for identification under such constraints.
+References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for
+identification under such constraints.
 """
 
 from __future__ import annotations
@@ -84,9 +91,13 @@ class PhysicalModel:
     values: Mapping[str, float]
 
     def link(self, j: int) -> list[int]:
-        """Where the ten parameters of link j stand among the standard ones, in the order of INERTIAL."""
+        """Where the ten parameters of link j stand among the standard ones, in the order of
+        INERTIAL.
+        """
         if j not in self.links:
-            raise InputError(f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}")
+            raise InputError(
+                f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}"
+            )
         return [self.standard.index(f"{family}{j}") for family in INERTIAL]
 
     def named(self, chi: Array) -> dict[str, float]:
@@ -94,7 +105,9 @@ class PhysicalModel:
         return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
 
     def smallest(self, chi: Array) -> dict[str, float]:
-        """The smallest eigenvalue of every condition, by its name: not negative for a physical robot."""
+        """The smallest eigenvalue of every condition, by its name: not negative for a physical
+        robot.
+        """
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
     def rows(self, names: Sequence[str]) -> Array:
@@ -102,7 +115,9 @@ class PhysicalModel:
         return self.K[[self.base.index(name) for name in names]]
 
 
-def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None = None) -> PhysicalModel:
+def physical_model(
+    model: GeneratedModel, constants: Mapping[str, float] | None = None
+) -> PhysicalModel:
     """Standard parameters of an emitted model and the conditions on them.
 
     Parameters
@@ -119,21 +134,31 @@ def physical_model(model: GeneratedModel, constants: Mapping[str, float] | None 
     require(model, "base_parameters")
     elements = elements_of(model, constants)
     if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
-        raise ModelError(f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME)
+        raise ModelError(
+            f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME
+        )
     emitted = cast(Any, model)
     standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
     return PhysicalModel(
         standard=standard,
         base=tuple(model.BASE_PARAMETERS),
-        K=np.asarray(emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float),
+        K=np.asarray(
+            emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float
+        ),
         links=tuple(emitted.LINKS),
-        conditions=(*_links(emitted.LINKS, standard), *_forms(elements, standard), *_signs(elements, standard)),
+        conditions=(
+            *_links(emitted.LINKS, standard),
+            *_forms(elements, standard),
+            *_signs(elements, standard),
+        ),
         values=dict(model.VALUES),
     )
 
 
 def pseudo_inertia(ten: Array) -> Array:
-    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin of its frame."""
+    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin
+    of its frame.
+    """
     XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
     J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
     l = np.array([[MX, MY, MZ]])
@@ -143,14 +168,22 @@ def pseudo_inertia(ten: Array) -> Array:
 def _links(links: Sequence[int], standard: Sequence[str]) -> Iterator[Condition]:
     B = np.array([pseudo_inertia(ten) for ten in np.eye(10)])
     for j in links:
-        yield Condition(f"link {j}", tuple(standard.index(f"{family}{j}") for family in INERTIAL), B)
+        yield Condition(
+            f"link {j}", tuple(standard.index(f"{family}{j}") for family in INERTIAL), B
+        )
 
 
 def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
     """One condition per kind and per group of joints that forms of that kind couple."""
     for kind in FORMED:
-        own = {name: _form(acts) for name, (k, when, acts) in elements.items() if k == kind and when == "both"}
-        for joints in _coupled([{i for pair in own[name] for i in pair} for name in own if is_form(elements[name][2])]):
+        own = {
+            name: _form(acts)
+            for name, (k, when, acts) in elements.items()
+            if k == kind and when == "both"
+        }
+        for joints in _coupled(
+            [{i for pair in own[name] for i in pair} for name in own if is_form(elements[name][2])]
+        ):
             place = {j: k for k, j in enumerate(sorted(joints))}
             members = [name for name in own if {i for pair in own[name] for i in pair} <= joints]
             B = np.zeros((len(members), len(place), len(place)))
@@ -158,11 +191,15 @@ def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
                 for (i, m), b in own[name].items():
                     B[k, place[i], place[m]] = B[k, place[m], place[i]] = b
             names = ", ".join(map(str, sorted(joints)))
-            yield Condition(f"{kind} of joints {names}", tuple(standard.index(name) for name in members), B)
+            yield Condition(
+                f"{kind} of joints {names}", tuple(standard.index(name) for name in members), B
+            )
 
 
 def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
-    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in either direction."""
+    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in
+    either direction.
+    """
     along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
     for name, (kind, when, acts) in elements.items():
         if kind in SIGNED and not is_form(acts):
@@ -171,11 +208,17 @@ def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
         both, sided = own.get("both", []), [own.get(when, []) for when in ("positive", "negative")]
         for names in [[*both, *one] for one in sided] if any(sided) else [[name] for name in both]:
             if names:
-                yield Condition(" + ".join(names), tuple(standard.index(name) for name in names), np.ones((len(names), 1, 1)))
+                yield Condition(
+                    " + ".join(names),
+                    tuple(standard.index(name) for name in names),
+                    np.ones((len(names), 1, 1)),
+                )
 
 
 def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of ELEMENTS is given as a form q'Bq (its keys are pairs of joints), not along s = G q."""
+    """Whether an element of ELEMENTS is given as a form q'Bq (its keys are pairs of joints), not
+    along s = G q.
+    """
     return any(isinstance(key, tuple) for key in acts)
 
 

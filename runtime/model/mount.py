@@ -1,6 +1,8 @@
-"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame it is mounted on and in that of the link.
+"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame
+it is mounted on and in that of the link.
 
-With P the pseudo-inertia of a body (`runtime.model.inertia`), about and along the axes of frame f, and lTf the pose of f in the frame of its link l,
+With P the pseudo-inertia of a body (`runtime.model.inertia`), about and along the axes of frame f,
+and lTf the pose of f in the frame of its link l,
 
     P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
     X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
@@ -10,17 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, require
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
 
 Array = np.ndarray
-
-RIGID = 1e-9  # largest change of a pose, against the size of the robot, of two frames on one body
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +45,20 @@ class Mount:
     @property
     def place(self) -> str:
         """In words."""
-        return f"link {self.link}" if self.frame == self.link else f"frame {self.frame} of link {self.link}"
+        return (
+            f"link {self.link}"
+            if self.frame == self.link
+            else f"frame {self.frame} of link {self.link}"
+        )
 
     @property
     def action(self) -> Array:
-        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the order of INERTIAL."""
-        return np.column_stack([ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)])
+        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the
+        order of INERTIAL.
+        """
+        return np.column_stack(
+            [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
+        )
 
     def columns(self, physical: PhysicalModel) -> Array:
         """dX/dchi of the load at `frame`, shape (b, 10)."""
@@ -57,10 +66,17 @@ class Mount:
         if self.frame == self.link:
             return own
         moved = own @ self.action
-        return np.where(np.abs(moved) > RIGID * np.abs(moved).max(axis=1, keepdims=True), moved, 0.0)
+        return np.where(
+            np.abs(moved) > LIMIT.RIGID_POSE * np.abs(moved).max(axis=1, keepdims=True), moved, 0.0
+        )
 
 
-def mount(model: GeneratedModel, frame: int | None = None, link: int | None = None, constants: Mapping[str, float] | None = None) -> Mount:
+def mount(
+    model: GeneratedModel,
+    frame: int | None = None,
+    link: int | None = None,
+    constants: Mapping[str, float] | None = None,
+) -> Mount:
     """The link that carries a frame, and the pose of the frame in it.
 
     Parameters
@@ -87,24 +103,38 @@ def mount(model: GeneratedModel, frame: int | None = None, link: int | None = No
         return Mount(link, link, np.eye(4))
     require(model, "frame_poses")
     rng = np.random.default_rng(0)
-    T: Array = model.frame_poses(rng.uniform(-1.0, 1.0, (8, len(model.JOINTS))), **(constants or {}))  # type: ignore[attr-defined]
+    q = rng.uniform(-1.0, 1.0, (8, len(model.JOINTS)))
+    T: Array = cast(Any, model).frame_poses(q, **(constants or {}))
     if not 1 <= frame <= T.shape[1]:
         raise InputError(f"no frame {frame}; {model.NAME} has frames 1 to {T.shape[1]}")
     poses = {j: np.linalg.solve(T[:, j - 1], T[:, frame - 1]) for j in links}
     size = max(1.0, float(np.abs(T).max()))
-    carrying = [j for j, pose in poses.items() if np.ptp(pose, axis=0).max() < RIGID * size]
+    carrying = [
+        j for j, pose in poses.items() if np.ptp(pose, axis=0).max() < LIMIT.RIGID_POSE * size
+    ]
     if link is not None and link not in carrying:
-        raise InputError(f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}")
+        raise InputError(
+            f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}"
+        )
     if not carrying:
-        raise InputError(f"frame {frame} is fixed to no link with inertia; links are {', '.join(map(str, links))}")
+        raise InputError(
+            f"frame {frame} is fixed to no link with inertia; links are "
+            f"{', '.join(map(str, links))}"
+        )
     link = link or (frame if frame in carrying else carrying[-1])
     return Mount(link, frame, np.eye(4) if link == frame else poses[link].mean(axis=0))
 
 
 def load_effect(
-    model: GeneratedModel, load: Mapping[str, float], *, frame: int | None = None, link: int | None = None, **constants: float
+    model: GeneratedModel,
+    load: Mapping[str, float],
+    *,
+    frame: int | None = None,
+    link: int | None = None,
+    **constants: float,
 ) -> Array:
-    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X + load_effect(...) is the robot with it.
+    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X
+    + load_effect(...) is the robot with it.
 
     Parameters
     ----------
@@ -118,18 +148,27 @@ def load_effect(
     **constants : float
         Values in place of the robot file's.
     """
-    return np.asarray(mount(model, frame, link, constants).columns(physical_model(model, constants)) @ load_vector(load))
+    return np.asarray(
+        mount(model, frame, link, constants).columns(physical_model(model, constants))
+        @ load_vector(load)
+    )
 
 
 def load_vector(load: Mapping[str, float]) -> Array:
     """The ten parameters in the order of INERTIAL; InputError for another name."""
     if unknown := [name for name in load if name not in INERTIAL]:
-        raise InputError(f"unknown parameter {', '.join(unknown)} of a load; expected some of {', '.join(INERTIAL)}")
+        raise InputError(
+            f"unknown parameter {', '.join(unknown)} of a load; expected some of "
+            f"{', '.join(INERTIAL)}"
+        )
     return np.array([float(load.get(name, 0.0)) for name in INERTIAL])
 
 
-def load_of_body(mass: float, centre: Any, inertia: Any = None, rotation: Any = None) -> dict[str, float]:
-    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it is mounted on.
+def load_of_body(
+    mass: float, centre: Any, inertia: Any = None, rotation: Any = None
+) -> dict[str, float]:
+    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it
+    is mounted on.
 
     Parameters
     ----------
@@ -137,14 +176,21 @@ def load_of_body(mass: float, centre: Any, inertia: Any = None, rotation: Any = 
     centre : array_like, shape (3,), m
         Of mass, in that frame.
     inertia : array_like, shape (3, 3), kg m^2, optional
-        Tensor about the centre of mass (products as tensor elements, Ixy = -integral x y dm); default: a point.
+        Tensor about the centre of mass (products as tensor elements, Ixy = -integral x y dm);
+        default: a point.
     rotation : array_like, shape (3, 3), optional
         Orientation of the axes of `inertia` in that frame; default: the same axes.
     """
-    c, I = np.asarray(centre, dtype=float), np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float)
+    c, I = (
+        np.asarray(centre, dtype=float),
+        np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float),
+    )
     R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
     if c.shape != (3,) or I.shape != (3, 3) or R.shape != (3, 3) or not np.allclose(I, I.T):
-        raise InputError(f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected (3,), a symmetric (3, 3), (3, 3)")
+        raise InputError(
+            f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected (3,), a symmetric "
+            "(3, 3), (3, 3)"
+        )
     if not mass > 0:
         raise InputError(f"mass {mass} kg; expected a positive one")
     J = R @ I @ R.T + mass * (c @ c * np.eye(3) - np.outer(c, c))
@@ -152,7 +198,9 @@ def load_of_body(mass: float, centre: Any, inertia: Any = None, rotation: Any = 
 
 
 def ten_parameters(P: Array) -> Array:
-    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its matrix S of second moments."""
+    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its
+    matrix S of second moments.
+    """
     S = P[:3, :3]
     J = np.trace(S) * np.eye(3) - S
     return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])

@@ -1,6 +1,8 @@
-"""The clock of a record: stamps that increase, uniform within the jitter allowed, at the rate that is stated.
+"""The clock of a record: stamps that increase, uniform within the jitter allowed, at the rate that
+is stated.
 
-Stamps are read by blocks, twice: for their order and mean rate, then against the uniform grid of that rate.
+Stamps are read by blocks, twice: for their order and mean rate, then against the uniform grid of
+that rate.
 """
 
 from __future__ import annotations
@@ -17,8 +19,12 @@ from runtime.records.time_stamps import time_stamps
 Array = np.ndarray
 
 JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where nothing is said
-HINT = "; where the clock alone is at fault, state record.rate without columns.t, or raise record.jitter (below 0.5)"
-RATE_TOLERANCE = 1e-3  # between a stated rate and that of the stamps, beyond what the jitter of the two ends makes
+HINT = (
+    "; where the clock alone is at fault, state record.rate without columns.t, or raise "
+    "record.jitter (below 0.5)"
+)
+# between a stated rate and that of the stamps, beyond what the jitter of the two ends makes
+RATE_TOLERANCE = 1e-3
 
 
 def sample(i: int) -> str:
@@ -52,7 +58,9 @@ class Stamps:
 
     def error(self, message: str, i: int | None = None) -> InputError:
         """The error of sample i, or of all."""
-        return InputError(message, file=self.file, column=self.column, row=None if i is None else self.row(i))
+        return InputError(
+            message, file=self.file, column=self.column, row=None if i is None else self.row(i)
+        )
 
 
 def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
@@ -66,7 +74,8 @@ def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
     Raises
     ------
     InputError
-        Time that goes back or stands, another rate than the stated one, or stamps off the uniform grid.
+        Time that goes back or stands, another rate than the stated one, or stamps off the uniform
+        grid.
     """
     first = last = np.nan
     N = 0
@@ -75,20 +84,31 @@ def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
             i = int(np.argmax(step <= 0))
             after = i + len(t) - len(step)
             raise stamps.error(
-                f"time goes from {instant(t[after] - step[i])} s to {instant(t[after])} s; expected increasing time", N + after
+                (
+                    f"time goes from {instant(t[after] - step[i])} s to {instant(t[after])} s; "
+                    "expected increasing time"
+                ),
+                N + after,
             )
         first, last, N = (float(t[0]) if N == 0 else first), float(t[-1]), N + len(t)
     if N < 2:
         raise InputError(f"{N} samples; a record needs more", file=stamps.file)
     rate = (N - 1) / (last - first)
-    if stamps.rate is not None and abs(rate / stamps.rate - 1) > RATE_TOLERANCE + 2 * stamps.jitter / (N - 1):
-        raise stamps.error(f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the unit of time")
+    if stamps.rate is not None and abs(
+        rate / stamps.rate - 1
+    ) > RATE_TOLERANCE + 2 * stamps.jitter / (N - 1):
+        raise stamps.error(
+            f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the "
+            "unit of time"
+        )
     _require_uniform(stamps, blocks(), first, rate)
     return stamps.rate or rate
 
 
 def rate_of(stamps: Stamps, t: Array) -> float:
-    """Sampling rate, Hz, of the stamps t, shape (N,), s, as `clock`; the error lists every irregularity and the setting that cures them."""
+    """Sampling rate, Hz, of the stamps t, shape (N,), s, as `clock`; the error lists every
+    irregularity and the setting that cures them.
+    """
     try:
         return clock(stamps, lambda: [t])
     except InputError as e:
@@ -101,17 +121,24 @@ def rate_of(stamps: Stamps, t: Array) -> float:
             else f". {remedies(t, regularity, arrays=stamps.column is None)}"
         )
         raise InputError(
-            f"{e.message.removesuffix(HINT)}. In all: {regularity.to_text(stamps.row)}{cure}", file=e.file, column=e.column, row=e.row
+            f"{e.message.removesuffix(HINT)}. In all: {regularity.to_text(stamps.row)}{cure}",
+            file=e.file,
+            column=e.column,
+            row=e.row,
         ) from None
 
 
 def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate: float) -> None:
-    """Raise InputError where stamps leave the uniform grid by more than the jitter, at the step that differs most."""
+    """Raise InputError where stamps leave the uniform grid by more than the jitter, at the step
+    that differs most.
+    """
     deviation = worst = 0.0
     N = place = 0
     length = np.nan
     for t, step in _steps(blocks):
-        deviation = max(deviation, float(np.max(np.abs(t - first - np.arange(N, N + len(t)) / rate) * rate)))
+        deviation = max(
+            deviation, float(np.max(np.abs(t - first - np.arange(N, N + len(t)) / rate) * rate))
+        )
         off = np.abs(step * rate - 1)
         if len(off) and off.max() > worst:
             i = int(np.argmax(off))
@@ -119,7 +146,11 @@ def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate
         N += len(t)
     if deviation > stamps.jitter:
         raise stamps.error(
-            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step {length:g} s here, {1 / rate:g} s on average{HINT}",
+            (
+                f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, "
+                "step "
+                f"{length:g} s here, {1 / rate:g} s on average{HINT}"
+            ),
             place,
         )
 

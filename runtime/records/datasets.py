@@ -1,10 +1,13 @@
-"""Measured records that are public: where they are, what they hash to, and the settings that go with them.
+"""Measured records that are public: where they are, what they hash to, and the settings that go
+with them.
 
     fetch("tx40", "pos_read_data.csv")       path of the file
     dataset_study("tx40")                    settings as read from a study file
 
-A file is looked for in the folder SYMGEN_DATA as <name>/<file> or <name>/<file>.gz (never written to), then in the user's cache, then at its
-source. Hashes are of the uncompressed bytes. The records belong to their authors and are not part of this package.
+A file is looked for in the folder SYMGEN_DATA as <name>/<file> or <name>/<file>.gz (never written
+to), then in the user's cache, then at its
+source. Hashes are of the uncompressed bytes. The records belong to their authors and are not part
+of this package.
 """
 
 from __future__ import annotations
@@ -24,7 +27,9 @@ TIMEOUT = 10.0  # s, for a connection and between two packets
 
 @dataclass(frozen=True)
 class Dataset:
-    """A public record. url : folder of the files.   files : SHA-256 of the uncompressed bytes, by name.   study : its settings."""
+    """A public record. url : folder of the files.   files : SHA-256 of the uncompressed bytes, by
+    name.   study : its settings.
+    """
 
     title: str
     source: str
@@ -47,7 +52,10 @@ TX40 = Dataset(
         "record": {
             "dataset": "tx40",
             "files": ["pos_read_data.csv", "curr_data.csv"],
-            "columns": {"q": [f"Joint_{j}" for j in range(1, 7)], "tau": [f"Joint_{j}" for j in range(1, 7)]},
+            "columns": {
+                "q": [f"Joint_{j}" for j in range(1, 7)],
+                "tau": [f"Joint_{j}" for j in range(1, 7)],
+            },
             "side": "motor",
             "rate": 5000,
             "units": {"q": "rad", "tau": "N*m"},
@@ -57,7 +65,11 @@ TX40 = Dataset(
             "lowpass": {"cutoff": 50, "order": 4, "on": ["q", "qd"]},
             "decimate": {"factor": "auto", "phase": "first"},
         },
-        "rows": {"window": [0, 7.5], "trim": 3, "low_speed": 0},  # afterwards at rest: sign(qd) chatters and the torque creeps
+        "rows": {
+            "window": [0, 7.5],
+            "trim": 3,
+            "low_speed": 0,
+        },  # afterwards at rest: sign(qd) chatters and the torque creeps
         "validate": {"split": [[0, 3.7], [3.7, 7.5]]},
     },
 )
@@ -74,7 +86,10 @@ _EMPS_RECORD: dict[str, Any] = {
 }
 
 EMPS = Dataset(
-    title="EMPS, electro-mechanical positioning system, one prismatic axis, 2 x 24.8 s at 1 kHz (Janot, Gautier and Brunot, 2019)",
+    title=(
+        "EMPS, electro-mechanical positioning system, one prismatic axis, 2 x 24.8 s at 1 kHz "
+        "(Janot, Gautier and Brunot, 2019)"
+    ),
     source="github.com/forgi86/sysid-neural-continuous, examples/EMPS/data",
     licence="Apache-2.0 (repository); none stated in the data description",
     url="https://raw.githubusercontent.com/forgi86/sysid-neural-continuous/956aa7ecd73061b0321c6f6098d74c9e4a7ce67a/examples/EMPS/data/",
@@ -89,8 +104,14 @@ EMPS = Dataset(
             "lowpass": {"cutoff": 100, "order": 4, "on": ["q"], "padding": "matlab"},
             "decimate": {"factor": 10, "phase": "last", "padding": "matlab"},
         },
-        "rows": {"window": [0.0485, None], "trim": 0, "low_speed": 0},  # without the first 49 samples
-        "validate": {"record": [{**_EMPS_RECORD, "files": ["DATA_EMPS_PULSES.mat"], "name": "emps_pulses"}]},
+        "rows": {
+            "window": [0.0485, None],
+            "trim": 0,
+            "low_speed": 0,
+        },  # without the first 49 samples
+        "validate": {
+            "record": [{**_EMPS_RECORD, "files": ["DATA_EMPS_PULSES.mat"], "name": "emps_pulses"}]
+        },
         "cestac": {"delta": [1e-6, 2e-5, 5e-5, 1e-4]},  # m
         "controller": {  # the authors' Simulink diagram
             "law": {"kind": "cascade", "kp": 160.18, "kv": 243.45, "gain": 35.15065188248547},
@@ -106,15 +127,30 @@ DATASETS: Mapping[str, Dataset] = {"tx40": TX40, "emps": EMPS}
 
 
 def listing() -> list[dict[str, Any]]:
-    """Every dataset as JSON values: name, title, source, licence and files, each with its address, hash and path, null where it is not here."""
+    """Every dataset as JSON values: name, title, source, licence and files, each with its address,
+    hash and path, null where it is not here.
+    """
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():
         paths = {file: locate(name, file) for file in dataset.files}
         files = [
-            {"name": file, "url": dataset.url + file, "sha256": digest, "path": None if paths[file] is None else str(paths[file])}
+            {
+                "name": file,
+                "url": dataset.url + file,
+                "sha256": digest,
+                "path": None if paths[file] is None else str(paths[file]),
+            }
             for file, digest in dataset.files.items()
         ]
-        rows.append({"name": name, "title": dataset.title, "source": dataset.source, "licence": dataset.licence, "files": files})
+        rows.append(
+            {
+                "name": name,
+                "title": dataset.title,
+                "source": dataset.source,
+                "licence": dataset.licence,
+                "files": files,
+            }
+        )
     return rows
 
 
@@ -130,7 +166,9 @@ def locate(name: str, file: str, *, cache: Path | None = None) -> Path | None:
 
 
 def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
-    """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source; raises DataUnavailableError where none answers."""
+    """Path of a file of a dataset: from SYMGEN_DATA, the cache, or its source; raises
+    DataUnavailableError where none answers.
+    """
     path, tried = _local(name, file, cache)
     if path is not None:
         return path
@@ -139,7 +177,10 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
     dataset = _dataset(name)
     folder = _cache(cache) / name
     source = pooch.create(
-        path=folder, base_url=dataset.url, registry={k: f"sha256:{v}" for k, v in dataset.files.items()}, retry_if_failed=0
+        path=folder,
+        base_url=dataset.url,
+        registry={k: f"sha256:{v}" for k, v in dataset.files.items()},
+        retry_if_failed=0,
     )
     try:
         return Path(source.fetch(file, downloader=pooch.HTTPDownloader(timeout=TIMEOUT)))
@@ -147,7 +188,10 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
         tried.append(f"download of {dataset.url}{file}: {_short(e)}")
     lines = "\n".join(f"  - {line}" for line in tried)
     raise DataUnavailableError(
-        f"{name}/{file} was found nowhere:\n{lines}\nPut it at <folder>/{name}/{file} (or {file}.gz) and set the environment variable SYMGEN_DATA to <folder>.",
+        (
+            f"{name}/{file} was found nowhere:\n{lines}\nPut it at <folder>/{name}/{file} (or "
+            f"{file}.gz) and set the environment variable SYMGEN_DATA to <folder>."
+        ),
         tried=tuple(tried),
     )
 
@@ -163,7 +207,12 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
                 found = sha256(read_bytes(path))
                 if found != expected:
                     raise InputError(
-                        f"SHA-256 {found}; expected {expected}, that of the public record: replace or remove the file", file=str(path)
+                        (
+                            f"SHA-256 {found}; expected {expected}, that of the public record: "
+                            "replace "
+                            "or remove the file"
+                        ),
+                        file=str(path),
                     )
                 return path, tried
         tried.append(f"SYMGEN_DATA={data}: no {name}/{file}, no {name}/{file}.gz")

@@ -1,6 +1,8 @@
-"""From the columns of a file to positions and torques of the joint side, SI: names, finite numbers, scale, units, then the drives.
+"""From the columns of a file to positions and torques of the joint side, SI: names, finite numbers,
+scale, units, then the drives.
 
-Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1
+... qn, tau1 ... taun needs no column names.
 """
 
 from __future__ import annotations
@@ -21,12 +23,23 @@ from runtime.settings.units import COMMANDS, position_unit, torque_unit
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """Factors of the n columns of positions (to rad or m) and of commands, and the drives behind which each was measured; None: joint side."""
+    """From the columns of a record to the joint side, SI.
+
+    Attributes
+    ----------
+    positions, commands : ndarray, shape (n,)
+        Factors of the columns of positions (to rad or m) and of commands.
+    of_positions, of_torques : Drives or None
+        Drives behind which each was measured; None: joint side.
+    drives : Drives or None
+        Those of the robot, coupled as the record says.
+    """
 
     positions: Array
     commands: Array
     of_positions: Drives | None
     of_torques: Drives | None
+    drives: Drives | None
 
     def position(self, q: Array) -> Array:
         """Joint positions, rad or m; q, shape (N, n), as in the file."""
@@ -35,7 +48,9 @@ class Conversion:
 
     @property
     def follows(self) -> Array | None:
-        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are joints."""
+        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are
+        joints.
+        """
         if self.of_positions is None:
             return None
         root = np.linalg.inv(self.of_positions.motion)
@@ -47,46 +62,97 @@ class Conversion:
         return tau if self.of_torques is None else self.of_torques.joint_torque(tau)
 
 
-def conversion(settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int) -> Conversion:
-    """How the columns of a record become joint side, SI; first, last : tables of the positions and of the torques."""
+def conversion(
+    settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int
+) -> Conversion:
+    """How the columns of a record become joint side, SI; first, last : tables of the positions and
+    of the torques.
+    """
     positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
-    scale, constant = _scale(settings.scale.tau, last, n, "scale.tau"), _torque_constant(settings, drives, n)
+    scale, constant = (
+        _scale(settings.scale.tau, last, n, "scale.tau"),
+        _torque_constant(settings, drives, n),
+    )
     if "motor" not in settings.sides:
-        return Conversion(positions, scale * constant, None, None)
+        return Conversion(positions, scale * constant, None, None, drives)
     if drives is None:
         raise InputError(
-            "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side", file=first.file
+            (
+                "side is motor but the robot has no drives; give them in the robot file, or a "
+                "record "
+                "of the joint side"
+            ),
+            file=first.file,
         )
     used = replace(drives, torque_constant=constant, coupling=settings.coupling)
     of_positions, of_torques = (used if side == "motor" else None for side in settings.sides)
-    return Conversion(positions, scale * constant if of_torques is None else scale, of_positions, of_torques)
+    commands = scale * constant if of_torques is None else scale
+    coupled = drives.decoupled(settings.coupling)
+    return Conversion(positions, commands, of_positions, of_torques, coupled)
 
 
-def column_names(settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()) -> Columns:
-    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages.
+def column_names(
+    settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()
+) -> Columns:
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag:
+    the joints of its messages.
 
-    joints : names of the joints of the robot, in its order: what `names` means in the settings, and what of a bag is read where they are left out.
+    joints : names of the joints of the robot, in its order: what `names` means in the settings, and
+    what of a bag is read where they are left out.
     """
     given = settings.columns
-    t = given.t if given.t is not None or settings.rate is not None or "t" not in first.names else "t"
-    qr = _meant(first, "qr", "", given.qr, joints) if given.qr else _numbered("qr", first) if "qr1" in first.names else ()
+    t = (
+        given.t
+        if given.t is not None or settings.rate is not None or "t" not in first.names
+        else "t"
+    )
+    qr = (
+        _meant(first, "qr", "", given.qr, joints)
+        if given.qr
+        else _numbered("qr", first)
+        if "qr1" in first.names
+        else ()
+    )
     if first.joints is not None and settings.units.t != "s":
-        raise InputError(f"record.units.t is {settings.units.t}; time stamps of bags are read in s", file=first.file)
+        raise InputError(
+            f"record.units.t is {settings.units.t}; time stamps of bags are read in s",
+            file=first.file,
+        )
     of_q = _meant(first, "q", "position", given.q, joints)
-    of_tau = _meant(last, "tau", "effort", given.tau or (given.q if last.joints is not None or given.q == BY_NAME else ()), joints)
+    of_tau = _meant(
+        last,
+        "tau",
+        "effort",
+        given.tau or (given.q if last.joints is not None or given.q == BY_NAME else ()),
+        joints,
+    )
     if given.q == BY_NAME and first is last and set(of_q) & set(of_tau):
         raise InputError(
-            f"columns {', '.join(of_q)} would be positions and torques; name those of the torques, record.columns.tau", file=first.file
+            (
+                f"columns {', '.join(of_q)} would be positions and torques; name those of the "
+                "torques, "
+                "record.columns.tau"
+            ),
+            file=first.file,
         )
     if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
-        raise InputError(f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques")
+        raise InputError(
+            f"{first.file} holds the torques and {last.file} the positions; `files` are the "
+            "positions, then the torques"
+        )
     return Columns(t, of_q, of_tau, qr, given.tau_ff, given.tau_known)
 
 
-def _meant(table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]) -> tuple[str, ...]:
+def _meant(
+    table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
+) -> tuple[str, ...]:
     if names == BY_NAME and not joints:
         raise InputError(
-            f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; add labels to the robot file",
+            (
+                f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; "
+                "add "
+                "labels to the robot file"
+            ),
             file=table.file,
         )
     if table.joints is not None and quantity:
@@ -97,40 +163,68 @@ def _meant(table: Table, key: str, quantity: str, names: Sequence[str], joints: 
     return tuple(names) or _numbered(key, table)
 
 
-def require_alike(names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]) -> None:
+def require_alike(
+    names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
+) -> None:
     """Raise InputError where positions and torques, of these shapes, are not of one record."""
-    if first is not last and not set(names.q) & set(names.tau) and {*names.tau} <= {*first.names} and {*names.q} <= {*last.names}:
+    if (
+        first is not last
+        and not set(names.q) & set(names.tau)
+        and {*names.tau} <= {*first.names}
+        and {*names.q} <= {*last.names}
+    ):
         raise InputError(
-            f"{first.file} and {last.file} hold positions and torques each; two `files` are the positions and the torques of one record, "
+            f"{first.file} and {last.file} hold positions and torques each; two `files` are the "
+            "positions and the torques of one record, "
             f"further records are named by `also: [{last.file}]`"
         )
     if q[1:] != tau[1:]:
         raise InputError(
-            f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques ({', '.join(names.tau)}); expected one of each per joint",
+            (
+                f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques "
+                f"({', '.join(names.tau)}); expected one of each per joint"
+            ),
             file=first.file,
         )
     if q != tau:
-        raise InputError(f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut them to the same instants")
+        raise InputError(
+            f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut "
+            "them to the same instants"
+        )
 
 
 def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
-    found = sorted((int(m[1]), name) for name in table.names if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name)))
+    found = sorted(
+        (int(m[1]), name)
+        for name in table.names
+        if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name))
+    )
     if not found:
         raise InputError(
-            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in a study file, record.columns.{quantity}",
+            (
+                f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name "
+                "them "
+                "in "
+                f"a study file, record.columns.{quantity}"
+            ),
             file=table.file,
         )
     return tuple(name for _, name in found)
 
 
-def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0, hint: str = "") -> Array:
-    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity among them; hint : what else may be done about nan."""
+def require_finite(
+    x: Array, names: Sequence[str], table: Table, first: int = 0, hint: str = ""
+) -> Array:
+    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity
+    among them; hint : what else may be done about nan.
+    """
     if not np.isfinite(x).all():
         bad = np.argwhere(~np.isfinite(x))
         i, j = bad[0]
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut the record"
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut "
+            "the record"
             f"{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=table.file,
             column=column,
@@ -139,11 +233,14 @@ def require_finite(x: Array, names: Sequence[str], table: Table, first: int = 0,
     return x
 
 
-def _per_joint(value: float | Sequence[float], n: int, key: str, table: Table | None = None) -> Array:
+def _per_joint(
+    value: float | Sequence[float], n: int, key: str, table: Table | None = None
+) -> Array:
     x = np.atleast_1d(np.asarray(value, dtype=float))
     if len(x) not in (1, n):
         raise InputError(
-            f"record.{key} has {len(x)} values; expected one or {n}, one per joint", file=None if table is None else table.file
+            f"record.{key} has {len(x)} values; expected one or {n}, one per joint",
+            file=None if table is None else table.file,
         )
     return np.broadcast_to(x, (n,))
 
@@ -162,12 +259,23 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 def _position_units(settings: RecordSettings, n: int) -> Array:
     """Factors to rad or m, shape (n,)."""
     units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
-    counts = _per_joint(1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution, n, "counts_per_revolution")
-    return np.array([factor / (counts[j] if kind == "counts" else 1.0) for j, (kind, factor) in enumerate(units)])
+    counts = _per_joint(
+        1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution,
+        n,
+        "counts_per_revolution",
+    )
+    return np.array(
+        [
+            factor / (counts[j] if kind == "counts" else 1.0)
+            for j, (kind, factor) in enumerate(units)
+        ]
+    )
 
 
 def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) -> Array:
-    """Factors from the unit of tau to N m or N, shape (n,): that of the unit, times a torque constant for current and voltage."""
+    """Factors from the unit of tau to N m or N, shape (n,): that of the unit, times a torque
+    constant for current and voltage.
+    """
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
     if not any(kind in COMMANDS for kind, _ in units):
@@ -178,7 +286,14 @@ def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) ->
         constant = drives.torque_constant
     else:
         raise InputError(
-            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, "
-            "then gears and torque constants are those of the robot's drives; else set record.torque_constant (N*m/A) with the gears in it"
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for "
+            "currents of the motors set record.torque_side: motor, "
+            "then gears and torque constants are those of the robot's drives; else set "
+            "record.torque_constant (N*m/A) with the gears in it"
         )
-    return np.array([constant[j] * factor if kind in COMMANDS else factor for j, (kind, factor) in enumerate(units)])
+    return np.array(
+        [
+            constant[j] * factor if kind in COMMANDS else factor
+            for j, (kind, factor) in enumerate(units)
+        ]
+    )

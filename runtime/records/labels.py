@@ -1,4 +1,6 @@
-"""What records and their files are called: names that differ where the records do, as short as they may be."""
+"""What records and their files are called: names that differ where the records do, as short as they
+may be.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,10 @@ class Label:
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:
     """One label by record, no name twice.
 
-    A record is called as its settings say, else as its dataset or its first file without ending; of equal ones each is called by the folder too
-    (day1/run, day2/run), by more folders where need be, and in the end by its number. A file is called by its name, by its path where another has
+    A record is called as its settings say, else as its dataset or its first file without ending; of
+    equal ones each is called by the folder too
+    (day1/run, day2/run), by more folders where need be, and in the end by its number. A file is
+    called by its name, by its path where another has
     the same.
     """
     paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
@@ -35,9 +39,15 @@ def labels(settings: Sequence[RecordSettings]) -> list[Label]:
             "/".join(part[-depth:]) if count[name] > 1 and s.name is None else name
             for s, part, name in zip(settings, parts, names, strict=True)
         ]
-    names = [f"{name} ({names[:k].count(name) + 1})" if name in names[:k] else name for k, name in enumerate(names)]
+    names = [
+        f"{name} ({names[:k].count(name) + 1})" if name in names[:k] else name
+        for k, name in enumerate(names)
+    ]
     same = Counter(Path(file).name for file in {file for s in settings for file in s.files})
-    files = [tuple(Path(file).name if same[Path(file).name] == 1 else file for file in s.files) for s in settings]
+    files = [
+        tuple(Path(file).name if same[Path(file).name] == 1 else file for file in s.files)
+        for s in settings
+    ]
     return [Label(name, of) for name, of in zip(names, files, strict=True)]
 
 

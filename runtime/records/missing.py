@@ -1,4 +1,6 @@
-"""Positions that a record does not hold: where they were measured, and at which encoders they are missing (`signals.reader: counts` takes them)."""
+"""Positions that a record does not hold: where they were measured, and at which encoders they are
+missing (`signals.reader: counts` takes them).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,10 @@ from runtime.model.drives import Drives
 
 Array = np.ndarray
 
-COUNTS = "where positions are counts of encoders, signals: {reader: counts} takes such samples as missing"
+COUNTS = (
+    "where positions are counts of encoders, signals: {reader: counts} takes such samples as "
+    "missing"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +26,11 @@ class Missing:
     Attributes
     ----------
     samples : ndarray of bool, shape (N, n)
-        True: the column holds no position there. The record holds a straight line between its neighbours.
+        True: the column holds no position there. The record holds a straight line between its
+        neighbours.
     follows : ndarray of bool, shape (n, n), or None
-        Joint j follows from column i (R^-1 of the drives is not zero there); None: columns are joints.
+        Joint j follows from column i (R^-1 of the drives is not zero there); None: columns are
+        joints.
     """
 
     samples: Array
@@ -34,17 +41,23 @@ class Missing:
         return self.samples if self.follows is None else self.samples @ self.follows.T
 
     def at_encoders(self, drives: Drives | None) -> Array:
-        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of `drives`.
+        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of
+        `drives`.
 
-        A motor that turns with two joints has none where either joint has none; where motors were recorded each stands for itself.
+        A motor that turns with two joints has none where either joint has none; where motors were
+        recorded each stands for itself.
         """
         if drives is None:
             return self.at_joints()
         return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
 
     def near_gaps(self, longest: int, reach: int) -> Array:
-        """Samples in gaps of any joint of more than `longest` samples and within `reach` samples of these, bool, shape (N,)."""
-        ends = np.flatnonzero(np.diff(self.at_joints().any(axis=1), prepend=False, append=False)).reshape(-1, 2)
+        """Samples in gaps of any joint of more than `longest` samples and within `reach` samples of
+        these, bool, shape (N,).
+        """
+        ends = np.flatnonzero(
+            np.diff(self.at_joints().any(axis=1), prepend=False, append=False)
+        ).reshape(-1, 2)
         near = np.zeros(len(self.samples), dtype=bool)
         for a, b in ends[ends[:, 1] - ends[:, 0] > longest]:
             near[max(a - reach, 0) : b + reach] = True
@@ -52,7 +65,9 @@ class Missing:
 
 
 def bridged(q: Array, missing: Array, before: Array | None = None) -> Array:
-    """q, shape (N, n), with straight lines where samples are missing: between their neighbours, from `before`, shape (n,), on, and held at the ends."""
+    """q, shape (N, n), with straight lines where samples are missing: between their neighbours,
+    from `before`, shape (n,), on, and held at the ends.
+    """
     q, at = np.array(q), np.arange(len(q))
     for j in np.flatnonzero(missing.any(axis=0)):
         known = np.flatnonzero(~missing[:, j])
@@ -64,11 +79,14 @@ def bridged(q: Array, missing: Array, before: Array | None = None) -> Array:
 
 
 def require_positions(missing: Missing | None, who: str, file: str, hint: str = "") -> None:
-    """Raise InputError where positions are missing, which `who` needs; hint : what else may be done."""
+    """Raise InputError where positions are missing, which `who` needs; hint : what else may be
+    done.
+    """
     if missing is not None and missing.samples.any():
         i, j = np.argwhere(missing.samples)[0]
         raise InputError(
-            f"{missing.samples.sum()} positions are missing, the first of column {j + 1} at sample {i + 1}; {who} needs all of them: "
+            f"{missing.samples.sum()} positions are missing, the first of column {j + 1} at sample "
+            f"{i + 1}; {who} needs all of them: "
             f"repair or cut the record{f'; {hint}' if hint else ''}",
             file=file,
         )

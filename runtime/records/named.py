@@ -1,4 +1,6 @@
-"""What a name on a command line or in a fleet file means: a dataset, a study file, or a measured file."""
+"""What a name on a command line or in a fleet file means: a dataset, a study file, or a measured
+file.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     Parameters
     ----------
     record : str or Path
-        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
+        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1
+        ..., tau1 ... (SI, joint side).
     """
     path = Path(record)
     if str(record) in DATASETS:
@@ -27,5 +30,6 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     if is_measured(path):
         return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
     raise InputError(
-        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(KINDS)}, the folder of a ROS 2 bag)"
+        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file "
+        f"(.yaml) or a measured file ({', '.join(KINDS)}, the folder of a ROS 2 bag)"
     )

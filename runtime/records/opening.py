@@ -1,4 +1,6 @@
-"""The files of one record, opened and checked: columns, lengths, joints, and how their numbers become joint side, SI."""
+"""The files of one record, opened and checked: columns, lengths, joints, and how their numbers
+become joint side, SI.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +12,22 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, ModelError
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.records.clock import Stamps
 from runtime.records.datasets import fetch
 from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.table import open_table
-from runtime.records.joint_side import Conversion, column_names, conversion, require_alike, require_finite
+from runtime.records.joint_side import (
+    Conversion,
+    column_names,
+    conversion,
+    require_alike,
+    require_finite,
+)
 from runtime.records.labels import Label
 from runtime.records.missing import COUNTS, bridged
-from runtime.settings.record import NONE, SHORTEST, Columns, RecordSettings
+from runtime.settings.record import NONE, Columns, RecordSettings
 from runtime.settings.units import time_unit
 
 QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
@@ -54,13 +63,14 @@ class Samples:
     def signals(self) -> dict[str, Array]:
         """What is resampled together, by name."""
         given = {key: getattr(self, key) for key in ("q", "tau", "q_r", "tau_ff", "tau_known")}
-        given |= {"missing": self.missing.astype(float)} if self.missing.any() else {}
+        given |= {"missing": self.missing} if self.missing.any() else {}
         return {key: x for key, x in given.items() if x is not None}
 
 
 @dataclass(frozen=True, eq=False)
 class RecordFiles:
-    """Measured files: positions, time and reference in one, torques in the same or another, known torques in one of these or in a third.
+    """Measured files: positions, time and reference in one, torques in the same or another, known
+    torques in one of these or in a third.
 
     Attributes
     ----------
@@ -71,7 +81,8 @@ class RecordFiles:
     hashes : mapping of str to str
         SHA-256 by file.
     tables : tuple of 3 Table
-        The files of the positions, of the torques, of the known torques; one file may stand for several.
+        The files of the positions, of the torques, of the known torques; one file may stand for
+        several.
     columns : Columns
         Names of the columns.
     samples : int
@@ -102,12 +113,21 @@ class RecordFiles:
     @property
     def stamps(self) -> Stamps:
         """How messages name the time stamps, and what they must be."""
-        return Stamps(self.first.file, self.columns.t, self.first.row, self.settings.rate, self.settings.jitter)
+        return Stamps(
+            self.first.file,
+            self.columns.t,
+            self.first.row,
+            self.settings.rate,
+            self.settings.jitter,
+        )
 
     @property
     def note(self) -> str:
         """What the files tell of the columns that are read, a sentence; "" for nothing."""
-        notes = (table.note(list(groups.values())) for table, groups in groups_of(self.columns, self.tables))
+        notes = (
+            table.note(list(groups.values()))
+            for table, groups in groups_of(self.columns, self.tables)
+        )
         return "; ".join(note for note in notes if note)
 
     def read(self) -> Samples:
@@ -120,39 +140,77 @@ class RecordFiles:
     def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Samples]:
         """The same by blocks of `size` samples; [start, stop) of them, default: all."""
         asked, stop = groups_of(self.columns, self.tables), self.samples if stop is None else stop
-        streams = [table.blocks(list(groups.values()), size, start, stop) for table, groups in asked]
+        streams = [
+            table.blocks(list(groups.values()), size, start, stop) for table, groups in asked
+        ]
         keys = [key for _, groups in asked for key in groups]
         last = None
         for a, blocks in zip(range(start, stop, size), zip(*streams, strict=True), strict=True):
-            samples, last = self._converted(a, dict(zip(keys, (x for block in blocks for x in block), strict=True)), last)
+            samples, last = self._converted(
+                a, dict(zip(keys, (x for block in blocks for x in block), strict=True)), last
+            )
             yield samples
 
     def times(self, size: int) -> Iterator[Array]:
         """t by blocks of `size` samples, s; the record has a time column."""
-        for a, (t,) in zip(range(0, self.samples, size), self.first.blocks([[self.columns.t or ""]], size), strict=True):
+        for a, (t,) in zip(
+            range(0, self.samples, size),
+            self.first.blocks([[self.columns.t or ""]], size),
+            strict=True,
+        ):
             yield self._time(t, a)
+
+    def largest_known(self, size: int) -> Array | None:
+        """Size of the known torques, shape (n,), read by blocks; None where there are none."""
+        names = asked_columns(self.columns)["tau_known"]
+        if not names:
+            return None
+        blocks = self.tables[2].blocks([names], size)
+        largest = np.max([np.abs(x).max(axis=0) for (x,) in blocks], axis=0)
+        return np.ravel(self._on_joints(largest[None]))
 
     def close(self) -> None:
         """End the processes that read the files."""
         for table in self.tables:
             table.close()
 
-    def _converted(self, start: int, parts: dict[str, Array], before: Array | None = None) -> tuple[Samples, Array]:
-        """Samples from `start` on, as the files hold them, in the joint side, SI, and the last positions, shape (n,), of the file.
+    def _converted(
+        self, start: int, parts: dict[str, Array], before: Array | None = None
+    ) -> tuple[Samples, Array]:
+        """Samples from `start` on, as the files hold them, in the joint side, SI, and the last
+        positions, shape (n,), of the file.
 
         before : positions of the file ahead of `start`.
         """
-        missing = np.isnan(parts["q"]) if self.missing else np.empty((len(parts["q"]), 0), dtype=bool)
+        missing = (
+            np.isnan(parts["q"]) if self.missing else np.empty((len(parts["q"]), 0), dtype=bool)
+        )
         if missing.any():
             parts["q"] = bridged(parts["q"], missing, before)
-        joint_side = {"q": self.side.position, "q_r": self.side.position, "tau": self.side.torque, "tau_ff": self.side.torque}
-        place = {key: (table, own) for table, groups in groups_of(self.columns, self.tables) for key, own in groups.items()}
+        joint_side = {
+            "q": self.side.position,
+            "q_r": self.side.position,
+            "tau": self.side.torque,
+            "tau_ff": self.side.torque,
+        }
+        place = {
+            key: (table, own)
+            for table, groups in groups_of(self.columns, self.tables)
+            for key, own in groups.items()
+        }
         hints = {} if self.missing else {"q": COUNTS}
         checked = {
-            key: require_finite(x, place[key][1], place[key][0], start, hints.get(key, "")) for key, x in parts.items() if key != "t"
+            key: require_finite(x, place[key][1], place[key][0], start, hints.get(key, ""))
+            for key, x in parts.items()
+            if key != "t"
         }
-        converted = {key: joint_side[key](x) if key in joint_side else self._on_joints(x) for key, x in checked.items()}
-        return Samples(t=self._time(parts["t"], start) if "t" in parts else None, missing=missing, **converted), parts["q"][-1]
+        converted = {
+            key: joint_side[key](x) if key in joint_side else self._on_joints(x)
+            for key, x in checked.items()
+        }
+        return Samples(
+            t=self._time(parts["t"], start) if "t" in parts else None, missing=missing, **converted
+        ), parts["q"][-1]
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""
@@ -164,7 +222,10 @@ class RecordFiles:
         return spread
 
     def _time(self, t: Array, start: int) -> Array:
-        return np.asarray(require_finite(t, [self.columns.t or ""], self.first, start)[:, 0] * time_unit(self.settings.units.t))
+        return np.asarray(
+            require_finite(t, [self.columns.t or ""], self.first, start)[:, 0]
+            * time_unit(self.settings.units.t)
+        )
 
 
 def open_record(
@@ -194,7 +255,10 @@ def open_record(
     missing : bool
         Whether positions may be missing: nan, an empty field, a null.
     """
-    opened = [open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks) for path in record_files(settings, folder)]
+    opened = [
+        open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks)
+        for path in record_files(settings, folder)
+    ]
     first, last, other = tables = places(settings, opened)
     names = column_names(settings, first, last, joints)
     first.positions, first.missing = frozenset(names.q), missing
@@ -203,27 +267,59 @@ def open_record(
     for table, groups in groups_of(names, tables):
         counts[table] = table.samples(list(groups.values()))
         widths |= zip(groups, table.widths(list(groups.values())), strict=True)
-        if by_blocks and counts[table] < SHORTEST:  # a whole record says so itself, after what is wrong with its lines
-            raise InputError(f"{counts[table]} samples; a record has at least {SHORTEST}", file=table.file)
+        if (
+            by_blocks and counts[table] < LIMIT.FEWEST_SAMPLES
+        ):  # a whole record says so itself, after what is wrong with its lines
+            raise InputError(
+                f"{counts[table]} samples; a record has at least {LIMIT.FEWEST_SAMPLES}",
+                file=table.file,
+            )
     samples, n = counts[first], widths["q"]
     require_alike(names, first, last, (samples, n), (counts[last], widths["tau"]))
     if drives is not None and drives.n != n:
-        raise InputError(f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file)
+        raise InputError(
+            f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file
+        )
     if "tau_known" in widths:
         widths["tau_known"] += names.tau_known.count(NONE)
-    for key, title in (("q_r", "reference positions"), ("tau_ff", "feed-forward torques"), ("tau_known", "known torques")):
+    for key, title in (
+        ("q_r", "reference positions"),
+        ("tau_ff", "feed-forward torques"),
+        ("tau_known", "known torques"),
+    ):
         if widths.get(key, n) != n:
-            raise InputError(f"{widths[key]} {title} {', '.join(asked_columns(names)[key])}; expected {n}", file=first.file)
+            raise InputError(
+                f"{widths[key]} {title} {', '.join(asked_columns(names)[key])}; expected {n}",
+                file=first.file,
+            )
     if "tau_known" in widths and counts[other] != samples:
-        raise InputError(f"{samples} samples in {first.file}, {counts[other]} known torques; expected the same instants", file=other.file)
+        raise InputError(
+            (
+                f"{samples} samples in {first.file}, {counts[other]} known torques; expected the "
+                "same "
+                "instants"
+            ),
+            file=other.file,
+        )
     hashes = dict(zip(label.files, (table.digest for table in opened), strict=True))
-    return RecordFiles(settings, label.name, hashes, tables, names, samples, n, conversion(settings, drives, first, last, n), missing)
+    return RecordFiles(
+        settings,
+        label.name,
+        hashes,
+        tables,
+        names,
+        samples,
+        n,
+        conversion(settings, drives, first, last, n),
+        missing,
+    )
 
 
 def places(settings: RecordSettings, opened: Sequence[Table]) -> tuple[Table, Table, Table]:
     """The files of the positions, of the torques and of the known torques.
 
-    Of two files the second holds the torques, but for known torques that it has and the first has not, beside torques of the first.
+    Of two files the second holds the torques, but for known torques that it has and the first has
+    not, beside torques of the first.
     """
     first, last, columns = opened[0], opened[-1], settings.columns
     if len(opened) == 3 or not columns.tau_known:
@@ -236,7 +332,9 @@ def places(settings: RecordSettings, opened: Sequence[Table]) -> tuple[Table, Ta
 
 
 def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
-    """Paths of the files of a record; those of a dataset are looked up, and downloaded where need be."""
+    """Paths of the files of a record; those of a dataset are looked up, and downloaded where need
+    be.
+    """
     if not settings.files:
         raise InputError("the record names no file; set record.files")
     if settings.dataset is None:
@@ -251,23 +349,49 @@ def drives_of(model: Any) -> Drives | None:
 
 
 def names_of(model: Any) -> tuple[str, ...]:
-    """Names of the joints of an emitted model, in the order of JOINTS; none where the robot file does not name every joint."""
+    """Names of the joints of an emitted model, in the order of JOINTS; none where the robot file
+    does not name every joint.
+    """
     labels = getattr(model, "LABELS", {})
-    if not isinstance(labels, Mapping) or not all(isinstance(label, str) and label.isprintable() for label in labels.values()):
+    if not isinstance(labels, Mapping) or not all(
+        isinstance(label, str) and label.isprintable() for label in labels.values()
+    ):
         raise ModelError("LABELS are no table of names; emit the model again", file=model.NAME)
-    return tuple(labels[j] for j in model.JOINTS) if model is not None and labels.keys() >= {*model.JOINTS} else ()
+    return (
+        tuple(labels[j] for j in model.JOINTS)
+        if model is not None and labels.keys() >= {*model.JOINTS}
+        else ()
+    )
 
 
 def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
     """Columns by quantity; none of a quantity that is not asked for."""
     known = tuple(name for name in names.tau_known if name != NONE)
-    return dict(zip(QUANTITIES, (() if names.t is None else (names.t,), names.q, names.qr, names.tau, names.tau_ff, known), strict=True))
+    return dict(
+        zip(
+            QUANTITIES,
+            (
+                () if names.t is None else (names.t,),
+                names.q,
+                names.qr,
+                names.tau,
+                names.tau_ff,
+                known,
+            ),
+            strict=True,
+        )
+    )
 
 
-def groups_of(names: Columns, tables: tuple[Table, Table, Table]) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
+def groups_of(
+    names: Columns, tables: tuple[Table, Table, Table]
+) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
     """Each file once, with the columns that it is asked for, by quantity."""
     first, last, other = tables
     place = dict(zip(QUANTITIES, (first, first, first, last, last, other), strict=True))
     asked = {key: columns for key, columns in asked_columns(names).items() if columns}
-    groups = {table: {key: columns for key, columns in asked.items() if place[key] is table} for table in dict.fromkeys(tables)}
+    groups = {
+        table: {key: columns for key, columns in asked.items() if place[key] is table}
+        for table in dict.fromkeys(tables)
+    }
     return [(table, own) for table, own in groups.items() if own]

@@ -1,4 +1,6 @@
-"""Where results come from: the names of the records, their time stamps, and whether anything was measured."""
+"""Where results come from: the names of the records, their time stamps, and whether anything was
+measured.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +27,20 @@ def record_names(records: Sequence[Record | Stream]) -> tuple[str, ...]:
 
 
 def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
-    """Provenance of a result on `records`: their names, whether one of them was simulated, and their time stamps in words."""
+    """Provenance of a result on `records`: their names, whether one of them was simulated, and
+    their time stamps in words.
+    """
     names = record_names(records)
     simulated = any(record.name.startswith(SIMULATED) for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
-    stamps = {name: text for name, record in zip(names, records, strict=True) if (text := getattr(record, "time", ""))}
-    known = {name: text for name, record in zip(names, records, strict=True) if (text := getattr(record, "known", ""))}
-    said = {"time": stamps, "known_torques": known}
-    return {"records": list(names), "simulated": simulated, **{key: texts for key, texts in said.items() if texts}, **note}
+    named = list(zip(names, records, strict=True))
+    said = {
+        "time": {name: record.origin.time for name, record in named if record.origin.time},
+        "known_torques": {name: record.subtracted for name, record in named if record.subtracted},
+    }
+    return {
+        "records": list(names),
+        "simulated": simulated,
+        **{key: texts for key, texts in said.items() if texts},
+        **note,
+    }

@@ -3,7 +3,8 @@
     record = read_record("run.csv")
     records = read_records(study.record, model, folder="measurements")
 
-Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1
+... qn, tau1 ... taun needs no column names.
 Bad input raises InputError, which names file, column and line or sample.
 """
 
@@ -22,34 +23,44 @@ from runtime.records.labels import Label, labels
 from runtime.records.missing import Missing
 from runtime.records.named import study_of
 from runtime.records.opening import RecordFiles, Samples, drives_of, names_of, open_record
-from runtime.records.record import Record
+from runtime.records.record import Origin, Record
 from runtime.records.resampling import Stretch, resampled
 from runtime.records.time_stamps import time_stamps
 from runtime.settings.record import RecordSettings, each_record
 
-IRREGULAR = 0.05  # between the rate of the settings and the median step of stamps that are resampled
+IRREGULAR = (
+    0.05  # between the rate of the settings and the median step of stamps that are resampled
+)
 
 
 def read_record(
-    path: str | Path | RecordSettings, model: GeneratedModel | None = None, *, folder: str | Path = ".", missing: bool = False
+    path: str | Path | RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path = ".",
+    missing: bool = False,
 ) -> Record:
     """One measured record, joint side, SI.
 
     Parameters
     ----------
     path : str, Path or RecordSettings
-        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file,
+        a dataset, or settings.
     model : module, optional
-        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
+        Emitted model of the robot; needed where a side is "motor", which its drives convert, and
+        checked for its number of joints.
     folder : str or Path
         Where relative file names start; of a study file, those in it start where it is.
     missing : bool
-        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
+        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits;
+        a study file that names this reader says so itself.
 
     Raises
     ------
     InputError
-        Files that cannot be read or hold something else, and several records, or one that `resample` splits.
+        Files that cannot be read or hold something else, and several records, or one that
+        `resample` splits.
     """
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
@@ -60,14 +71,21 @@ def read_record(
     records = read_records(settings, model, folder=folder, missing=missing)
     if len(records) != 1:
         names = ", ".join(record.name for record in records)
-        raise InputError(f"{len(records)} records or pieces between gaps; read_records gives them all: {names}")
+        raise InputError(
+            f"{len(records)} records or pieces between gaps; read_records gives them all: {names}"
+        )
     return records[0]
 
 
 def read_records(
-    settings: Sequence[RecordSettings], model: GeneratedModel | None = None, *, folder: str | Path | None = None, missing: bool = False
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path | None = None,
+    missing: bool = False,
 ) -> list[Record]:
-    """Several records of one robot, no name twice; a record that `resample` splits at gaps is one record by piece.
+    """Several records of one robot, no name twice; a record that `resample` splits at gaps is one
+    record by piece.
 
     Parameters
     ----------
@@ -82,7 +100,9 @@ def read_records(
     records = [
         record
         for one, label in zip(settings, labels(settings), strict=True)
-        for record in read_pieces(one, label, drives_of(model), Path(folder or ""), names_of(model), missing=missing)
+        for record in read_pieces(
+            one, label, drives_of(model), Path(folder or ""), names_of(model), missing=missing
+        )
     ]
     for record in records if model is not None else ():
         require_joints(record.n, tuple(record.files), model)
@@ -90,9 +110,15 @@ def read_records(
 
 
 def read_pieces(
-    settings: RecordSettings, label: Label, drives: Drives | None, folder: Path, joints: Sequence[str] = (), *, missing: bool = False
+    settings: RecordSettings,
+    label: Label,
+    drives: Drives | None,
+    folder: Path,
+    joints: Sequence[str] = (),
+    *,
+    missing: bool = False,
 ) -> list[Record]:
-    """The record, or the records into which `resample` splits it at gaps and where time goes back."""
+    """The record, or those into which `resample` splits it at gaps and where time goes back."""
     opened = open_record(settings, label, drives, folder, joints=joints, missing=missing)
     try:
         samples = opened.read()
@@ -112,10 +138,8 @@ def read_pieces(
             tau_known=own.get("tau_known"),
             rate=rate,
             name=opened.name if K == 1 else f"{opened.name} ({k} of {K})",
-            files=opened.hashes,
-            time=text,
-            jitter=settings.jitter,
-            missing=Missing(own["missing"] > 0, opened.side.follows) if "missing" in own else None,
+            missing=Missing(own["missing"], opened.side.follows) if "missing" in own else None,
+            origin=Origin(opened.hashes, text, settings.jitter, opened.side.drives),
         )
         for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]
@@ -124,16 +148,23 @@ def read_pieces(
 def require_joints(n: int, files: Sequence[str], model: GeneratedModel | None) -> None:
     """Raise InputError unless a record of `n` joints is one of the robot of the model."""
     if model is not None and n != len(model.JOINTS):
-        raise InputError(f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}", file=", ".join(files))
+        raise InputError(
+            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}",
+            file=", ".join(files),
+        )
 
 
 def _uniform(opened: RecordFiles, samples: Samples) -> tuple[list[Stretch], float, str]:
-    """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or resampled where the settings ask for it."""
+    """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or
+    resampled where the settings ask for it.
+    """
     settings, stamps, file = opened.settings, opened.stamps, opened.first.file
     t, signals = samples.t, tuple(samples.signals.values())
     if t is None:
         if settings.rate is None:
-            raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=file)
+            raise InputError(
+                "no time column and no rate; set record.rate (Hz) or record.columns.t", file=file
+            )
         return [Stretch(np.arange(opened.samples) / settings.rate, signals)], settings.rate, ""
     if settings.resample is None:
         rate = rate_of(stamps, t)
@@ -141,10 +172,20 @@ def _uniform(opened: RecordFiles, samples: Samples) -> tuple[list[Stretch], floa
     regularity = time_stamps(t, gap=settings.resample.longest, file=file)
     if settings.rate is not None and abs(1 / regularity.period / settings.rate - 1) > IRREGULAR:
         raise InputError(
-            f"time runs at {1 / regularity.period:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time", file=file
+            (
+                f"time runs at {1 / regularity.period:g} Hz, record.rate is {settings.rate:g} Hz; "
+                "correct one, or the unit of time"
+            ),
+            file=file,
         )
     try:
-        stretches, rate, done = resampled(t, signals, regularity, settings.resample, settings.rate, file=file)
+        stretches, rate, done = resampled(
+            t, signals, regularity, settings.resample, settings.rate, file=file
+        )
     except InputError as e:
-        raise InputError(f"{e.message}. The stamps: {regularity.to_text(stamps.row)}", file=file, column=opened.columns.t) from None
+        raise InputError(
+            f"{e.message}. The stamps: {regularity.to_text(stamps.row)}",
+            file=file,
+            column=opened.columns.t,
+        ) from None
     return stretches, rate, f"{regularity.to_text(stamps.row)}; {done}"

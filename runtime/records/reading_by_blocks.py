@@ -1,8 +1,10 @@
-"""From the files of a measurement to a record that is read by blocks, joint side, SI: `runtime.records.reading` for files larger than memory.
+"""From the files of a measurement to a record that is read by blocks, joint side, SI:
+`runtime.records.reading` for files larger than memory.
 
     stream = open_streams(study.record, model, block=65536)[0]
 
-The same settings, checks and errors; hashes and the clock are read when the stream is opened, finite numbers are required as blocks come by.
+The same settings, checks and errors; hashes and the clock are read when the stream is opened,
+finite numbers are required as blocks come by.
 """
 
 from __future__ import annotations
@@ -16,20 +18,22 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import clock
 from runtime.records.formats.columns import BLOCK, Array
-from runtime.records.formats.table import BY_ENDING
+from runtime.records.formats.table import is_read_by_blocks
 from runtime.records.labels import Label, labels
 from runtime.records.opening import RecordFiles, drives_of, names_of, open_record, record_files
 from runtime.records.reading import read_records, require_joints
-from runtime.records.record import Record
+from runtime.records.record import Origin, Record
 from runtime.records.stream import Stream
-from runtime.settings.record import SHORTEST, RecordSettings, each_record
+from runtime.settings.record import RecordSettings, each_record
 
 KEPT = 2**23  # samples whose time is kept, 64 MB; read again and again in longer records
-LARGE = 100_000_000  # bytes of the files of a record from which it is read by blocks when nothing is said
+# bytes of the files of a record from which it is read by blocks when nothing is said
+LARGE = 100_000_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,7 +61,10 @@ class FileStream(Stream):
 
     def _times(self) -> Iterator[Array]:
         if self.opened.columns.t is None:
-            return (self._counted(a, min(self.block, len(self) - a)) for a in range(0, len(self), self.block))
+            return (
+                self._counted(a, min(self.block, len(self) - a))
+                for a in range(0, len(self), self.block)
+            )
         return self.opened.times(self.block)
 
     def _counted(self, start: int, count: int) -> Array:
@@ -72,11 +79,20 @@ class FileStream(Stream):
         """Other processes read what they need."""
         return {key: value for key, value in vars(self).items() if key != "_clock"}
 
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position, of the samples [start, stop)."""
+    def blocks(
+        self, start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[Array, Array, Array, Array]]:
+        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position, of the
+        samples [start, stop).
+        """
         for x in self.opened.blocks(self.block, start, stop):
             known = 0.0 if x.tau_known is None else x.tau_known
-            yield self._counted(start, len(x.q)) if x.t is None else x.t, x.q, x.tau - known, x.missing
+            yield (
+                self._counted(start, len(x.q)) if x.t is None else x.t,
+                x.q,
+                x.tau - known,
+                x.missing,
+            )
             start += len(x.q)
 
 
@@ -88,7 +104,9 @@ def open_stream(
     block: int = BLOCK,
     missing: bool = False,
 ) -> FileStream:
-    """The record that the settings describe, to be read by blocks of `block` samples; its files are read once, for hashes and clock."""
+    """The record that the settings describe, to be read by blocks of `block` samples; its files are
+    read once, for hashes and clock.
+    """
     return open_streams([settings], model, folder=folder, block=block, missing=missing)[0]
 
 
@@ -107,25 +125,47 @@ def open_streams(
         for one, label in zip(settings, labels(settings), strict=True)
     ]
     for stream in streams:
-        require_joints(stream.n, tuple(stream.files), model)
+        require_joints(stream.n, tuple(stream.origin.files), model)
     return streams
 
 
 def _stream(
-    settings: RecordSettings, label: Label, drives: Drives | None, joints: Sequence[str], folder: Path, block: int, missing: bool
+    settings: RecordSettings,
+    label: Label,
+    drives: Drives | None,
+    joints: Sequence[str],
+    folder: Path,
+    block: int,
+    missing: bool,
 ) -> FileStream:
-    if block < SHORTEST:
-        raise InputError(f"blocks of {block} samples; expected at least {SHORTEST}")
+    if block < LIMIT.FEWEST_SAMPLES:
+        raise InputError(f"blocks of {block} samples; expected at least {LIMIT.FEWEST_SAMPLES}")
     if settings.resample is not None:
-        raise InputError("record.resample needs the whole record; set stream: off", file=", ".join(label.files))
-    opened = open_record(settings, label, drives, folder, joints=joints, by_blocks=True, missing=missing)
+        raise InputError(
+            "record.resample needs the whole record; set stream: off", file=", ".join(label.files)
+        )
+    opened = open_record(
+        settings, label, drives, folder, joints=joints, by_blocks=True, missing=missing
+    )
     rate = settings.rate
     if opened.columns.t is not None:
         rate = clock(opened.stamps, lambda: opened.times(block))
     if rate is None:
-        raise InputError("no time column and no rate; set record.rate (Hz) or record.columns.t", file=opened.first.file)
-    name, n, files, follows = opened.name, opened.n, opened.hashes, opened.side.follows
-    return FileStream(name=name, n=n, rate=rate, files=files, samples=opened.samples, block=block, follows=follows, opened=opened)
+        raise InputError(
+            "no time column and no rate; set record.rate (Hz) or record.columns.t",
+            file=opened.first.file,
+        )
+    return FileStream(
+        name=opened.name,
+        n=opened.n,
+        rate=rate,
+        origin=Origin(opened.hashes, jitter=settings.jitter, drives=opened.side.drives),
+        samples=opened.samples,
+        block=block,
+        follows=opened.side.follows,
+        largest_known=opened.largest_known(block),
+        opened=opened,
+    )
 
 
 def records_or_streams(
@@ -136,23 +176,43 @@ def records_or_streams(
     folder: str | Path | None = None,
     missing: bool = False,
 ) -> list[Record] | list[Stream]:
-    """The records, all of them in memory, or all of them to be read by blocks, as the setting `stream` of a study says."""
+    """The records, all of them in memory, or all of them to be read by blocks, as the setting
+    `stream` of a study says.
+    """
     if stream == "off" or not is_stream(settings, stream, folder):
         return read_records(settings, model, folder=folder, missing=missing)
-    streams: list[Stream] = [*open_streams(settings, model, folder=folder, block=BLOCK if stream == "auto" else stream, missing=missing)]
+    streams: list[Stream] = [
+        *open_streams(
+            settings,
+            model,
+            folder=folder,
+            block=BLOCK if stream == "auto" else stream,
+            missing=missing,
+        )
+    ]
     return streams
 
 
-def is_stream(settings: Sequence[RecordSettings], stream: Literal["auto", "off"] | int, folder: str | Path | None = None) -> bool:
+def is_stream(
+    settings: Sequence[RecordSettings],
+    stream: Literal["auto", "off"] | int,
+    folder: str | Path | None = None,
+) -> bool:
     """Whether these records are to be read by blocks."""
     return are_large(settings, folder) if stream == "auto" else stream != "off"
 
 
 def are_large(settings: Sequence[RecordSettings], folder: str | Path | None = None) -> bool:
-    """Whether the files of these records, of formats that can be read by blocks, hold LARGE bytes or more in all; those of data sets do not, nor those
+    """Whether the files of these records, of formats that can be read by blocks, hold LARGE bytes
+    or more in all; those of data sets do not, nor those
     that are resampled."""
     if any(s.resample is not None for s in settings):
         return False
-    paths = [path for s in each_record(tuple(settings)) if s.dataset is None for path in record_files(s, Path(folder or ""))]
-    readable = all(any(suffix.lower() in BY_ENDING and BY_ENDING[suffix.lower()].by_blocks for suffix in path.suffixes) for path in paths)
+    paths = [
+        path
+        for s in each_record(tuple(settings))
+        if s.dataset is None
+        for path in record_files(s, Path(folder or ""))
+    ]
+    readable = all(is_read_by_blocks(path) for path in paths)
     return readable and sum(path.stat().st_size for path in paths if path.is_file()) >= LARGE

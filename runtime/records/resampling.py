@@ -1,13 +1,19 @@
-"""Samples at the instants of an irregular clock, brought to a uniform one; never across a gap or a step back of time.
+"""Samples at the instants of an irregular clock, brought to a uniform one; never across a gap or a
+step back of time.
 
-    t_k = t_first + k / rate,   k = 0 ... floor((t_last - t_first) rate)       for every stretch without gap or step back
+    t_k = t_first + k / rate,   k = 0 ... floor((t_last - t_first) rate)
+                                for every stretch without gap or step back
 
-between two samples by a straight line or by a cubic spline through all samples of the stretch. For a signal of highest pulsation w and steps up to h the error is at
-most (w h)^2/8 or 5 (w h)^4/384 of its amplitude (de Boor, A Practical Guide to Splines, 2001, II.(12) and V.(18)), the ends of the spline aside. Nothing is
+between two samples by a straight line or by a cubic spline through all samples of the stretch. For
+a signal of highest pulsation w and steps up to h the error is at
+most (w h)^2/8 or 5 (w h)^4/384 of its amplitude (de Boor, A Practical Guide to Splines, 2001,
+II.(12) and V.(18)), the ends of the spline aside. Nothing is
 filtered: a rate below that of the record would fold what lies above half of it, and is refused.
 
-Where the samples are uniform and their stamps are not (a controller samples, another computer stamps), interpolation at the stamps would add the jitter times the
-velocity to the positions. "count" takes the samples of a stretch as they are, t_k = t_first + k / rate, and requires as many as its stamps last.
+Where the samples are uniform and their stamps are not (a controller samples, another computer
+stamps), interpolation at the stamps would add the jitter times the
+velocity to the positions. "count" takes the samples of a stretch as they are, t_k = t_first + k /
+rate, and requires as many as its stamps last.
 """
 
 from __future__ import annotations
@@ -22,9 +28,10 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from runtime.errors import InputError
+from runtime.limits import LIMIT
 from runtime.records.remedies import remedies
 from runtime.records.time_stamps import GAP, TimeStamps, time_stamps
-from runtime.settings.record import SHORTEST, Resample
+from runtime.settings.record import Resample
 from runtime.settings.schema import structure
 
 Array = np.ndarray
@@ -43,9 +50,15 @@ class Stretch:
 
 
 def resample(
-    t: ArrayLike, x: ArrayLike, rate: float | None = None, *, method: Literal["cubic", "linear"] = "cubic", longest: float = GAP
+    t: ArrayLike,
+    x: ArrayLike,
+    rate: float | None = None,
+    *,
+    method: Literal["cubic", "linear"] = "cubic",
+    longest: float = GAP,
 ) -> tuple[Array, Array]:
-    """Signals brought from irregular stamps to a uniform rate, between two samples by a cubic spline or a straight line.
+    """Signals brought from irregular stamps to a uniform rate, between two samples by a cubic
+    spline or a straight line.
 
         t_k = t[0] + k / rate,   k = 0 ... floor((t[-1] - t[0]) rate)
 
@@ -72,43 +85,67 @@ def resample(
     Raises
     ------
     InputError
-        Time that goes back, a longer gap, a rate below that of the record, or numbers that are not finite.
+        Time that goes back, a longer gap, a rate below that of the record, or numbers that are not
+        finite.
     """
     t, x = np.asarray(t, dtype=float), np.asarray(x, dtype=float)
-    if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < SHORTEST:
-        raise InputError(f"t {t.shape}, x {x.shape}; expected (N,) and (N,) or (N, n), N at least {SHORTEST}")
+    if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < LIMIT.FEWEST_SAMPLES:
+        raise InputError(
+            f"t {t.shape}, x {x.shape}; expected (N,) and (N,) or (N, n), N at "
+            f"least {LIMIT.FEWEST_SAMPLES}"
+        )
     if not (np.isfinite(t).all() and np.isfinite(x).all()):
         raise InputError("t or x holds nan or infinity; repair or cut the record")
-    settings = structure(Resample, {"rate": rate, "method": method, "longest": longest, "shortest": 0.0}, ())
+    settings = structure(
+        Resample, {"rate": rate, "method": method, "longest": longest, "shortest": 0.0}, ()
+    )
     stamps = time_stamps(t, gap=settings.longest)
     if method not in ("cubic", "linear"):
         raise InputError(f"method {method!r}; expected cubic or linear")
     if stamps.gaps or stamps.resets:
-        raise InputError(f"time has gaps of more than {longest:g} periods, or goes back. {remedies(t, time_stamps(t), arrays=True)}")
-    ((stretch,), _, _) = resampled(t, [x[:, None] if x.ndim == 1 else x], stamps, settings, None, file="t")
+        raise InputError(
+            f"time has gaps of more than {longest:g} periods, or goes back. "
+            f"{remedies(t, time_stamps(t), arrays=True)}"
+        )
+    ((stretch,), _, _) = resampled(
+        t, [x[:, None] if x.ndim == 1 else x], stamps, settings, None, file="t"
+    )
     return stretch.t, stretch.signals[0][:, 0] if x.ndim == 1 else stretch.signals[0]
 
 
 def resampled(
-    t: Array, signals: Sequence[Array], stamps: TimeStamps, settings: Resample, rate: float | None, *, file: str
+    t: Array,
+    signals: Sequence[Array],
+    stamps: TimeStamps,
+    settings: Resample,
+    rate: float | None,
+    *,
+    file: str,
 ) -> tuple[list[Stretch], float, str]:
     """Stretches at a uniform rate, that rate in Hz, and what was done, as a sentence.
 
-    t, shape (N,), s; signals, each of shape (N, n).   stamps : those of t.   rate : of the record, where it is stated.
+    t, shape (N,), s; signals and masks, each of shape (N, n).
+    stamps : those of t.
+    rate : of the record, where it is stated.
     """
     if settings.gaps == "refuse" and (stamps.gaps or stamps.resets):
         raise InputError(
-            "time has gaps or goes back; set record.resample.gaps: split to cut the record there, or record.resample.longest to bridge longer gaps",
+            (
+                "time has gaps or goes back; set record.resample.gaps: split to cut the record "
+                "there, "
+                "or record.resample.longest to bridge longer gaps"
+            ),
             file=file,
         )
     step = np.diff(t)
     counted = settings.method == "count"
-    regular = step[(step >= 0 if counted else step > 0) & (step <= stamps.gap * stamps.period)]
+    regular = step[(step >= 0 if counted else step > 0) & (step <= stamps.longest)]
     own = len(regular) / float(regular.sum())
     wanted = settings.rate or rate or own
     if wanted < LOWEST * own:
         raise InputError(
-            f"record.resample.rate {wanted:g} Hz, below the {own:g} Hz of the record: what is faster than {wanted / 2:g} Hz would be folded; "
+            f"record.resample.rate {wanted:g} Hz, below the {own:g} Hz of the record: what is "
+            f"faster than {wanted / 2:g} Hz would be folded; "
             "resample at its rate or above, signals.decimate lowers it afterwards",
             file=file,
         )
@@ -116,32 +153,43 @@ def resampled(
     stretches, short = [], 0
     for a, b in pairwise(cuts):
         keep = np.concatenate([[True], (step[a : b - 1] != 0) | counted])
-        if np.count_nonzero(keep) < SHORTEST or t[b - 1] - t[a] < settings.shortest:
+        if np.count_nonzero(keep) < LIMIT.FEWEST_SAMPLES or t[b - 1] - t[a] < settings.shortest:
             short += 1
         elif counted:
             stretches.append(_counted(t[a:b], [x[a:b] for x in signals], wanted, file))
         else:
-            stretches.append(_uniform(t[a:b][keep], [x[a:b][keep] for x in signals], wanted, settings.method))
+            stretches.append(
+                _uniform(t[a:b][keep], [x[a:b][keep] for x in signals], wanted, settings.method)
+            )
     if not stretches:
-        raise InputError(f"no stretch of {settings.shortest:g} s without a gap; lower record.resample.shortest", file=file)
+        raise InputError(
+            f"no stretch of {settings.shortest:g} s without a gap; lower record.resample.shortest",
+            file=file,
+        )
     samples = sum(len(stretch.t) for stretch in stretches)
     done = "taken as uniform" if counted else "resampled"
     text = (
-        f"{done} at {wanted:.6g} Hz ({settings.method}): {samples} samples in {len(stretches)} stretch{'es' if len(stretches) > 1 else ''}"
+        f"{done} at {wanted:.6g} Hz ({settings.method}): {samples} samples in {len(stretches)} "
+        f"stretch{'es' if len(stretches) > 1 else ''}"
     )
     left = [
         f"{short} shorter than {settings.shortest:g} s left out" if short else "",
-        f"{len(stamps.repeats)} samples of repeated stamps left out" if stamps.repeats and not counted else "",
+        f"{len(stamps.repeats)} samples of repeated stamps left out"
+        if stamps.repeats and not counted
+        else "",
     ]
     return stretches, wanted, ", ".join([text, *(part for part in left if part)])
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """The signals as they are, at t[0] + k/rate. Raises InputError where the stamps last longer or shorter than so many samples."""
+    """The signals as they are, at t[0] + k/rate. Raises InputError where the stamps last longer or
+    shorter than so many samples.
+    """
     N, last = len(t), float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
         raise InputError(
-            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, their stamps {last:.6g} s: the rate is another, or samples are "
+            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, "
+            f"their stamps {last:.6g} s: the rate is another, or samples are "
             "missing; state record.rate, or cut at shorter gaps by record.resample.longest",
             file=file,
         )
@@ -153,6 +201,12 @@ def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> St
     K = int(np.floor((t[-1] - t[0]) * rate + LAST)) + 1
     grid = t[0] + np.arange(K) / rate
     at = np.minimum(grid, t[-1])
-    if method == "cubic":
-        return Stretch(grid, tuple(CubicSpline(t, x, axis=0)(at) for x in signals))
-    return Stretch(grid, tuple(np.stack([np.interp(at, t, x[:, j]) for j in range(x.shape[1])], axis=1) for x in signals))
+    return Stretch(grid, tuple(_interpolated(t, x, at, method) for x in signals))
+
+
+def _interpolated(t: Array, x: Array, at: Array, method: str) -> Array:
+    """x, shape (N, n), at other instants; of a mask, whether a sample next to them is in it."""
+    if method == "cubic" and x.dtype != np.bool_:
+        return np.asarray(CubicSpline(t, x, axis=0)(at))
+    straight = np.stack([np.interp(at, t, column) for column in x.T], axis=1)
+    return straight > LAST if x.dtype == np.bool_ else straight

@@ -1,16 +1,20 @@
-"""Records that are read by blocks: what a source of samples offers, and samples that wait for one another."""
+"""Records that are read by blocks: what a source of samples offers, and samples that wait for one
+another.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from runtime.records.record import Record
+from runtime.model.drives import Drives
+from runtime.records.record import Origin, Record, known_text
 
 Array = np.ndarray
+Block = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,45 +29,54 @@ class Stream(ABC):
         Number of joints.
     rate : float, Hz
         Sampling rate.
-    files : mapping of str to str
-        SHA-256 by file name.
+    origin : Origin
+        Files, clock and drives by which it is read.
     samples : int
         N.
     block : int
         Samples of a block.
     follows : ndarray of bool, shape (n, n), or None
         Joint j follows from column i of the positions, as in `runtime.records.missing`.
+    largest_known : ndarray, shape (n,), or None
+        Size of the known torques that are subtracted; None where there are none.
     """
 
     name: str
     n: int
     rate: float
-    files: Mapping[str, str]
+    origin: Origin
     samples: int
     block: int
     follows: Array | None = None
+    largest_known: Array | None = None
 
     def __len__(self) -> int:
         return self.samples
+
+    @property
+    def file(self) -> str:
+        """What messages call it: its files, or its name where there are none."""
+        return ", ".join(self.origin.files) or self.name
+
+    @property
+    def subtracted(self) -> str:
+        """What known torques take from the record, a sentence; "" where there are none."""
+        return known_text(self.largest_known)
 
     @abstractmethod
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
 
     @abstractmethod
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where none may be missing, of the samples [start, stop);
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
+        """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where
+        none may be missing, of the samples [start, stop);
         default: all."""
 
     @property
     def in_any_order(self) -> bool:
         """Whether samples are read without those before them."""
         return True
-
-    def part(self, start: int, stop: int) -> Stream:
-        """The samples [start, stop) as a stream of their own."""
-        same = {f.name: getattr(self, f.name) for f in fields(Stream)}
-        return PartStream(**{**same, "samples": stop - start}, stream=self, start=start)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -74,57 +87,108 @@ class RecordStream(Stream):
 
     def __init__(self, record: Record, block: int) -> None:
         follows = None if record.missing is None else record.missing.follows
-        name, n, rate, files = record.name, record.n, record.rate, record.files
-        super().__init__(name=name, n=n, rate=rate, files=files, samples=len(record), block=block, follows=follows)
+        known = None if record.tau_known is None else np.abs(record.tau_known).max(axis=0)
+        super().__init__(
+            name=record.name,
+            n=record.n,
+            rate=record.rate,
+            origin=record.origin,
+            samples=len(record),
+            block=block,
+            follows=follows,
+            largest_known=known,
+        )
         object.__setattr__(self, "record", record)
 
     def times(self) -> Iterator[Array]:
         return (t for t, *_ in self.blocks())
 
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
-        missing = np.empty((len(self), 0), dtype=bool) if self.record.missing is None else self.record.missing.samples
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
+        missing = (
+            np.empty((len(self), 0), dtype=bool)
+            if self.record.missing is None
+            else self.record.missing.samples
+        )
         stop = len(self) if stop is None else stop
         for a in range(start, stop, self.block):
             samples = slice(a, min(a + self.block, stop))
-            yield self.record.t[samples], self.record.q[samples], self.record.tau[samples], missing[samples]
+            yield (
+                self.record.t[samples],
+                self.record.q[samples],
+                self.record.torque[samples],
+                missing[samples],
+            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChangedStream(Stream):
-    """A stream whose positions and torques are changed, sample by sample: change(q, tau) of arrays (B, n)."""
+    """A stream whose positions and torques are changed, sample by sample: change(q, tau) of arrays
+    (B, n).
+    """
 
     stream: Stream
     change: Callable[[Array, Array], tuple[Array, Array]]
 
     @classmethod
-    def of(cls, stream: Stream, change: Callable[[Array, Array], tuple[Array, Array]]) -> ChangedStream:
-        """The changed stream."""
+    def of(
+        cls,
+        stream: Stream,
+        change: Callable[[Array, Array], tuple[Array, Array]],
+        drives: Drives,
+    ) -> ChangedStream:
+        """The changed stream, as if it were read by `drives`."""
         same = {f.name: getattr(stream, f.name) for f in fields(Stream)}
+        same["origin"] = replace(stream.origin, drives=drives)
         return cls(stream=stream, change=change, **same)
 
     def times(self) -> Iterator[Array]:
         return self.stream.times()
 
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
-        return ((t, *self.change(q, tau), missing) for t, q, tau, missing in self.stream.blocks(start, stop))
+    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
+        return (
+            (t, *self.change(q, tau), missing)
+            for t, q, tau, missing in self.stream.blocks(start, stop)
+        )
 
     @property
     def in_any_order(self) -> bool:
         return self.stream.in_any_order
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PartStream(Stream):
-    """Consecutive samples of a stream, from number `start` on."""
+class PieceReader:
+    """Samples of a stream by overlapping ranges, in order of time; each is read once where samples
+    are read behind those before them only.
+    """
 
-    stream: Stream
-    start: int
+    def __init__(self, stream: Stream) -> None:
+        self.stream = stream
+        self.blocks: Iterator[Block] = iter(())
+        self.held: list[tuple[int, Block]] = []  # with the number of their first sample
+        self.next = len(stream)  # sample that the next block begins with
 
-    def times(self) -> Iterator[Array]:
-        return (t for t, *_ in self.blocks())
-
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, Array, Array, Array]]:
-        return self.stream.blocks(self.start + start, self.start + (len(self) if stop is None else stop))
+    def read(self, begin: int, end: int) -> Block:
+        """t, q, tau and missing samples of [begin, end)."""
+        in_any_order = self.stream.in_any_order
+        if in_any_order or begin < (self.held[0][0] if self.held else self.next):
+            self.blocks = self.stream.blocks(*((begin, end) if in_any_order else ()))
+            self.held, self.next = [], begin if in_any_order else 0
+        while self.next < end:
+            block = next(self.blocks)
+            if self.next + len(block[0]) > begin:
+                self.held.append((self.next, block))
+            self.next += len(block[0])
+        self.held = [(first, x) for first, x in self.held if first + len(x[0]) > begin]
+        shapes = [(end - begin, *x.shape[1:]) for x in self.held[0][1]]
+        whole = [np.empty(s, x.dtype) for s, x in zip(shapes, self.held[0][1], strict=True)]
+        for first, block in self.held:
+            a = max(first, begin)
+            b = max(a, min(first + len(block[0]), end))  # one that is held may lie behind the end
+            for x, part in zip(whole, block, strict=True):
+                x[a - begin : b - begin] = part[a - first : b - first]
+        if in_any_order:
+            self.held = []
+        t, q, tau, missing = whole
+        return t, q, tau, missing
 
 
 class Queue:
@@ -147,16 +211,3 @@ class Queue:
         head = self.parts[0]
         self.parts[0], self.count = head[count:], self.count - count
         return head[:count]
-
-
-def recut(blocks: Iterable[tuple[Array, ...]], lengths: Iterable[int]) -> Iterator[tuple[Array, ...]]:
-    """The same samples in blocks of these lengths; every array of a block has its length."""
-    queues: list[Queue] = []
-    source = iter(blocks)
-    for length in lengths:
-        while not queues or queues[0].count < length:
-            block = next(source)
-            queues = queues or [Queue() for _ in block]
-            for queue, x in zip(queues, block, strict=True):
-                queue.put(x)
-        yield tuple(queue.take(length) for queue in queues)

@@ -1,4 +1,5 @@
-"""What the time stamps of a record are like: how regular, where samples are missing, where time goes back or stands.
+"""What the time stamps of a record are like: how regular, where samples are missing, where time
+goes back or stands.
 
 Steps are told apart by the period T, the median of the steps that go forward:
 
@@ -20,12 +21,15 @@ from runtime.errors import InputError
 Array = np.ndarray
 
 GAP = 3.0  # periods; a longer step is a gap
+DIGITS = 1e-6  # relative error of stamps as they are written: three periods are no more than that
 LISTED = 3  # places named, of those of one kind
 
 
 @dataclass(frozen=True)
 class Irregular:
-    """A step that is no jitter; sample : number, from 0, of the sample in which it ends.   before, after : s."""
+    """A step that is no jitter; sample : number, from 0, of the sample in which it ends.   before,
+    after : s.
+    """
 
     sample: int
     before: float
@@ -41,8 +45,9 @@ class Irregular:
 class TimeStamps:
     """Regularity of N time stamps.
 
-    period : T, s.   jitter, jitter_rms : largest and rms deviation of the regular steps from T, in periods.
-    gaps, resets, repeats : the other steps, in time.   gap : periods from which a step is a gap.
+    period : T, s.
+    jitter, jitter_rms : largest and rms deviation of the regular steps from T, in periods.
+    gaps, resets, repeats : the other steps, in time.   longest : s, a longer step is a gap.
     """
 
     samples: int
@@ -52,7 +57,7 @@ class TimeStamps:
     gaps: tuple[Irregular, ...]
     resets: tuple[Irregular, ...]
     repeats: tuple[Irregular, ...]
-    gap: float = GAP
+    longest: float
 
     @property
     def regular(self) -> bool:
@@ -62,18 +67,30 @@ class TimeStamps:
     def to_text(self, row: Callable[[int], str] = lambda i: f"sample {i + 1}") -> str:
         """One sentence; row : how the file counts sample i, from 0."""
         parts = [
-            f"{self.samples} samples, median step {self.period:.6g} s, jitter up to {100 * self.jitter:.2g} % ({100 * self.jitter_rms:.2g} % rms)"
+            (
+                f"{self.samples} samples, median step {self.period:.6g} s, jitter up to "
+                f"{100 * self.jitter:.2g} % ({100 * self.jitter_rms:.2g} % rms)"
+            )
         ]
-        for found, kind in ((self.gaps, "gap"), (self.resets, "step back"), (self.repeats, "repeated stamp")):
+        for found, kind in (
+            (self.gaps, "gap"),
+            (self.resets, "step back"),
+            (self.repeats, "repeated stamp"),
+        ):
             if found:
                 largest = sorted(found, key=lambda s: -abs(s.step))[:LISTED]
                 places = ", ".join(f"{row(s.sample)} ({self._size(s)})" for s in largest)
-                parts.append(f"{_count(len(found), kind)}{', the largest' if len(found) > LISTED else ''} at {places}")
+                parts.append(
+                    f"{_count(len(found), kind)}{', the largest' if len(found) > LISTED else ''} "
+                    f"at {places}"
+                )
         return "; ".join(parts)
 
     def _size(self, irregular: Irregular) -> str:
         periods = f", {irregular.step / self.period:.0f} periods" if irregular.step > 0 else ""
-        return f"t = {irregular.before:.6g} s" + (f", {irregular.step:.6g} s{periods}" if irregular.step else "")
+        return f"t = {irregular.before:.6g} s" + (
+            f", {irregular.step:.6g} s{periods}" if irregular.step else ""
+        )
 
 
 def _count(number: int, kind: str) -> str:
@@ -91,19 +108,23 @@ def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStam
     if not len(forward):
         raise InputError("time never goes forward; expected increasing time", file=file)
     period = float(np.median(forward))
-    regular = forward[forward <= gap * period]
+    rounding = (gap + 2) * np.spacing(np.abs(t).max())  # of the step and of the median
+    longest = gap * period * (1 + DIGITS) + rounding
+    regular = forward[forward <= longest]
     off = regular / period - 1
 
     def those(mask: Array) -> tuple[Irregular, ...]:
-        return tuple(Irregular(int(i) + 1, float(t[i]), float(t[i + 1])) for i in np.flatnonzero(mask))
+        return tuple(
+            Irregular(int(i) + 1, float(t[i]), float(t[i + 1])) for i in np.flatnonzero(mask)
+        )
 
     return TimeStamps(
         len(t),
         period,
         float(np.abs(off).max()),
         float(np.sqrt(np.mean(off**2))),
-        those(step > gap * period),
+        those(step > longest),
         those(step < 0),
         those(step == 0),
-        gap,
+        longest,
     )

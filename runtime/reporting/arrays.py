@@ -1,8 +1,11 @@
-"""Results for other programs: an Estimate and a resolution study as named arrays, in NPZ, MAT and CSV.
+"""Results for other programs: an Estimate and a resolution study as named arrays, in NPZ, MAT and
+CSV.
 
-    arrays = estimate_arrays(fit)                   # names as text arrays, X, sigma ..., joints, figures of the fit
+    arrays = estimate_arrays(fit)
+            # names as text arrays, X, sigma ..., joints, figures of the fit
     np.load(BytesIO(npz(arrays)))                   # without pickles
-    load estimate.mat                               # MATLAB, Octave: names as cell arrays, value.ZZ1R beside X
+    load estimate.mat
+            # MATLAB, Octave: names as cell arrays, value.ZZ1R beside X
 
 Same result, same bytes: neither file holds the time at which it was written.
 """
@@ -18,6 +21,7 @@ from typing import Any
 import numpy as np
 import scipy.io
 
+from runtime.errors import encodable
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import json_text
 from runtime.resolution.result import Cestac
@@ -25,8 +29,13 @@ from runtime.resolution.result import Cestac
 Array = np.ndarray
 
 LONGEST_NAME = 63  # characters of a name in MATLAB
-KEYWORDS = frozenset({"break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if", "otherwise",
-                      "parfor", "persistent", "return", "spmd", "switch", "try", "while"})  # fmt: skip
+KEYWORDS = frozenset(
+    {
+        *("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for"),
+        *("function", "global", "if", "otherwise", "parfor", "persistent", "return", "spmd"),
+        *("switch", "try", "while"),
+    }
+)
 HEADER = b"MATLAB 5.0 MAT-file, written by symgen"
 
 
@@ -41,12 +50,35 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
         "relative_sigma": fit.relative_sigma,
         "sigma_corrected": fit.sigma_corrected,
         "covariance": fit.covariance,
-        **{name: np.array(getattr(fit, name)) for name in ("sigma_rho", "cond", "cond_unit", "rank", "residual_norm", "relative_error")},
+        **{
+            name: np.array(getattr(fit, name))
+            for name in (
+                "sigma_rho",
+                "cond",
+                "cond_unit",
+                "rank",
+                "residual_norm",
+                "relative_error",
+            )
+        },
         "joints": _texts(joint.joint for joint in joints),
         "joint_rows": np.array([joint.rows for joint in joints], dtype=np.int64),
-        **{f"joint_{name}": np.array([getattr(j, name) for j in joints]) for name in ("residual_norm", "relative_error", "sigma_rho")},
-        **{name: np.array(text) for name, text in (("method", fit.method), ("status", fit.status), ("message", fit.message))},
-        **{name: np.array(json_text(part)) for name, part in (("settings", fit.settings), ("provenance", fit.provenance))},
+        **{
+            f"joint_{name}": np.array([getattr(j, name) for j in joints])
+            for name in ("residual_norm", "relative_error", "sigma_rho")
+        },
+        **{
+            name: np.array(encodable(text))
+            for name, text in (
+                ("method", fit.method),
+                ("status", fit.status),
+                ("message", fit.message),
+            )
+        },
+        **{
+            name: np.array(json_text(part))
+            for name, part in (("settings", fit.settings), ("provenance", fit.provenance))
+        },
     }
 
 
@@ -64,10 +96,16 @@ def cestac_arrays(result: Cestac) -> dict[str, Array]:
         "labels": _texts(r.level.label for r in levels),
         "delta": np.array([r.level.delta for r in levels]),
         "torque": np.array([r.level.torque for r in levels]),
-        **{name: np.array([getattr(r, name) for r in levels]).reshape(len(levels), b) for name in by_parameter},
+        **{
+            name: np.array([getattr(r, name) for r in levels]).reshape(len(levels), b)
+            for name in by_parameter
+        },
         **{name: np.array([getattr(r, name) for r in levels]) for name in by_level},
         "verdicts": _texts(r.verdict for r in levels),
-        **{name: np.array(json_text(part)) for name, part in (("settings", result.settings), ("provenance", result.provenance))},
+        **{
+            name: np.array(json_text(part))
+            for name, part in (("settings", result.settings), ("provenance", result.provenance))
+        },
     }
 
 
@@ -88,7 +126,9 @@ def npz(arrays: Mapping[str, Array]) -> bytes:
 
 
 def mat(arrays: Mapping[str, Array]) -> bytes:
-    """A MATLAB file (version 5): vectors as columns, texts as cell arrays, and `value`, a structure of X (or X_LS) by name."""
+    """A MATLAB file (version 5): vectors as columns, texts as cell arrays, and `value`, a structure
+    of X (or X_LS) by name.
+    """
     values = arrays.get("X", arrays.get("X_LS", np.empty(0)))
     fields = dict(zip(matlab_names(map(str, arrays["names"])), values.tolist(), strict=True))
     stream = BytesIO()
@@ -99,7 +139,9 @@ def mat(arrays: Mapping[str, Array]) -> bytes:
 
 
 def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Each name as MATLAB allows it: a letter, then letters, digits and _, at most 63, no keyword, none twice."""
+    """Each name as MATLAB allows it: a letter, then letters, digits and _, at most 63, no keyword,
+    none twice.
+    """
     allowed: list[str] = []
     for name in names:
         own = re.sub(r"[^A-Za-z0-9_]", "_", name)
@@ -113,18 +155,60 @@ def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def cestac_csv(result: Cestac) -> str:
-    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho), its increase beside it)."""
+    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho),
+    its increase beside it).
+    """
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(
-        ("level", "delta", "torque", "name", "unit", "X_LS", "mean", "sigma", "relative_sigma", "e", "half_width", "decides", "increase")
+        (
+            "level",
+            "delta",
+            "torque",
+            "name",
+            "unit",
+            "X_LS",
+            "mean",
+            "sigma",
+            "relative_sigma",
+            "e",
+            "half_width",
+            "decides",
+            "increase",
+        )
     )
     for r in result.levels:
         place = (r.level.label, repr(float(r.level.delta)), repr(float(r.level.torque)))
         for i, name in enumerate(result.names):
-            numbers = (repr(float(x[i])) for x in (result.reference.X, r.mean, r.sigma, r.relative_sigma, r.e, r.half_width))
-            writer.writerow((*place, name, result.reference.units.get(name, ""), *numbers, int(name in result.deciding), ""))
-        writer.writerow((*place, "rho", "", "", "", "", "", repr(float(r.e_rho)), "", 1, repr(float(r.increase))))
+            numbers = (
+                repr(float(x[i]))
+                for x in (result.reference.X, r.mean, r.sigma, r.relative_sigma, r.e, r.half_width)
+            )
+            writer.writerow(
+                (
+                    *place,
+                    name,
+                    result.reference.units.get(name, ""),
+                    *numbers,
+                    int(name in result.deciding),
+                    "",
+                )
+            )
+        writer.writerow(
+            (
+                *place,
+                "rho",
+                "",
+                "",
+                "",
+                "",
+                "",
+                repr(float(r.e_rho)),
+                "",
+                1,
+                repr(float(r.increase)),
+            )
+        )
     return stream.getvalue()
 
 

@@ -1,4 +1,6 @@
-"""The checklist of an identification on a page: key numbers under the verdict, the checks one by one."""
+"""The checklist of an identification on a page: key numbers under the verdict, the checks one by
+one.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,13 @@ from runtime.table import Table
 
 def checks_section(checklist: Checklist) -> Section:
     """Question, answer, limit, remedy; what is not good first."""
-    ordered = sorted(checklist.checks, key=lambda check: ("no", "doubtful", "open", "good").index(check.state))
-    rows = [(c.question, state_mark(c.state), c.finding, c.limit, "" if c.state == "good" else c.remedy) for c in ordered]
+    ordered = sorted(
+        checklist.checks, key=lambda check: ("no", "doubtful", "open", "good").index(check.state)
+    )
+    rows = [
+        (c.question, state_mark(c.state), c.finding, c.limit, "" if c.state == "good" else c.remedy)
+        for c in ordered
+    ]
     table = Table(
         "The verdict is the worst of these",
         ("question", "answer", "found", "good within", "what to do"),

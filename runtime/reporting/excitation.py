@@ -28,13 +28,24 @@ def motion_figure(excitation: Excitation) -> Figure:
         ("position, of its range", (q - middle) / half, True),
         ("velocity, of its limit", qd / limits.qd, True),
         ("acceleration, of its limit", qdd / limits.qdd, True),
-        ("torque, of its limit" if limited else "torque, N m or N", tau / limits.tau if limited else tau, limited),
+        (
+            "torque, of its limit" if limited else "torque, N m or N",
+            tau / limits.tau if limited else tau,
+            limited,
+        ),
     )
     with mpl.rc_context(STYLE):
         figure, axes = panels_figure(4, 1, (7.2, 8.4))
         for ax, (title, x, share) in zip(axes, panels, strict=True):
             for j, name in enumerate(joint_labels(excitation.model)):
-                ax.plot(t, x[:, j], linewidth=1.0, linestyle=LINES[j // 7 % 4], color=f"C{j % 7}", label=f"joint {name}")
+                ax.plot(
+                    t,
+                    x[:, j],
+                    linewidth=1.0,
+                    linestyle=LINES[j // 7 % 4],
+                    color=f"C{j % 7}",
+                    label=f"joint {name}",
+                )
             if share:
                 ax.set_ylim(-1.08, 1.08)
                 for bound in (-1, 1):
@@ -48,12 +59,19 @@ def motion_figure(excitation: Excitation) -> Figure:
 
 def excitation_page(excitation: Excitation) -> Page:
     """The report of a search."""
-    shown = "position, velocity, acceleration of every joint as a share of its limits, and torques, over time"
+    shown = (
+        "position, velocity, acceleration of every joint as a share of its limits, and "
+        "torques, over time"
+    )
     return Page(
         title=f"{excitation.model.NAME}: exciting motion",
         verdict=excitation.verdict,
         sections=[
-            Section("Motion", images=[drawn("The motion", motion_figure(excitation), shown, "motion")], tables=[excitation.usage_table()]),
+            Section(
+                "Motion",
+                images=[drawn("The motion", motion_figure(excitation), shown, "motion")],
+                tables=[excitation.usage_table()],
+            ),
             Section("What it will tell", tables=[excitation.sigma_table()]),
             Section("Search", tables=[excitation.starts_table()]),
         ],

@@ -1,4 +1,6 @@
-"""Results as files in a folder: the page, figures, tables, and everything that another program reads."""
+"""Results as files in a folder: the page, figures, tables, and everything that another program
+reads.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,9 @@ from runtime.identification.compare import Ranking
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
+from runtime.limits import LIMIT
+from runtime.loop.result import Simulation
 from runtime.model.generated import joint_labels
-from runtime.motion.result import Simulation
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
 from runtime.reporting.excitation import excitation_page
@@ -33,8 +36,6 @@ from runtime.settings.yaml import yaml_text
 Files: TypeAlias = dict[str, str | bytes]
 
 RECORD = "simulated.csv"
-ONE_BLOCK = 40
-"""Lines of parameters.tex that one page holds; more stand in two blocks."""
 
 
 def report(
@@ -49,9 +50,11 @@ def report(
     ----------
     result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or Fleet
     folder : str, Path or Results
-        Made where it is missing; or one that this process keeps for itself (`runtime.result_files.reserved`).
+        Made where it is missing; or one that this process keeps for itself
+        (`runtime.result_files.reserved`).
     study : Study, optional
-        Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An Identification holds its own.
+        Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An
+        Identification holds its own.
 
     Returns
     -------
@@ -72,7 +75,8 @@ def report(
 def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
     raise TypeError(
-        f"{type(result).__name__} is no result that is written; expected an Identification, Ranking, Cestac, Advice, Simulation, Excitation or Fleet"
+        f"{type(result).__name__} is no result that is written; expected an Identification, "
+        "Ranking, Cestac, Advice, Simulation, Excitation or Fleet"
     )
 
 
@@ -85,21 +89,27 @@ def identification_files(
     verdict: str = "",
     sections: Sequence[Section] = (),
 ) -> Files:
-    """Files of an identification; title, warning, verdict, sections : as for `identification_page`."""
+    """Files of an identification; title, warning, verdict, sections : as for
+    `identification_page`.
+    """
     unit, fit, study = result.torque_unit, result.model_estimate, study_text(result.study, folder)
-    page = identification_page(result, study, title=title, warning=warning, verdict=verdict, sections=sections)
+    page = identification_page(
+        result, study, title=title, warning=warning, verdict=verdict, sections=sections
+    )
     torques = plots.torque_overlay(result.comparison, unit, result.source)
     files: Files = {
         **page_files(page),
         "estimate.json": result.to_json(),
         "parameters.csv": parameters_csv(result),
-        "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= ONE_BLOCK else 2),
+        "parameters.tex": fit.to_latex(blocks=1 if len(fit.names) <= LIMIT.TABLE_LINES else 2),
         **array_files("estimate", estimate_arrays(result.estimate)),
         "study.yaml": study,
         "torques.png": plots.png(torques),
         "torques.svg": plots.svg(torques),
     }
-    files |= {"standard_parameters.csv": standard_csv(result.model_estimate)} if result.feasible else {}
+    files |= (
+        {"standard_parameters.csv": standard_csv(result.model_estimate)} if result.feasible else {}
+    )
     files |= {} if result.advice is None else {"advice.json": result.advice.to_json()}
     return files | ({} if result.resolution is None else resolution_files(result.resolution))
 
@@ -112,20 +122,31 @@ def _(result: Identification, folder: Path, study: Study) -> Files:
 @files_of.register
 def _(result: Ranking, folder: Path, study: Study) -> Files:
     """The comparison, and the files of the best identification."""
-    section = Section("Treatments compared", (result.verdict, *result.missing), tables=(result.table(),))
-    return {"comparison.json": json_text(result.summary()), **identification_files(result.best, folder, sections=(section,))}
+    section = Section(
+        "Treatments compared", (result.verdict, *result.missing), tables=(result.table(),)
+    )
+    return {
+        "comparison.json": json_text(result.summary()),
+        **identification_files(result.best, folder, sections=(section,)),
+    }
 
 
 @files_of.register
 def _(result: Cestac, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
-    return page_files(resolution_page(result, text)) | {"study.yaml": text, **resolution_files(result)}
+    return page_files(resolution_page(result, text)) | {
+        "study.yaml": text,
+        **resolution_files(result),
+    }
 
 
 @files_of.register
 def _(result: Advice, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
-    return page_files(advice_page(result, text)) | {"study.yaml": text, "advice.json": result.to_json()}
+    return page_files(advice_page(result, text)) | {
+        "study.yaml": text,
+        "advice.json": result.to_json(),
+    }
 
 
 @files_of.register
@@ -136,7 +157,7 @@ def _(result: Simulation, folder: Path, study: Study) -> Files:
     return {
         RECORD: result.to_csv(),
         "study.yaml": study_text(replace(study, record=(record,)), folder),
-        "simulation.json": json_text(result.summary()),
+        "simulation.json": result.to_json(),
         "simulation.svg": plots.svg(figure),
         "simulation.png": plots.png(figure),
     }
@@ -146,7 +167,7 @@ def _(result: Simulation, folder: Path, study: Study) -> Files:
 def _(result: Excitation, folder: Path, study: Study) -> Files:
     """The motion as samples and by its coefficients, its figures of merit, the figure."""
     return page_files(excitation_page(result)) | {
-        "excitation.json": json_text(result.summary()),
+        "excitation.json": result.to_json(),
         "trajectory.csv": result.to_csv(),
         "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
     }
@@ -154,7 +175,11 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
 
 @files_of.register
 def _(result: Fleet, folder: Path, study: Study) -> Files:
-    return {"summary.txt": f"{result}\n", "summary.csv": result.to_csv(), "summary.json": result.to_json()}
+    return {
+        "summary.txt": f"{result}\n",
+        "summary.csv": result.to_csv(),
+        "summary.json": result.to_json(),
+    }
 
 
 def page_files(page: Page) -> Files:
@@ -164,5 +189,8 @@ def page_files(page: Page) -> Files:
 
 def resolution_files(result: Cestac) -> Files:
     """The study in every format."""
-    files: Files = {"cestac.json": result.to_json(), "cestac.csv": cestac_csv(result), "cestac.tex": result.to_latex()}
+    files: Files = {
+        "cestac.json": result.to_json(),
+        "cestac.csv": cestac_csv(result),
+    }
     return files | array_files("cestac", cestac_arrays(result))

@@ -1,8 +1,12 @@
-"""A report as one HTML file that opens anywhere: images, style and script inside, no request to anyone. jinja2 only here.
+"""A report as one HTML file that opens anywhere: images, style and script inside, no request to
+anyone. jinja2 only here.
 
-A Page is plain values; the template holds the layout. Everything that comes from a file or a user is escaped, by the template or by `markup.element`;
-numbers for the script are JSON in which <, > and & are escapes. The content security policy allows this script and this style sheet by their
-hashes, hence nothing else. Without scripts, and in print, figures are the images and tables stand as they were written.
+A Page is plain values; the template holds the layout. Everything that comes from a file or a user
+is escaped, by the template or by `markup.element`;
+numbers for the script are JSON in which <, > and & are escapes. The content security policy allows
+this script and this style sheet by their
+hashes, hence nothing else. Without scripts, and in print, figures are the images and tables stand
+as they were written.
 """
 
 from __future__ import annotations
@@ -47,7 +51,13 @@ class Matrix:
     @property
     def cells(self) -> list[list[tuple[str, int]]]:
         """(text, shade from 0 to 4) by row; what rounds to nothing is 0."""
-        return [[(f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x)))) for x in row] for row in self.values]
+        return [
+            [
+                (f"{x:+.2f}".replace("-", "−") if abs(x) >= 0.005 else "0", min(4, int(5 * abs(x))))
+                for x in row
+            ]
+            for row in self.values
+        ]
 
 
 @dataclass(frozen=True)
@@ -136,18 +146,29 @@ class Page:
     @property
     def files(self) -> dict[str, bytes]:
         """Figures that are written beside the page, by file name."""
-        return {name: content for section in self.sections for image in section.images for name, content in image.files.items()}
+        return {
+            name: content
+            for section in self.sections
+            for image in section.images
+            for name, content in image.files.items()
+        }
 
 
 def state_mark(state: State) -> Markup:
     """A state as sign and word, coloured besides."""
-    return element("span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}")
+    return element(
+        "span", f"{SIGNS[state]} {WORDS[state]}" if state else "", class_=f"state {state}"
+    )
 
 
 def render(page: Page) -> str:
     """The HTML text of a page. Same page, same bytes."""
-    images = [image for section in page.sections for image in section.images if image.series is not None]
-    scripted = bool(images) or any(table.sortable or table.kinds for section in page.sections for table in section.tables)
+    images = [
+        image for section in page.sections for image in section.images if image.series is not None
+    ]
+    scripted = bool(images) or any(
+        table.sortable or table.kinds for section in page.sections for table in section.tables
+    )
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS)) if scripted else ""
     allowed = f"script-src '{_hash(script)}'; " if scripted else ""
     return _template().render(
@@ -159,7 +180,10 @@ def render(page: Page) -> str:
         data=embedded([image.series.data for image in images if image.series is not None]),
         number_of={id(image): k for k, image in enumerate(images)},
         id=id,
-        policy=f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; {allowed}base-uri 'none'; form-action 'none'",
+        policy=(
+            f"default-src 'none'; img-src data:; style-src '{_hash(style)}'; {allowed}base-uri "
+            "'none'; form-action 'none'"
+        ),
     )
 
 
@@ -181,6 +205,10 @@ def _resource(name: str) -> str:
 @lru_cache(maxsize=1)
 def _template() -> Template:
     environment = Environment(
-        loader=PackageLoader("runtime.reporting", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("runtime.reporting", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("report.html.jinja")

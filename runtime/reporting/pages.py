@@ -1,4 +1,6 @@
-"""Pages of results: verdict, key numbers, checks, then everything that was asked for, then settings and provenance."""
+"""Pages of results: verdict, key numbers, checks, then everything that was asked for, then settings
+and provenance.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,20 @@ from runtime.resolution.result import Cestac
 from runtime.table import Table
 
 SIMULATED_WARNING = (
-    "Everything here was computed on a SIMULATED record, made from the values of the robot file with encoder steps and torque noise. "
+    "Everything here was computed on a SIMULATED record, made from the values of the robot file "
+    "with encoder steps and torque noise. "
     "No figure in this report was measured."
 )
 
 
 def identification_page(
-    result: Identification, study: str, *, title: str = "", warning: str = "", verdict: str = "", sections: Sequence[Section] = ()
+    result: Identification,
+    study: str,
+    *,
+    title: str = "",
+    warning: str = "",
+    verdict: str = "",
+    sections: Sequence[Section] = (),
 ) -> Page:
     """The page of an identification.
 
@@ -62,19 +71,30 @@ def identification_page(
             settings_section(study),
             provenance_section(result),
         ],
-        footer=f"Made by symgen {result.estimate.provenance['versions']['symgen']}. Equation numbers are those of the chapter that the documentation names.",
+        footer=(
+            f"Made by symgen {result.estimate.provenance['versions']['symgen']}. Equation "
+            "numbers are those of the chapter that the documentation names."
+        ),
     )
 
 
 def supplementary_sections(result: Identification) -> list[Section]:
-    """Physical consistency, load, friction, encoders, as far as they were asked for, and the parts that could not be computed."""
+    """Physical consistency, load, friction, encoders, as far as they were asked for, and the parts
+    that could not be computed.
+    """
     sections = [physical_section(result.model_estimate)] if result.feasible else []
     if result.feasibility is not None:
-        sections.append(Section("Physical consistency", (f"The parameters are {result.feasibility.text}.",)))
+        sections.append(
+            Section("Physical consistency", (f"The parameters are {result.feasibility.text}.",))
+        )
     sections += [] if result.payload is None else [payload_section(result.payload)]
     sections += [friction_section(result.friction, result.torque_unit)] if result.friction else []
     sections += [] if result.advice is None else [advice_section(result.advice)]
-    sections += [] if result.resolution is None else [resolution_section(result.resolution, "Resolution study")]
+    sections += (
+        []
+        if result.resolution is None
+        else [resolution_section(result.resolution, "Resolution study")]
+    )
     return [*sections, *([Section("Not done", result.missing)] if result.missing else [])]
 
 
@@ -91,24 +111,42 @@ def resolution_page(result: Cestac, study: str) -> Page:
 def advice_page(advice: Advice, study: str) -> Page:
     """The page of an advice; study : text of study.yaml."""
     title = f"{_robot(advice)}: encoder resolution advised on {_records(advice)}"
-    return Page(title=title, verdict=advice.verdict, sections=[advice_section(advice), settings_section(study)])
+    return Page(
+        title=title,
+        verdict=advice.verdict,
+        sections=[advice_section(advice), settings_section(study)],
+    )
 
 
 def settings_section(study: str) -> Section:
     """Every setting, folded; study : text of study.yaml."""
-    return Section("Settings", ("Every setting of this study, defaults included; study.yaml beside this file.",), listing=study)
+    return Section(
+        "Settings",
+        ("Every setting of this study, defaults included; study.yaml beside this file.",),
+        listing=study,
+    )
 
 
 def provenance_section(result: Identification) -> Section:
     """Hashes and versions that reproduce the result."""
     provenance = result.estimate.provenance
     rows = [("robot file", provenance["robot"], f"SHA-256 {provenance['robot_sha256']}")]
-    rows += [("record file", name, f"SHA-256 {digest}") for name, digest in provenance["files"].items()]
+    rows += [
+        ("record file", name, f"SHA-256 {digest}") for name, digest in provenance["files"].items()
+    ]
     rows += [("version", name, version) for name, version in provenance["versions"].items()]
     labels = {"target": "kernels", "processor": "processor", "seed": "seed", "note": "note"}
-    rows += [("run", label, str(provenance[key])) for key, label in labels.items() if provenance.get(key) is not None]
+    rows += [
+        ("run", label, str(provenance[key]))
+        for key, label in labels.items()
+        if provenance.get(key) is not None
+    ]
     text = ("The same robot file, record, settings and versions give the same numbers.",)
-    return Section("Provenance", text, tables=[Table("What these numbers come from", ("", "name", "value"), rows, wide=(1, 2))])
+    return Section(
+        "Provenance",
+        text,
+        tables=[Table("What these numbers come from", ("", "name", "value"), rows, wide=(1, 2))],
+    )
 
 
 def _robot(result: Cestac | Advice) -> str:

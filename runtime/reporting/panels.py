@@ -1,6 +1,8 @@
-"""Places of the panels of a figure, from the letters that stand around them: no text is measured, nothing is drawn to find out.
+"""Places of the panels of a figure, from the letters that stand around them: no text is measured,
+nothing is drawn to find out.
 
-matplotlib's own search (constrained layout) draws every tick twice; it took a third of the time of a report.
+matplotlib's own search (constrained layout) draws every tick twice; it took a third of the time of
+a report.
 """
 
 from __future__ import annotations
@@ -14,14 +16,19 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.layout_engine import LayoutEngine
 
 POINT = 1 / 72  # inch
-LETTER, LINE, LABEL = 0.64, 1.3, 1.6  # width of a digit, height of a line, of a label with the space to it: in sizes of the letters
+LETTER, LINE, LABEL = (
+    0.64,
+    1.3,
+    1.6,
+)  # width of a digit, height of a line, of a label with the space to it: in sizes of the letters
 SIZE = 9.0  # points, of titles and labels
 TICK = 0.11  # inch, a tick and the space to its label
 EDGE = 0.06  # inch, to the edge of the figure and between rows
 
 
 class PanelLayout(LayoutEngine):
-    """Panels of one grid, each with room for its ticks, labels and title, below the legend of the figure.
+    """Panels of one grid, each with room for its ticks, labels and title, below the legend of the
+    figure.
 
     right, below : room to the right of every panel, and further room below it, inch.
     """
@@ -36,8 +43,12 @@ class PanelLayout(LayoutEngine):
     def execute(self, fig: Figure) -> None:
         """Place the panels; twice, as the places decide how many ticks there are."""
         panels = [(ax, place) for ax in fig.axes if (place := ax.get_subplotspec()) is not None]
-        for axis in (axis for ax, _ in panels for axis in (ax.xaxis, ax.yaxis) if not axis.get_label_text()):
-            axis.set_label_coords(0.0, 0.0)  # else matplotlib seeks a place for the empty label, among all ticks
+        for axis in (
+            axis for ax, _ in panels for axis in (ax.xaxis, ax.yaxis) if not axis.get_label_text()
+        ):
+            axis.set_label_coords(
+                0.0, 0.0
+            )  # else matplotlib seeks a place for the empty label, among all ticks
         for _ in range(2):
             fig.subplots_adjust(**self._places(fig, panels))
 
@@ -61,15 +72,27 @@ class PanelLayout(LayoutEngine):
         vertical = _spread(
             fig.get_figheight(),
             below[-1] + EDGE + (line if fig.get_supxlabel() else 0.0),
-            above[0] + EDGE + sum(legend.get_window_extent().height / fig.dpi for legend in fig.legends),
+            above[0]
+            + EDGE
+            + sum(legend.get_window_extent().height / fig.dpi for legend in fig.legends),
             max((b + a for b, a in zip(below, above[1:], strict=False)), default=0.0) + EDGE,
             grid.nrows,
         )
-        return dict(zip(("left", "right", "wspace", "bottom", "top", "hspace"), (*horizontal, *vertical), strict=True))
+        return dict(
+            zip(
+                ("left", "right", "wspace", "bottom", "top", "hspace"),
+                (*horizontal, *vertical),
+                strict=True,
+            )
+        )
 
 
-def _spread(whole: float, before: float, after: float, between: float, count: int) -> tuple[float, float, float]:
-    """(first edge, last edge, space over size of a panel) of `count` panels on `whole` inches; edges as shares of them."""
+def _spread(
+    whole: float, before: float, after: float, between: float, count: int
+) -> tuple[float, float, float]:
+    """(first edge, last edge, space over size of a panel) of `count` panels on `whole` inches;
+    edges as shares of them.
+    """
     size = max((whole - before - after - (count - 1) * between) / count, EDGE)
     return before / whole, (before + count * size + (count - 1) * between) / whole, between / size
 

@@ -1,4 +1,6 @@
-"""The parameters of an identification in one table: value, deviations, CAD, what became of each, and what it is made of."""
+"""The parameters of an identification in one table: value, deviations, CAD, what became of each,
+and what it is made of.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,26 @@ from runtime.model.generated import GeneratedModel
 from runtime.reporting.page import Section
 from runtime.table import Table
 
-HEADER = ("parameter", "value", "σ", "%σ", "corrected σ", "unit", "CAD", "difference %", "all fitted", "%σ of it", "role", "made of")
+HEADER = (
+    "parameter",
+    "value",
+    "σ",
+    "%σ",
+    "corrected σ",
+    "unit",
+    "CAD",
+    "difference %",
+    "all fitted",
+    "%σ of it",
+    "role",
+    "made of",
+)
 
 
 def cad_values(model: GeneratedModel) -> dict[str, float]:
-    """Base parameters from the values of the robot file, X = K chi, where those that enter are all given."""
+    """Base parameters from the values of the robot file, X = K chi, where those that enter are all
+    given.
+    """
     values: Mapping[str, float] = getattr(model, "VALUES", None) or {}
     if not values or not hasattr(model, "base_parameters"):
         return {}
@@ -29,7 +46,10 @@ def cad_values(model: GeneratedModel) -> dict[str, float]:
     K = np.asarray(emitted.base_parameters(np.eye(len(names))), dtype=float)
     chi = np.array([values.get(name, np.nan) for name in names])
     entering = [np.flatnonzero(row) for row in K]
-    X = {name: float(row[used] @ chi[used]) for name, row, used in zip(model.BASE_PARAMETERS, K, entering, strict=True)}
+    X = {
+        name: float(row[used] @ chi[used])
+        for name, row, used in zip(model.BASE_PARAMETERS, K, entering, strict=True)
+    }
     return {name: value for name, value in X.items() if math.isfinite(value)}
 
 
@@ -42,7 +62,10 @@ def parameter_section(result: Identification) -> Section:
     for i, name in enumerate(estimate.names):
         made = formulas.get(name, name)
         fold = element(
-            "details", element("summary", "formula", aria_label=f"formula of {name}"), element("span", symbol(name), " = "), formula(made)
+            "details",
+            element("summary", "formula", aria_label=f"formula of {name}"),
+            element("span", symbol(name), " = "),
+            formula(made),
         )
         rows.append(
             (
@@ -68,13 +91,19 @@ def parameter_section(result: Identification) -> Section:
         only="only those that carry the model",
     )
     text = [
-        "The value to use stands first. σ is eq. (10), which takes residuals as independent; filtered ones are not, and the corrected deviation takes "
-        "blocks of time as independent instead: it is the one to trust. %σ is 100 σ/|value|, eq. (11).",
-        "A parameter that was removed has no value to use: what it would do is below the error of the model; numbered in the order of removal. Beside stands "
+        "The value to use stands first. σ is eq. (10), which takes residuals as independent; "
+        "filtered ones are not, and the corrected deviation takes "
+        "blocks of time as independent instead: it is the one to trust. %σ is 100 σ/|value|, eq. "
+        "(11).",
+        "A parameter that was removed has no value to use: what it would do is below the error of "
+        "the model; numbered in the order of removal. Beside stands "
         "the fit of all parameters together. Ratio: of σρ, eq. (9), without it to its first value.",
     ]
     if cad:
-        text.append("CAD: the values of the robot file through the same formulas; difference: of the value to it, in % of it.")
+        text.append(
+            "CAD: the values of the robot file through the same formulas; difference: of the value "
+            "to it, in % of it."
+        )
     return Section("Parameters", text, tables=[table])
 
 
@@ -98,11 +127,18 @@ def _own(fit: Estimate, name: str) -> tuple[str, str, str, str]:
     if name not in fit.names:
         return "", "", "", ""
     i = fit.names.index(name)
-    return number(fit.X[i], ".5g"), number(fit.sigma[i], ".2g"), number(fit.relative_sigma[i], ".2f"), number(fit.sigma_corrected[i], ".2g")
+    return (
+        number(fit.X[i], ".5g"),
+        number(fit.sigma[i], ".2g"),
+        number(fit.relative_sigma[i], ".2f"),
+        number(fit.sigma_corrected[i], ".2g"),
+    )
 
 
 def _compared(cad: float, value: float) -> tuple[str, str]:
     """A CAD value and the difference of an estimate to it, %."""
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = 100 * (np.float64(value) - cad) / abs(np.float64(cad))
-    return ("" if math.isnan(cad) else number(cad)), (f"{difference:+.1f}" if math.isfinite(difference) else "")
+    return ("" if math.isnan(cad) else number(cad)), (
+        f"{difference:+.1f}" if math.isfinite(difference) else ""
+    )

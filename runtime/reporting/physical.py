@@ -1,4 +1,6 @@
-"""What a feasible estimate says beyond its parameters: eigenvalues, standard parameters, and whether least squares alone was feasible."""
+"""What a feasible estimate says beyond its parameters: eigenvalues, standard parameters, and
+whether least squares alone was feasible.
+"""
 
 from __future__ import annotations
 
@@ -32,16 +34,21 @@ def physical_section(fit: Estimate) -> Section:
     )
     text = (
         fit.message,
-        "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, inertia and friction not negative; all base parameters "
-        "are fitted together. The standard parameters give exactly the torques of the base parameters; what the torques leave open is nearest to "
-        "the values of the robot file. A mass that the record does not determine has a dash and its range here: standard_parameters.csv holds one complete "
+        "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, "
+        "inertia and friction not negative; all base parameters "
+        "are fitted together. The standard parameters give exactly the torques of the base "
+        "parameters; what the torques leave open is nearest to "
+        "the values of the robot file. A mass that the record does not determine has a dash and "
+        "its range here: standard_parameters.csv holds one complete "
         "set, to be used as a whole.",
     )
     return Section("Physical consistency", text, tables=[conditions, standard])
 
 
 def _value_cells(value: float, mass: Mapping[str, Any] | None) -> tuple[str, str]:
-    """Value and remark of a standard parameter; of a mass that the record does not determine, a dash and its range."""
+    """Value and remark of a standard parameter; of a mass that the record does not determine, a
+    dash and its range.
+    """
     text = number(value, ".5g")
     return (text, "") if mass is None else (text if mass["determined"] else "-", mass_text(mass))
 
@@ -53,10 +60,18 @@ def mass_text(mass: Mapping[str, Any]) -> str:
 
 
 def standard_csv(fit: Estimate) -> str:
-    """standard_parameters.csv: name, value, note; a note says which masses the record does not determine."""
+    """standard_parameters.csv: name, value, note; a note says which masses the record does not
+    determine.
+    """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(("name", "value", "note"))
-    loose = {name: mass_text(mass) for name, mass in fit.details.get("masses", {}).items() if not mass["determined"]}
-    writer.writerows((name, repr(value), loose.get(name, "")) for name, value in fit.details["standard"].items())
+    loose = {
+        name: mass_text(mass)
+        for name, mass in fit.details.get("masses", {}).items()
+        if not mass["determined"]
+    }
+    writer.writerows(
+        (name, repr(value), loose.get(name, "")) for name, value in fit.details["standard"].items()
+    )
     return stream.getvalue()

@@ -1,8 +1,10 @@
-"""Whether record, study and robot file suit each other, on a page: what would explain the record better, delays, values of the robot file."""
+"""Whether record, study and robot file suit each other, on a page: what would explain the record
+better, delays, values of the robot file.
+"""
 
 from __future__ import annotations
 
-from runtime.identification.plausibility.plausibility import Plausibility
+from runtime.checks.plausibility import Plausibility
 from runtime.markup import number
 from runtime.reporting.page import Section
 from runtime.table import Table
@@ -15,18 +17,42 @@ def plausibility_section(found: Plausibility) -> Section:
     if found.gravity is not None:
         text.append(f"Gravity fitted freely: {found.gravity.text}.")
     if found.delay is not None:
-        rows = zip(found.delay.joints, found.delay.shift, found.delay.sigma, found.delay.before, found.delay.after, strict=True)
-        cells = [(j, number(1e3 * d, ".2f"), number(1e3 * s, ".2f"), number(a, ".2f"), number(b, ".2f")) for j, d, s, a, b in rows]
+        rows = zip(
+            found.delay.joints,
+            found.delay.shift,
+            found.delay.sigma,
+            found.delay.before,
+            found.delay.after,
+            strict=True,
+        )
+        cells = [
+            (j, number(1e3 * d, ".2f"), number(1e3 * s, ".2f"), number(a, ".2f"), number(b, ".2f"))
+            for j, d, s, a, b in rows
+        ]
         header = ("joint", "torque late by, ms", "deviation, ms", "error without, %", "with, %")
         tables.append(Table("Delay of the torques against the positions", header, cells))
-    if found.known is not None:
-        values = zip(found.known.joints, found.known.gravity, found.known.inertia, found.known.error, strict=True)
-        ratios = [(j, number(g, ".2f"), number(a, ".2f"), number(e, ".1f")) for j, g, a, e in values]
+    if found.robot_values is not None:
+        values = zip(
+            found.robot_values.joints,
+            found.robot_values.gravity,
+            found.robot_values.inertia,
+            found.robot_values.error,
+            strict=True,
+        )
+        ratios = [
+            (j, number(g, ".2f"), number(a, ".2f"), number(e, ".1f")) for j, g, a, e in values
+        ]
         header_of_values = (
             "joint",
             "gravity torque, measured over computed",
             "inertia torque, measured over computed",
             "error of the values, %",
         )
-        tables.append(Table("Values of the robot file against the record, friction fitted", header_of_values, ratios))
+        tables.append(
+            Table(
+                "Values of the robot file against the record, friction fitted",
+                header_of_values,
+                ratios,
+            )
+        )
     return Section("Record, study and robot file", tuple(text), tables=tables)

@@ -1,4 +1,6 @@
-"""Numbers of a figure for the script of a page: extremes kept, the rest left out, float32 in base64."""
+"""Numbers of a figure for the script of a page: extremes kept, the rest left out, float32 in
+base64.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from runtime.identification.validation import JointComparison
+from runtime.limits import LIMIT
 
 Array = np.ndarray
-
-MOST = 6000
-"""Instants of one figure; 72 kB as float32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,32 +45,48 @@ class Series:
         """For JSON. Times are counted from `start`, s; nan breaks a line."""
         start = float(np.nanmin(self.t)) if len(self.t) else 0.0
         arrays = {"t": self.t - start, "first": self.first, "second": self.second}
-        return {"start": start, "labels": self.labels, "unit": self.unit, **{name: _base64(x) for name, x in arrays.items()}}
+        return {
+            "start": start,
+            "labels": self.labels,
+            "unit": self.unit,
+            **{name: _base64(x) for name, x in arrays.items()},
+        }
 
 
-def series(joint: JointComparison, unit: str, source: str, most: int = MOST) -> Series:
+def series(
+    joint: JointComparison, unit: str, source: str, most: int = LIMIT.INSTANTS_SHOWN
+) -> Series:
     """Measured and predicted torque of one joint, broken where rows are missing."""
     kept = extremes(np.array([joint.measured, joint.predicted, joint.error]), most)
     piece = np.searchsorted(gaps(joint.t), kept, side="right")
     holes = np.flatnonzero(np.diff(piece)) + 1
-    t, first, second = (np.insert(np.asarray(x, dtype=float)[kept], holes, np.nan) for x in (joint.t, joint.measured, joint.predicted))
+    t, first, second = (
+        np.insert(np.asarray(x, dtype=float)[kept], holes, np.nan)
+        for x in (joint.t, joint.measured, joint.predicted)
+    )
     return Series(t, first, second, (source, "predicted"), unit, len(joint.t))
 
 
 def extremes(values: Array, most: int) -> Array:
-    """Numbers of at most `most` columns of `values`, shape (m, N): first, last, and the smallest and largest of every row in stretches of equal length."""
+    """Numbers of at most `most` columns of `values`, shape (m, N): first, last, and the smallest
+    and largest of every row in stretches of equal length.
+    """
     m, N = values.shape
     if most >= N:
         return np.arange(N)
     length = -(-N // max((most - 2) // (2 * m), 1))
     count = -(-N // length)
-    filled = np.concatenate([values, np.repeat(values[:, -1:], count * length - N, axis=1)], axis=1).reshape(m, count, length)
+    filled = np.concatenate(
+        [values, np.repeat(values[:, -1:], count * length - N, axis=1)], axis=1
+    ).reshape(m, count, length)
     extreme = np.stack([filled.argmin(axis=2), filled.argmax(axis=2)]) + length * np.arange(count)
     return np.unique(np.concatenate([[0, N - 1], extreme.ravel().clip(max=N - 1)]))
 
 
 def gaps(t: Array) -> Array:
-    """Numbers of the rows before which a line breaks: rows left out, or time going back to another record."""
+    """Numbers of the rows before which a line breaks: rows left out, or time going back to another
+    record.
+    """
     steps = np.diff(t)
     usual = float(np.median(np.abs(steps))) if len(steps) else 0.0
     return np.flatnonzero((steps <= 0) | (steps > 5 * usual)) + 1

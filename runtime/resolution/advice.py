@@ -1,4 +1,6 @@
-"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in words."""
+"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in
+words.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +12,17 @@ import numpy as np
 from scipy.special import stdtrit
 
 from runtime.estimators.estimate import Estimate
-from runtime.json_documents import json_text
-from runtime.resolution.result import BIASED, CONFIDENCE, DECIDING, NEGLIGIBLE, deciding_names
+from runtime.json_documents import Result, json_text
+from runtime.limits import LIMIT
+from runtime.resolution.result import deciding_names
 from runtime.resolution.runs import Level
 from runtime.table import Table
 
 Array = np.ndarray
 
-LIMITS = (NEGLIGIBLE, BIASED)  # %e at which a step is sought
+LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
 ALL = "all"  # Label of the advice on all encoders alike
 NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
-AGREED = 0.3  # Relative difference of predicted and sampled %e that passes as agreement: 15 % in Delta, as %e grows with its square
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +48,14 @@ class Sampled:
 def sampled(delta: float, X: Array, reference: Array) -> Sampled:
     """Eqs. (18), (21) of the estimates X, shape (runs, b)."""
     N = len(X)
-    half = float(stdtrit(N - 1, (1 + CONFIDENCE) / 2)) / np.sqrt(N)
+    half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return Sampled(delta, N, 100 * (X.mean(axis=0) / reference - 1), 100 * half * X.std(axis=0, ddof=1) / np.abs(reference))
+        return Sampled(
+            delta,
+            N,
+            100 * (X.mean(axis=0) / reference - 1),
+            100 * half * X.std(axis=0, ddof=1) / np.abs(reference),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +84,14 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in Delta; True without runs."""
-        return self.sampled is None or abs(self.error - self.percent) <= self.half_width + AGREED * self.percent
+        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in
+        Delta; True without runs.
+        """
+        return (
+            self.sampled is None
+            or abs(self.error - self.percent)
+            <= self.half_width + LIMIT.PREDICTION_AGREES * self.percent
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +122,9 @@ class EncoderAdvice:
     unit: str = "rad"
 
     def reached(self, percent: float) -> Array:
-        """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan where it does not within the curve."""
+        """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan
+        where it does not within the curve.
+        """
         return np.array([crossing(self.delta, np.abs(e), percent) for e in self.change.T])
 
 
@@ -135,7 +150,7 @@ class ReaderAdvice:
 
 
 @dataclass(frozen=True, eq=False)
-class Advice:
+class Advice(Result):
     """Advice on the encoders of one robot, and on its torque sensors.
 
     Attributes
@@ -149,7 +164,8 @@ class Advice:
     asked : tuple of float, rad or m
         Further steps, of all encoders.
     steps : ndarray, shape (len(asked), b), %
-        Change predicted there by the chapter's law; under law phase, of real encoders read as the study reads them, nan where the records do not tell.
+        Change predicted there by the chapter's law; under law phase, of real encoders read as the
+        study reads them, nan where the records do not tell.
     torque_sigma : ndarray, shape (b,)
         Deviation of the parameters per N m (N) of deviation of the motor torques.
     real : tuple of ReaderAdvice
@@ -176,16 +192,22 @@ class Advice:
 
     @property
     def unit(self) -> str:
-        """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are coarse."""
+        """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are
+        coarse.
+        """
         return self.encoders[0].unit
 
     @property
     def place(self) -> str:
         """Where the encoders stand."""
-        return {"joint": "at the joints", "motor": "at the motors"}[self.settings.get("cestac", {}).get("side", "joint")]
+        return {"joint": "at the joints", "motor": "at the motors"}[
+            self.settings.get("cestac", {}).get("side", "joint")
+        ]
 
     def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
-        """The parameter that matters most at the step asked for, and its %e. steps : changes; default: those of the advice."""
+        """The parameter that matters most at the step asked for, and its %e. steps : changes;
+        default: those of the advice.
+        """
         decisive = [self.names.index(name) for name in self.deciding]
         e = np.abs((self.steps if steps is None else steps)[step])[decisive]
         k = int(np.argmax(e)) if len(e) else 0
@@ -193,10 +215,15 @@ class Advice:
 
     @property
     def negative(self) -> bool:
-        """Whether least squares would be biased at one of the steps asked for, or the runs contradict the prediction."""
-        several = (*self.encoders, *(encoder for reader in self.real for encoder in reader.encoders))
+        """Whether least squares would be biased at one of the steps asked for, or the runs
+        contradict the prediction.
+        """
+        several = (
+            *self.encoders,
+            *(encoder for reader in self.real for encoder in reader.encoders),
+        )
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
-        return contradicted or any(self.worst(k)[1] > BIASED for k in range(len(self.asked)))
+        return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
@@ -204,7 +231,10 @@ class Advice:
         both = bool(self.real) and self.encoders is not self.real[0].encoders
         parts = [] if self.real and not both else self._answers(self.encoders)
         for reader in self.real:
-            parts += [f"Real encoders read as {NAMES[reader.reader]}:", *self._answers(reader.encoders)]
+            parts += [
+                f"Real encoders read as {NAMES[reader.reader]}:",
+                *self._answers(reader.encoders),
+            ]
         parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
         return " ".join(parts)
 
@@ -212,48 +242,81 @@ class Advice:
         """Sentences on some encoders, all together first."""
         if not self.deciding:
             return [
-                f"no parameter has a %sigma of at most {DECIDING:g} %, so no step can be judged; more motion, or fewer columns, tell more."
+                (
+                    f"no parameter has a %sigma of at most {LIMIT.DECIDING:g} %, so no step can be "
+                    "judged; "
+                    "more motion, or fewer columns, tell more."
+                )
             ]
         first, single = encoders[0], encoders[1:]
-        parts = [self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits]
+        parts = [
+            self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits
+        ]
         for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():
-            known = [advice for advice in single if advice.unit == unit and not np.isnan(advice.limits[0].delta)]
+            known = [
+                advice
+                for advice in single
+                if advice.unit == unit and not np.isnan(advice.limits[0].delta)
+            ]
             if not known:
                 continue
             hardest = min(known, key=lambda advice: advice.limits[0].delta)
             limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
             parts.append(
-                f"Of single encoders{kind}, that of joint {hardest.label} asks most: {step_text(limit.delta, unit)} for "
+                f"Of single encoders{kind}, that of joint {hardest.label} asks most: "
+                f"{step_text(limit.delta, unit)} for "
                 f"{limit.percent:g} % ({limit.parameter or 'no parameter'})."
             )
-        doubted = [f"{advice.label} at {limit.percent:g} %" for advice in encoders for limit in advice.limits if not limit.agrees]
+        doubted = [
+            f"{advice.label} at {limit.percent:g} %"
+            for advice in encoders
+            for limit in advice.limits
+            if not limit.agrees
+        ]
         if doubted:
-            parts.append(f"Sampling does not confirm the prediction for: {', '.join(doubted)}; trust the runs.")
+            parts.append(
+                f"Sampling does not confirm the prediction for: {', '.join(doubted)}; trust the "
+                "runs."
+            )
         return parts
 
     def _sentence(self, limit: Limit, who: str, unit: str) -> str:
         if np.isnan(limit.delta) and not limit.parameter:
             return f"{who}, no step could be judged on this record."
         if np.isnan(limit.delta):
-            return f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the finest step that was tried."
+            return (
+                f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the "
+                "finest step that was tried."
+            )
         if not np.isfinite(limit.delta):
             return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
-        text = f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = {step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
+        text = (
+            f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = "
+            f"{step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
+        )
         if limit.sampled is not None:
-            text += f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- {limit.half_width:.2f} %"
+            text += (
+                f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- "
+                f"{limit.half_width:.2f} %"
+            )
         return text + ")."
-
-    def __str__(self) -> str:
-        return self.to_table()
 
     def to_table(self) -> str:
         """Steps by encoder, then by parameter, then what was assumed."""
         tables = [table.to_text() for table in self.tables()]
         notes = [note for reader in self.real for note in reader.notes]
-        return "\n\n".join([*tables, *self.asked_lines(), "\n".join(f"- {text}" for text in (*self.assumptions, *notes))])
+        return "\n\n".join(
+            [
+                *tables,
+                *self.asked_lines(),
+                "\n".join(f"- {text}" for text in (*self.assumptions, *notes)),
+            ]
+        )
 
     def tables(self) -> list[Table]:
-        """Steps by encoder, by the chapter's law and of real encoders by both readers, then by parameter."""
+        """Steps by encoder, by the chapter's law and of real encoders by both readers, then by
+        parameter.
+        """
         if not self.real:
             return [self.step_table(), self.parameter_table()]
         if self.encoders is self.real[0].encoders:
@@ -265,47 +328,88 @@ class Advice:
         headers, rows = ["encoder"], []
         for reader in self.real:
             for limit in reader.encoders[0].limits:
-                headers += [f"{NAMES[reader.reader]}, {limit.percent:g} %", "first parameter", "sampled %e"]
+                headers += [
+                    f"{NAMES[reader.reader]}, {limit.percent:g} %",
+                    "first parameter",
+                    "sampled %e",
+                ]
         for k, advice in enumerate(self.real[0].encoders):
             cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
             for reader in self.real:
                 for limit in reader.encoders[k].limits:
-                    sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+                    sampled = (
+                        "-"
+                        if limit.sampled is None
+                        else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+                    )
                     step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
                     turn = counts(limit.delta) if advice.unit == "rad" else ""
                     cells += [turn or step, limit.parameter or "-", sampled]
             rows.append(tuple(cells))
-        caption = "Real encoders, counts of random phase: coarsest step of each, the others exact; none: not even the finest step tried"
+        caption = (
+            "Real encoders, counts of random phase: coarsest step of each, the others "
+            "exact; "
+            "none: not even the finest step tried"
+        )
         return Table(caption, headers, rows)
 
     def step_table(self) -> Table:
         """Coarsest steps by encoder."""
         limits = self.encoders[0].limits
-        headers = (h for limit in limits for h in (f"{limit.percent:g} %: Delta, {self.unit}", "", "first parameter", "sampled %e"))
+        headers = (
+            h
+            for limit in limits
+            for h in (
+                f"{limit.percent:g} %: Delta, {self.unit}",
+                "",
+                "first parameter",
+                "sampled %e",
+            )
+        )
         rows = []
         for advice in self.encoders:
             cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
             for limit in advice.limits:
-                sampled = "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
-                cells += [f"{limit.delta:.3g}", counts(limit.delta) if advice.unit == "rad" else "", limit.parameter or "-", sampled]
+                sampled = (
+                    "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
+                )
+                cells += [
+                    f"{limit.delta:.3g}",
+                    counts(limit.delta) if advice.unit == "rad" else "",
+                    limit.parameter or "-",
+                    sampled,
+                ]
             rows.append(tuple(cells))
-        caption = "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with the Student interval of the runs"
+        caption = (
+            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter "
+            "with the Student interval of the runs"
+        )
         return Table(caption, ("encoder", *headers), rows)
 
     def parameter_table(self) -> Table:
-        """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of torque noise in %."""
+        """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of
+        torque noise in %.
+        """
         first = self.encoders[0]
         reached = [first.reached(limit.percent) for limit in first.limits]
-        header = ("parameter", "%sigma", *(f"Delta at {limit.percent:g} %" for limit in first.limits), "% per unit torque deviation")
+        header = (
+            "parameter",
+            "%sigma",
+            *(f"Delta at {limit.percent:g} %" for limit in first.limits),
+            "% per unit torque deviation",
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             added = 100 * self.torque_sigma / np.abs(self.reference.X)
         rows = []
         for i, name in enumerate(self.names):
             mark = "" if name in self.deciding else " *"
             steps = (f"{step[i]:.3g}" if np.isfinite(step[i]) else "-" for step in reached)
-            rows.append((name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}"))
+            rows.append(
+                (name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}")
+            )
         caption = (
-            "All encoders alike, by parameter; * does not decide; last column: %sigma added by white motor torque noise of deviation 1"
+            "All encoders alike, by parameter; * does not decide; last column: %sigma added "
+            "by white motor torque noise of deviation 1"
         )
         return Table(caption, header, rows)
 
@@ -318,7 +422,11 @@ class Advice:
         for k, delta in enumerate(self.asked):
             for way, steps in ways:
                 name, e = self.worst(k, steps)
-                change = "not judged on this record" if np.isnan(e) else f"largest predicted change {e:.2f} % ({name})"
+                change = (
+                    "not judged on this record"
+                    if np.isnan(e)
+                    else f"largest predicted change {e:.2f} % ({name})"
+                )
                 lines.append(f"Delta = {Level(delta).label}{way}: {change}")
         return ["\n".join(lines)] if lines else []
 
@@ -331,10 +439,13 @@ class Advice:
                 "X_LS": self.reference.X,
                 "relative_sigma_LS": self.reference.relative_sigma,
                 "deciding": self.deciding,
-                "deciding_relative_sigma": DECIDING,
+                "deciding_relative_sigma": LIMIT.DECIDING,
                 "verdict": self.verdict,
                 "encoders": [_summary(advice) for advice in self.encoders],
-                "real": {reader.reader: [_summary(advice) for advice in reader.encoders] for reader in self.real},
+                "real": {
+                    reader.reader: [_summary(advice) for advice in reader.encoders]
+                    for reader in self.real
+                },
                 "asked": [
                     {"delta": delta, "change": change, "worst": self.worst(k)}
                     for k, (delta, change) in enumerate(zip(self.asked, self.steps, strict=True))
@@ -359,25 +470,38 @@ def _summary(advice: EncoderAdvice) -> dict[str, Any]:
     }
 
 
-def confirmed(advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]) -> EncoderAdvice:
-    """The advice with runs at the steps of its limits; of all encoders, also between and above them."""
+def confirmed(
+    advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
+) -> EncoderAdvice:
+    """The advice with runs at the steps of its limits; of all encoders, also between and above
+    them.
+    """
     made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
     limits = []
     for limit in advice.limits:
         if limit.delta in made:
             point, i = made[limit.delta], reference.names.index(limit.parameter)
-            limit = replace(limit, sampled=point, error=abs(float(point.change[i])), half_width=float(point.half_width[i]))
+            limit = replace(
+                limit,
+                sampled=point,
+                error=abs(float(point.change[i])),
+                half_width=float(point.half_width[i]),
+            )
         limits.append(limit)
     if advice.label == ALL and made:
         low, high = min(made), max(made)
         for delta in (np.sqrt(low * high), 2 * high, 5 * high):
             if delta <= advice.delta[-1]:
                 made[float(delta)] = level(float(delta))
-    return replace(advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made)))
+    return replace(
+        advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made))
+    )
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:
-    """First step at which e reaches `percent`, straight lines between the points of logarithmic axes; nan where it does not."""
+    """First step at which e reaches `percent`, straight lines between the points of logarithmic
+    axes; nan where it does not.
+    """
     above = np.flatnonzero(e >= percent)
     if not len(above) or (above[0] == 0 and e[0] > percent):
         return float("nan")

@@ -1,19 +1,27 @@
-"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and below 5 %, predicted without sampling.
+"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and
+below 5 %, predicted without sampling.
 
-CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That mean is known to first order in the variance v
-of the rounding (errors in variables), from the expected normal equations of `runtime.observation.position_errors`:
+CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That
+mean is known to first order in the variance v
+of the rounding (errors in variables), from the expected normal equations of
+`runtime.rows.position_errors`:
 
     X(v) = E[W_c' W_c]^-1 E[W_c' Y]                %e (21) = 100 |1 - X(v) / X(0)|
 
     v = Delta^2 (two-point, gaussian), Delta^2 / 3 (uniform, quantise)
 
-so that one set of sensitivities gives the curve of every parameter, for all encoders together and for one at a time with the others exact. The step at
-which the first parameter that matters reaches a limit is confirmed by runs of CESTAC, with Student intervals. Parameters matter when their
-%sigma (11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
+so that one set of sensitivities gives the curve of every parameter, for all encoders together and
+for one at a time with the others exact. The step at
+which the first parameter that matters reaches a limit is confirmed by runs of CESTAC, with Student
+intervals. Parameters matter when their
+%sigma (11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not
+decide.
 
-Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white noise of the motors
+Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white
+noise of the motors
 
-    C = A^-1 (sum_ij Omega_ij W_i'W_j) A^-1,  A = W'W,  Omega = c R'R,  c = G(0)^2 / n_d of the decimation (the noise that slow columns see)
+    C = A^-1 (sum_ij Omega_ij W_i'W_j) A^-1,  A = W'W,  Omega = c R'R,  c = G(0)^2 / n_d of the
+    decimation (the noise that slow columns see)
 
 Weights of the joints (method wls) are those of the unperturbed fit.
 """
@@ -32,36 +40,47 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
-from runtime.estimators.methods import linear_system
+from runtime.estimators.method import linear_system
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, drives_of, joint_units
-from runtime.observation.observation import stack
-from runtime.observation.position_errors import NormalEquations, Perturbation, perturbation
+from runtime.model.generated import GeneratedModel, joint_units
 from runtime.records.provenance import origin
 from runtime.records.record import Record
-from runtime.resolution.advice import ALL, LIMITS, Advice, EncoderAdvice, Limit, ReaderAdvice, Sampled, confirmed, crossing, sampled
+from runtime.resolution.advice import (
+    ALL,
+    LIMITS,
+    Advice,
+    EncoderAdvice,
+    Limit,
+    ReaderAdvice,
+    Sampled,
+    confirmed,
+    crossing,
+    sampled,
+)
 from runtime.resolution.c.workspace import usable
-from runtime.resolution.perturbed import Task, prepared, study_columns
-from runtime.resolution.readers import LINES, READERS, real_encoders
-from runtime.resolution.readers import RATIO as STEPS
-from runtime.resolution.result import DECIDING, deciding_names
+from runtime.resolution.perturbed import Task, prepared_record, study_columns
+from runtime.resolution.readers import READERS, real_encoders
+from runtime.resolution.result import deciding_names
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.run import forget, moved_estimate
+from runtime.rows.observation import stack
+from runtime.rows.position_errors import NormalEquations, Perturbation, perturbation
+from runtime.rows.prepared import Prepared, common_drives, prepared
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]
 
-RATIO = 1.3  # Ratio of neighbouring steps of a curve
-WALK = 40  # Steps tried below and above the first guess
-BELOW, ABOVE = 3, 9  # Steps of the curve of all encoders below the first limit and above the last: factors of 2 and 10
+FIRST_ORDER = "first order in the variance of the errors, motion slow beside the filters; "
 
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
     """X as a function of the step, for the encoders of several records of one robot.
 
-    parts : the records.   weights : ndarray, shape (n,), 1/s_j.   share : variance of the rounding over Delta^2.
+    parts : the records.   weights : ndarray, shape (n,), 1/s_j.
+            share : variance of the rounding over Delta^2.
     """
 
     parts: tuple[Perturbation, ...]
@@ -93,7 +112,7 @@ class Predictor:
 
 def advise(
     model: GeneratedModel,
-    records: Record | Sequence[Record],
+    records: Record | Prepared | Sequence[Record | Prepared],
     study: Study | None = None,
     *,
     columns: Sequence[str] | None = None,
@@ -106,15 +125,17 @@ def advise(
     provenance: Mapping[str, Any] | None = None,
     real: bool | None = None,
 ) -> Advice:
-    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted; side, rounding, columns and runs by study.cestac.
+    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted;
+    side, rounding, columns and runs by study.cestac.
 
-    Real encoders, law phase, are judged twice: read as positions and read as counts (`runtime.resolution.readers`).
+    Real encoders, law phase, are judged twice: read as positions and read as counts
+    (`runtime.resolution.readers`).
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted module, or the same in C (`runtime.model.compiled`).
-    records : Record or sequence of Record
+    records : Record, Prepared, or a sequence of them
     study : Study, optional
         Default: Study().
     columns : sequence of str, optional
@@ -139,24 +160,34 @@ def advise(
     Raises
     ------
     SettingsError
-        A method that is not linear least squares, or a median filter, which no prediction goes through.
+        A method that is not linear least squares, or a median filter, which no prediction goes
+        through.
     """
     study, model = study or Study(), usable(model)
     study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
-    records = (records,) if isinstance(records, Record) else tuple(records)
+    several = records if isinstance(records, Sequence) else (records,)
+    as_measured = [prepared(model, record, study) for record in several]
+    whole = [own.record for own in as_measured]
     _refuse(study)
-    law, drives = study.cestac.rounding, drives or drives_of(model)
-    names = study_columns(model, records, study, columns, constants)
-    parts = tuple(perturbation(model, record, study, names, drives=drives, constants=constants) for record in records)
+    law, drives = study.cestac.rounding, drives or common_drives(model, as_measured)
+    names = study_columns(model, as_measured, study, columns, constants)
+    parts = tuple(
+        perturbation(model, own, study, names, drives=drives, constants=constants)
+        for own in as_measured
+    )
     settings = replace(study.estimate, columns="all")
-    measured = stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
+    measured = (
+        stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
+    )
     system = linear_system(measured, settings)
-    reference = assemble(system, system.solve(), model=model, provenance={**origin(records), **(provenance or {})})
+    reference = assemble(
+        system, system.solve(), model=model, provenance={**origin(whole), **(provenance or {})}
+    )
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
     task = Task(
-        tuple(prepared(model, record, study, drives) for record in records),
+        tuple(prepared_record(own, study, drives) for own in as_measured),
         model,
         names,
         settings,
@@ -165,7 +196,9 @@ def advise(
         drives,
         dict(constants or {}),
     )
-    units = joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)  # motors turn
+    units = (
+        joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)
+    )  # motors turn
     selections = _selections(model, encoders)
     total = len(selections) * ((law != "phase") + len(READERS) * (real or law == "phase"))
     done = count(1)
@@ -176,7 +209,9 @@ def advise(
 
     by_reader: tuple[ReaderAdvice, ...] = ()
     if real or law == "phase":
-        rate = np.abs(Predictor(parts, predictor.weights, VARIANCE["phase"]).rate(every)[decisive]).max(initial=0.0)
+        rate = np.abs(
+            Predictor(parts, predictor.weights, VARIANCE["phase"]).rate(every)[decisive]
+        ).max(initial=0.0)
         start = float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
         given: dict[str, Any] = {
             "drives": drives,
@@ -185,19 +220,25 @@ def advise(
             "progress": advance,
             "asked": asked,
         }
-        by_reader = real_encoders(model, records, study, reference, selections, units, start, **given)
+        by_reader = real_encoders(
+            model, as_measured, study, reference, selections, units, start, **given
+        )
     advices = []
     try:
         for label, own in selections.items() if law != "phase" else ():
             unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
             advice = _advice(predictor, label, own, names, decisive, unit)
             if confirm:
-                advice = confirmed(advice, reference, partial(sampled_level, task, parts, reference, own))
+                advice = confirmed(
+                    advice, reference, partial(sampled_level, task, parts, reference, own)
+                )
             advices.append(advice)
             advance()
     finally:
         forget()
-    steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(len(asked), len(names))
+    steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(
+        len(asked), len(names)
+    )
     if law == "phase":
         steps = next(reader.steps for reader in by_reader if reader.reader == study.signals.reader)
     return Advice(
@@ -208,12 +249,12 @@ def advise(
         asked=tuple(asked),
         steps=steps,
         torque_sigma=torque_sigma(predictor, drives),
-        assumptions=assumptions(study, records, parts, reference, real=bool(by_reader)),
+        assumptions=assumptions(study, whole, parts, reference, real=bool(by_reader)),
         settings={
             **measured.settings,
             "estimate": to_mapping(study.estimate),
             "cestac": to_mapping(study.cestac),
-            "rate": [record.rate for record in records],
+            "rate": [record.rate for record in whole],
         },
         provenance={**reference.provenance, "seed": study.cestac.seed},
     )
@@ -226,60 +267,99 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
     labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
     unknown = [label for label in labels if label not in every]
     if unknown or not labels:
-        raise InputError(f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}")
+        raise InputError(
+            f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}"
+        )
     return {label: every[label] for label in labels}
 
 
 def _advice(
-    predictor: Predictor, label: str, encoders: Sequence[int], names: Sequence[str], decisive: Sequence[int], unit: str
+    predictor: Predictor,
+    label: str,
+    encoders: Sequence[int],
+    names: Sequence[str],
+    decisive: Sequence[int],
+    unit: str,
 ) -> EncoderAdvice:
-    """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond them."""
+    """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond
+    them.
+    """
     rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
     if not (np.isfinite(rate) and rate > 0):
         return EncoderAdvice(
-            label, tuple(Limit(percent, np.inf, "") for percent in LIMITS), np.empty(0), np.empty((0, len(names))), unit=unit
+            label,
+            tuple(Limit(percent, np.inf, "") for percent in LIMITS),
+            np.empty(0),
+            np.empty((0, len(names))),
+            unit=unit,
         )
     start = float(np.sqrt(LIMITS[0] / rate))
     known: dict[int, Array] = {}
 
     def worst(k: int) -> float:
         if k not in known:
-            known[k] = predictor.change(start * RATIO**k, encoders)
+            known[k] = predictor.change(start * LIMIT.CURVE_RATIO**k, encoders)
         return float(np.abs(known[k][decisive]).max())
 
-    low = next((k for k in range(0, -WALK, -1) if worst(k) < LIMITS[0]), -WALK)
-    high = next((k for k in range(low, WALK) if worst(k) > LIMITS[-1]), WALK - 1)
+    low = next(
+        (k for k in range(0, -LIMIT.CURVE_STEPS, -1) if worst(k) < LIMITS[0]), -LIMIT.CURVE_STEPS
+    )
+    high = next(
+        (k for k in range(low, LIMIT.CURVE_STEPS) if worst(k) > LIMITS[-1]), LIMIT.CURVE_STEPS - 1
+    )
     if label == ALL:
-        low, high = low - BELOW, high + ABOVE
+        low, high = low - LIMIT.CURVE_BELOW, high + LIMIT.CURVE_ABOVE
     for k in range(low, high + 1):
         worst(k)
     order = sorted(known)
-    delta, change = start * RATIO ** np.array(order, dtype=float), np.array([known[k] for k in order])
+    delta, change = (
+        start * LIMIT.CURVE_RATIO ** np.array(order, dtype=float),
+        np.array([known[k] for k in order]),
+    )
     limits = []
     for percent in LIMITS:
         steps = [crossing(delta, np.abs(change[:, i]), percent) for i in decisive]
         first = int(np.nanargmin(steps)) if np.isfinite(steps).any() else None
-        limits.append(Limit(percent, np.inf, "") if first is None else Limit(percent, steps[first], names[decisive[first]]))
+        limits.append(
+            Limit(percent, np.inf, "")
+            if first is None
+            else Limit(percent, steps[first], names[decisive[first]])
+        )
     return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
 
 
 def sampled_level(
-    task: Task, parts: Sequence[Perturbation], reference: Estimate, encoders: Sequence[int], delta: float, runs: int | None = None
+    task: Task,
+    parts: Sequence[Perturbation],
+    reference: Estimate,
+    encoders: Sequence[int],
+    delta: float,
+    runs: int | None = None,
 ) -> Sampled:
-    """CESTAC with only some encoders coarse, eqs. (17), (18), (21); the streams of an encoder do not depend on which others are coarse.
+    """CESTAC with only some encoders coarse, eqs. (17), (18), (21); the streams of an encoder do
+    not depend on which others are coarse.
 
     encoders : numbers from 0.   runs : default: as many as the settings say.
     """
     X = []
     for run in range(runs or task.settings.runs):
-        X.append(moved_estimate(task, [_errors(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]))
+        X.append(
+            moved_estimate(
+                task, [_errors(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]
+            )
+        )
     return sampled(delta, np.array(X), reference.X)
 
 
-def _errors(task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int) -> Array:
+def _errors(
+    task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int
+) -> Array:
     """What rounding some encoders does to the joint positions of record k, shape (N, n)."""
     settings, q = task.settings, task.records[k].q
-    errors, seen = np.zeros(q.shape[::-1]), np.linalg.inv(part.root)  # of joints; positions as the encoders see them, up to their offsets
+    errors, seen = (
+        np.zeros(q.shape[::-1]),
+        np.linalg.inv(part.root),
+    )  # of joints; positions as the encoders see them, up to their offsets
     for i in encoders:
         own = q @ seen[i]
         error = rounded(own, delta, settings.rounding, stream(settings.seed, k, run, i)) - own
@@ -299,14 +379,21 @@ def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
         full = np.zeros((n, len(part.selection.kept), b))
         full[part.selection.mask] = part.observation.W
         Omega = R.T @ R * part.band.gain**2 / part.selection.factor
-        middle = middle + np.einsum("i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True)
+        middle = middle + np.einsum(
+            "i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True
+        )
         A = A + np.einsum("j,jab->ab", w**2, part.clean.G)
     inverse = np.linalg.inv(A)
     return np.asarray(np.sqrt(np.diag(inverse @ middle @ inverse)))
 
 
 def assumptions(
-    study: Study, records: Sequence[Record], parts: Sequence[Perturbation], reference: Estimate, *, real: bool = False
+    study: Study,
+    records: Sequence[Record],
+    parts: Sequence[Perturbation],
+    reference: Estimate,
+    *,
+    real: bool = False,
 ) -> tuple[str, ...]:
     """What the prediction stands on, in words. real : real encoders were judged too."""
     cestac, low = study.cestac, study.signals.lowpass
@@ -314,46 +401,85 @@ def assumptions(
         "two-point": "+-Delta, variance Delta^2",
         "gaussian": "normal, deviation Delta",
         "uniform": "uniform within +-Delta, variance Delta^2/3",
-        "quantise": "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3",
+        "quantise": (
+            "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3"
+        ),
     }.get(cestac.rounding)
     rates = ", ".join(f"{record.rate:g} Hz" for record in records)
     filters = (
         "no low-pass"
         if low is None
-        else f"Butterworth of order {low.order} at {low.cutoff:g} Hz forward and backward on {' and '.join(low.on)}"
+        else (
+            f"Butterworth of order {low.order} at {low.cutoff:g} Hz forward and backward on "
+            f"{' and '.join(low.on)}"
+        )
     )
     out = [name for name in reference.names if name not in deciding_names(reference)]
     friction = ", ".join(reference.names[s.column] for s in parts[0].switches)
     lines = f"uneven by {cestac.uneven:g} of a step" if cestac.uneven else "even"
     place = f"on the {cestac.side} side, sampled at {rates}"
-    encoders = [f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from sample to sample, {place}."] if law else []
+    encoders = (
+        [
+            (
+                f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from "
+                f"sample to sample, {place}."
+            )
+        ]
+        if law
+        else []
+    )
     if real:
         encoders.append(
-            f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and run, {place}. The reader knows the step, not the phase. "
-            f"Curves are a quadrature over the phase, without first order; steps of fewer than {LINES} in the motion of a joint are not judged. "
-            "Both estimates stand on the rows that the reader leaves in; rows in which dry friction has no certain direction are not among them. Steps are "
-            f"tried in the ratio {STEPS:g}, read as positions more closely where constant speeds of the record lock to the sampling and change more; between "
+            f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and "
+            f"run, {place}. The reader knows the step, not the phase. "
+            "Curves are a quadrature over the phase, without first order; steps of fewer than "
+            f"{LIMIT.LINES_IN_MOTION} in the motion of a joint are not judged. "
+            "Both estimates stand on the rows that the reader leaves in; rows in which dry "
+            "friction has no certain direction are not among them. Steps are "
+            f"tried in the ratio {LIMIT.READER_RATIO:g}, read as positions more closely where "
+            "constant speeds "
+            "of the record lock to the sampling and change more; between "
             "these, ask for the step of the encoder itself."
         )
     return (
         *encoders,
-        f"Filters: {filters}, no median, decimation by {', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off gives another answer.",
-        f"Method {study.estimate.method}; {'first order in the variance of the errors, motion slow beside the filters; ' if law else ''}rows used and weights are "
+        (
+            f"Filters: {filters}, no median, decimation by "
+            f"{', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off "
+            "gives "
+            "another answer."
+        ),
+        f"Method {study.estimate.method}; {FIRST_ORDER if law else ''}rows used and weights are "
         "those of the record.",
         *(
-            [f"Friction that switches with the sign of a speed ({friction}) by its mean and covariance under normal errors."]
+            [
+                (
+                    f"Friction that switches with the sign of a speed ({friction}) by its mean and "
+                    "covariance under normal errors."
+                )
+            ]
             if friction and law
             else []
         ),
-        f"Parameters matter whose %sigma (11) is at most {DECIDING:g} %" + (f"; not: {', '.join(out)}." if out else ", here all of them."),
-        "Torques: white noise of the motors does not bias X, to first order and beyond, since Y is linear in it and W does not know it; it adds to sigma.",
+        f"Parameters matter whose %sigma (11) is at most {LIMIT.DECIDING:g} %"
+        + (f"; not: {', '.join(out)}." if out else ", here all of them."),
+        (
+            "Torques: white noise of the motors does not bias X, to first order and beyond, since "
+            "Y "
+            "is "
+            "linear in it and W does not know it; it adds to sigma."
+        ),
     )
 
 
 def _refuse(study: Study) -> None:
     if study.estimate.method not in ("ols", "wls"):
         raise SettingsError(
-            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls", path=("estimate", "method")
+            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls",
+            path=("estimate", "method"),
         )
     if study.estimate.weights == "covariance":
-        raise SettingsError("'covariance'; the prediction knows weights by joint, use joint or iterated", path=("estimate", "weights"))
+        raise SettingsError(
+            "'covariance'; the prediction knows weights by joint, use joint or iterated",
+            path=("estimate", "weights"),
+        )

@@ -1,15 +1,21 @@
-"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have done to the estimate?
+"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have
+done to the estimate?
 
-    q_CESTAC  every raw sample of the position rounded at random, steps of Delta                     eqs. (15), (28), `runtime.resolution.rounding`
-    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the identification          eq. (16)
-    X_CESTAC = least squares of Y on W_CESTAC, Y as measured                                         eq. (17)
+    q_CESTAC  every raw sample of the position rounded at random, steps of Delta:
+              eqs. (15), (28), `runtime.resolution.rounding`
+    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the study: eq. (16)
+    X_CESTAC = least squares of Y on W_CESTAC, Y as measured: eq. (17)
 
-N runs per Delta (`runtime.resolution.run`) give the mean (18), the deviation (19), %sigma (20), %e (21) and the residual (22); `runtime.resolution.result` holds them
-and their verdict. The rows used are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3) are studied alone and
-with the first Delta. Columns are by default the essential ones of the identification, rounding is two-point, on the joint side: those
+N runs per Delta (`runtime.resolution.run`) give the mean (18), the deviation (19), %sigma (20), %e
+(21) and the residual (22); `runtime.resolution.result` holds them
+and their verdict. The rows used are those of the measured record in every run. Steps of the motor
+torque (`torque`, section 4.1.3) are studied alone and
+with the first Delta. Columns are by default the essential ones of the identification, rounding is
+two-point, on the joint side: those
 reproduce the chapter's figures.
 
-The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in the settings of the result.
+The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in
+the settings of the result.
 """
 
 from __future__ import annotations
@@ -19,39 +25,49 @@ from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.closed_loop import LoopSimulator
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of, method_of
 from runtime.model.compile_cache import processor
 from runtime.model.compiled import target_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, drives_of
+from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
 from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.loop import Loop, loop_of, without_loop_options
-from runtime.resolution.perturbed import PreparedRecord, Task, column_errors, perturbed, prepared_records, study_columns, with_deviation
+from runtime.resolution.perturbed import (
+    PreparedRecord,
+    Task,
+    column_errors,
+    perturbed,
+    prepared_records,
+    study_columns,
+    with_deviation,
+)
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
+from runtime.rows.prepared import Prepared, common_drives, prepared
 from runtime.settings.study import CestacSettings, Study, to_mapping
+
+if TYPE_CHECKING:
+    from runtime.loop.simulation import Simulator
 
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]
 
-BLOCK = 20  # Most runs of one task: about a second, beside which sending it is nothing
-
 
 def cestac(
     model: GeneratedModel,
-    records: Record | Sequence[Record],
+    records: Record | Prepared | Sequence[Record | Prepared],
     study: Study | None = None,
     *,
     columns: Sequence[str] | None = None,
@@ -62,73 +78,92 @@ def cestac(
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
-    simulator: LoopSimulator | None = None,
+    simulator: Simulator | None = None,
 ) -> Cestac:
-    """Change of the estimate under coarser encoders and torque sensors, by the settings study.cestac and the method of study.estimate.
+    """Change of the estimate under coarser encoders and torque sensors, by the settings
+    study.cestac and the method of study.estimate.
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted module, or the same in C (`runtime.model.compiled`).
-    records : Record or sequence of Record
+    records : Record, Prepared, or a sequence of them
         One record of the robot, or several that are stacked.
     study : Study, optional
         Default: Study().
     columns : sequence of str, optional
-        Essential names where they are known; default: those of `study` on these records. Unused unless study.cestac.columns is "essential".
+        Essential names where they are known; default: those of `study` on these records. Unused
+        unless study.cestac.columns is "essential".
     drives : Drives, optional
         Motor side; default: DRIVES of the model.
     constants : mapping, optional
         Values in place of the robot file's.
     workers : int
-        Processes, this one among them (`runtime.parallel`); the results do not depend on it. A script that asks for processes needs the usual
+        Processes, this one among them (`runtime.parallel`); the results do not depend on it. A
+        script that asks for processes needs the usual
         `if __name__ == "__main__"`.
     scheduler : str, optional
         Address of a Dask cluster that works instead (`runtime.cluster`), with the same results.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
-        Where runs are kept while the study lasts; those of an interrupted or shorter study with the same settings are not repeated.
+        Where runs are kept while the study lasts; those of an interrupted or shorter study with the
+        same settings are not repeated.
     provenance : mapping, optional
         Further entries of Cestac.provenance; names and time stamps of the records are there.
-    simulator : LoopSimulator, optional
-        Closed loop of iv, didim, cloe, and of place: loop; default: that of study.controller, with the CasADi model beside `model`.
+    simulator : Simulator, optional
+        Closed loop of iv, didim, cloe, and of place: loop; default: that of study.controller, with
+        the CasADi model beside `model`.
 
     Raises
     ------
     SettingsError
-        Motor side without drives, a column that is no base parameter, or a closed loop that the study does not tell.
+        Motor side without drives, a column that is no base parameter, or a closed loop that the
+        study does not tell.
     InputError
-        Both workers and a scheduler; a method that finds no estimate, or fewer than two at one of the steps.
+        Both workers and a scheduler; a method that finds no estimate, or fewer than two at one of
+        the steps.
     """
     study = study or Study()
     settings, model = study.cestac, usable(model)
-    records = (records,) if isinstance(records, Record) else tuple(records)
-    drives = drives or drives_of(model)
+    several = records if isinstance(records, Sequence) else (records,)
+    as_measured = [prepared(model, record, study) for record in several]
+    drives = drives or common_drives(model, as_measured)
     if settings.side == "motor" and drives is None:
         raise SettingsError(
-            f"motor, but {model.NAME} has no drives; use side: joint or give drives in the robot file", path=("cestac", "side")
+            (
+                f"motor, but {model.NAME} has no drives; use side: joint or give drives in the "
+                "robot "
+                "file"
+            ),
+            path=("cestac", "side"),
         )
     if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
         raise SettingsError(
-            f"{settings.rounding} with signals.reader: counts; it rounds every sample anew and destroys the edges that counts are read by, use phase",
+            (
+                f"{settings.rounding} with signals.reader: counts; it rounds every sample anew and "
+                "destroys the edges that counts are read by, use phase"
+            ),
             path=("cestac", "rounding"),
         )
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
-    loop = loop_of(model, records, study, simulator)
+    loop = loop_of(model, [own.record for own in as_measured], study, simulator)
     if loop is not None and constants:
-        raise InputError(f"constants with {study.estimate.method} or place: loop; the loop is that of the robot file, change it there")
+        raise InputError(
+            f"constants with {study.estimate.method} or place: loop; the loop is that of the robot "
+            "file, change it there"
+        )
     if settings.place == "loop":
         assert loop is not None
-        records = tuple(part.record for part in loop.closed.parts)
+        as_measured = [part.prepared for part in loop.closed.parts]
     asked = to_mapping(study.estimate)
     if loop is not None:
         study = replace(study, estimate=without_loop_options(study.estimate))
     task = Task(
-        records=prepared_records(model, records, study, drives, loop),
+        records=prepared_records(as_measured, study, drives, loop),
         model=model,
-        names=study_columns(model, records, study, columns, constants, loop),
+        names=study_columns(model, as_measured, study, columns, constants, loop),
         estimate=replace(study.estimate, columns="all"),
         settings=settings,
         levels=levels_of(settings),
@@ -136,28 +171,39 @@ def cestac(
         constants=dict(constants or {}),
         loop=loop,
     )
-    if study.estimate.method == "tls":
-        task = replace(task, errors=column_errors(model, records, study, task.names))
-    measured = perturbed(model, task, Level(0.0), ())
-    origins = {**origin(records), **(provenance or {})}
-    reference = estimate_of(*with_deviation(measured, task, Level(0.0)), model=model, provenance=origins)
+    if method_of(study.estimate).position_error is not None:
+        task = replace(task, errors=column_errors(model, as_measured, study, task.names))
+    measured, whole = perturbed(model, task, Level(0.0), ()), [own.record for own in as_measured]
+    origins = {**origin(whole), **(provenance or {})}
+    reference = estimate_of(
+        *with_deviation(measured, task, Level(0.0)), model=model, provenance=origins
+    )
     _refuse(reference)
     described = {
         **measured.settings,
         "estimate": asked,
         "cestac": to_mapping(settings),
-        "rate": [record.rate for record in records],
+        "rate": [record.rate for record in whole],
         "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
         **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
     }
-    runs = _all_runs(task, partial(_identity, task, described, reference.provenance), workers, scheduler, progress, checkpoint)
+    runs = _all_runs(
+        task,
+        partial(_identity, task, described, reference.provenance),
+        workers,
+        scheduler,
+        progress,
+        checkpoint,
+    )
     by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
     levels = list(zip(task.levels, by_level, strict=True))
     if settings.place == "loop":
         (_, exact), *levels = levels
         X = np.nanmean(exact.X, axis=0)
-        reference = replace(reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X)))
+        reference = replace(
+            reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X))
+        )
     return Cestac(
         names=task.names,
         reference=reference,
@@ -176,44 +222,68 @@ def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
     told = [loop.closed.assumption] if loop.closed.assumption else []
     if place == "loop":
         told.append(
-            "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared "
+            "The encoder rounds inside the simulated loop, whose parameters are the values of the "
+            "robot file; every run is a record of its own, compared "
             "with the mean of as many records of the same seeds whose encoder is that of the study."
         )
     elif method in ("didim", "cloe"):
         told.append(
-            f"{method} reads of the recorded positions {'the first alone' if method == 'didim' else 'what the loop does not explain'}; rounding them "
-            "says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
+            f"{method} reads of the recorded positions "
+            f"{'the first alone' if method == 'didim' else 'what the loop does not explain'}; "
+            "rounding them "
+            "says nothing of an encoder in the loop, whose controller answers its steps: place: "
+            "loop does."
         )
     elif method == "iv":
-        told.append("The instruments of iv know no rounding of recorded positions; what an encoder in the loop does to them: place: loop.")
+        told.append(
+            "The instruments of iv know no rounding of recorded positions; what an encoder in the "
+            "loop does to them: place: loop."
+        )
     return tuple(told)
 
 
 def _refuse(reference: Estimate) -> None:
     """InputError where the method finds no estimate that runs could be compared with."""
     if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
-        raise InputError(f"{reference.method}: no estimate of the record as measured to compare with: {reference.message}")
+        raise InputError(
+            f"{reference.method}: no estimate of the record as measured to compare with: "
+            f"{reference.message}"
+        )
 
 
 def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
-    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for every Phi. In the loop, that of the study first."""
+    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for
+    every Phi. In the loop, that of the study first.
+    """
     if settings.place == "loop":
         return (Level(0.0), *map(Level, settings.delta))
     steps = settings.torque or ()
     with_position = [Level(settings.delta[0], phi) for phi in steps] if settings.delta else []
-    return (*(Level(delta, 0.0) for delta in settings.delta), *(Level(0.0, phi) for phi in steps), *with_position)
+    return (
+        *(Level(delta, 0.0) for delta in settings.delta),
+        *(Level(0.0, phi) for phi in steps),
+        *with_position,
+    )
 
 
 def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
-    """Keys (level, run) in tasks of at most BLOCK runs with fixed borders: contiguous runs of one level or, where levels share their random
-    numbers, all levels of contiguous runs. A study of few runs has small tasks, so that there are some for every worker.
+    """Keys (level, run) in tasks of at most LIMIT.TASK_RUNS runs with fixed borders: contiguous
+    runs of one
+    level or, where levels share their random
+    numbers, all levels of contiguous runs. A study of few runs has small tasks, so that there are
+    some for every worker.
     """
-    size = max(1, min(BLOCK, runs // 4) // (levels if common else 1))
+    size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 
     def block(key: Key) -> Key:
         return (0 if common else key[0], key[1] // size)
 
-    return [tuple(group) for _, group in groupby(sorted(keys, key=lambda key: (block(key), key[1], key[0])), key=block)]
+    return [
+        tuple(group)
+        for _, group in groupby(
+            sorted(keys, key=lambda key: (block(key), key[1], key[0])), key=block
+        )
+    ]
 
 
 def _all_runs(
@@ -224,7 +294,9 @@ def _all_runs(
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
-    """Every run, by level and number, in whatever order they finished. identity : gives what tells this study from others on disk."""
+    """Every run, by level and number, in whatever order they finished. identity : gives what tells
+    this study from others on disk.
+    """
     runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
     finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
     parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
@@ -252,8 +324,12 @@ def _measured(record: PreparedRecord) -> Iterator[memoryview]:
     return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
 
 
-def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """What decides every bit of every run: JSON values that tell studies apart, the number of runs aside."""
+def _identity(
+    task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What decides every bit of every run: JSON values that tell studies apart, the number of runs
+    aside.
+    """
     drives = task.drives
     return {
         **{key: value for key, value in described.items() if key != "cestac"},
@@ -262,7 +338,12 @@ def _identity(task: Task, described: Mapping[str, Any], provenance: Mapping[str,
         "constants": dict(task.constants),
         "drives": None
         if drives is None
-        else [drives.ratio.tolist(), drives.offset.tolist(), drives.torque_constant.tolist(), drives.coupling],
+        else [
+            drives.ratio.tolist(),
+            drives.offset.tolist(),
+            drives.torque_constant.tolist(),
+            drives.coupling,
+        ],
         "robot": provenance.get("robot"),
         "robot_sha256": provenance.get("robot_sha256"),
         "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],

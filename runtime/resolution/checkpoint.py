@@ -1,10 +1,14 @@
 """Runs of a long study on disk, so that it can be killed and go on.
 
-    FOLDER/runs/study.json          what makes the runs: settings, hashes of record and model, versions
-    FOLDER/runs/000000.npz ...      the runs, some thousand in each: level, run, X, residual_norm, normal
+    FOLDER/runs/study.json
+            what makes the runs: settings, hashes of record and model, versions
+    FOLDER/runs/000000.npz ...
+            the runs, some thousand in each: level, run, X, residual_norm, normal
 
-Every file is written whole under another name and then renamed; an archive once written is not touched again. A study goes on only where study.json
-says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits of an uninterrupted one.
+Every file is written whole under another name and then renamed; an archive once written is not
+touched again. A study goes on only where study.json
+says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits
+of an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -22,17 +26,17 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.files import read_bytes
+from runtime.limits import LIMIT
 from runtime.records.formats.npz import archive_of
 from runtime.resolution.runs import Runs
 
-EVERY = 30.0  # s between two archives
-MOST = 20_000  # runs of one archive
 FOLDER = "runs"
 STUDY, UNFINISHED = "study.json", ".unfinished"
 
 
 class Checkpoint:
-    """The runs of one study in FOLDER/runs; nothing is written before the first `every` seconds, or `flush`.
+    """The runs of one study in FOLDER/runs; nothing is written before the first `every` seconds, or
+    `flush`.
 
     Parameters
     ----------
@@ -43,7 +47,13 @@ class Checkpoint:
         Time, s.
     """
 
-    def __init__(self, folder: str | Path, *, every: float = EVERY, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(
+        self,
+        folder: str | Path,
+        *,
+        every: float = LIMIT.ARCHIVE_PERIOD,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
         self.folder, self.every, self.clock = Path(folder) / FOLDER, every, clock
         self.written = 0  # runs on disk
         self._identity: Mapping[str, Any] = {}
@@ -78,7 +88,7 @@ class Checkpoint:
     def add(self, runs: Runs) -> None:
         """Take new runs; write them when it is time."""
         self._new.append(runs)
-        if self.clock() - self._last > self.every or sum(map(len, self._new)) >= MOST:
+        if self.clock() - self._last > self.every or sum(map(len, self._new)) >= LIMIT.ARCHIVE_RUNS:
             self.flush()
 
     def flush(self) -> None:
@@ -90,7 +100,10 @@ class Checkpoint:
             except OSError as e:
                 self._leave_no_empty_folder()
                 raise InputError(
-                    f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make room and repeat the command to go on",
+                    (
+                        f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make "
+                        "room and repeat the command to go on"
+                    ),
                     file=str(self.folder),
                 ) from e
             self.written += count
@@ -112,7 +125,9 @@ class Checkpoint:
     def _write(self, runs: Runs) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
         if not (self.folder / STUDY).is_file():
-            _write_whole(self.folder / STUDY, (json.dumps(self._identity, indent=2) + "\n").encode("utf-8"))
+            _write_whole(
+                self.folder / STUDY, (json.dumps(self._identity, indent=2) + "\n").encode("utf-8")
+            )
         data = BytesIO()
         np.savez(data, **{name: getattr(runs, name) for name in Runs.__dataclass_fields__})
         archives = self._archives()
@@ -120,15 +135,26 @@ class Checkpoint:
         _write_whole(self.folder / f"{number:06d}.npz", data.getvalue())
 
     def _compare(self, earlier: Mapping[str, Any]) -> None:
-        other = sorted(key for key in {*earlier, *self._identity} if earlier.get(key) != self._identity.get(key))
+        other = sorted(
+            key
+            for key in {*earlier, *self._identity}
+            if earlier.get(key) != self._identity.get(key)
+        )
         if other:
             raise InputError(
-                f"holds runs of another study, {', '.join(other)} differ; use another folder, or delete this one", file=str(self.folder)
+                (
+                    f"holds runs of another study, {', '.join(other)} differ; use another folder, "
+                    "or "
+                    "delete this one"
+                ),
+                file=str(self.folder),
             )
 
 
 def _write_whole(path: Path, data: bytes) -> None:
-    """The file appears complete or not at all; the unfinished one is removed, whatever happens short of a kill."""
+    """The file appears complete or not at all; the unfinished one is removed, whatever happens
+    short of a kill.
+    """
     unfinished = path.with_name(path.name + UNFINISHED)
     try:
         with unfinished.open("wb") as file:
@@ -145,9 +171,13 @@ def _json(path: Path) -> Mapping[str, Any]:
     try:
         study = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as e:
-        raise InputError(f"cannot be read ({e}); delete {path.parent} to start again", file=str(path)) from e
+        raise InputError(
+            f"cannot be read ({e}); delete {path.parent} to start again", file=str(path)
+        ) from e
     if not isinstance(study, dict):
-        raise InputError(f"not the settings of a study; delete {path.parent} to start again", file=str(path))
+        raise InputError(
+            f"not the settings of a study; delete {path.parent} to start again", file=str(path)
+        )
     return study
 
 
@@ -158,10 +188,24 @@ def _read(path: Path, b: int) -> Runs:
         runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
     except (InputError, KeyError) as e:
         reason = e.message if isinstance(e, InputError) else f"no array {e}"
-        raise InputError(f"damaged ({reason}); delete this file, its runs are computed again", file=str(path)) from e
+        raise InputError(
+            f"damaged ({reason}); delete this file, its runs are computed again", file=str(path)
+        ) from e
     R = len(runs)
-    shapes = {name: (getattr(runs, name).shape, getattr(runs, name).dtype.kind) for name in Runs.__dataclass_fields__}
-    wanted = {"level": ((R,), "i"), "run": ((R,), "i"), "X": ((R, b), "f"), "residual_norm": ((R,), "f"), "normal": ((R,), "b")}
+    shapes = {
+        name: (getattr(runs, name).shape, getattr(runs, name).dtype.kind)
+        for name in Runs.__dataclass_fields__
+    }
+    wanted = {
+        "level": ((R,), "i"),
+        "run": ((R,), "i"),
+        "X": ((R, b), "f"),
+        "residual_norm": ((R,), "f"),
+        "normal": ((R,), "b"),
+    }
     if shapes != wanted:
-        raise InputError(f"holds {shapes}; expected {wanted}; delete this file, its runs are computed again", file=str(path))
+        raise InputError(
+            f"holds {shapes}; expected {wanted}; delete this file, its runs are computed again",
+            file=str(path),
+        )
     return runs

@@ -1,13 +1,22 @@
-"""The closed loop of a resolution study: for methods that simulate it (iv, didim, cloe), and for encoders that stand inside it.
+"""The closed loop of a resolution study: for methods that simulate it (iv, didim, cloe), and for
+encoders that stand inside it.
 
-    place: record    the positions of the record are rounded; the loop is simulated without steps, as the method does on any record
-    place: loop      every run is a record simulated anew, the encoder of the loop with steps of Delta and a random phase for each encoder:
+    place: record
+            the positions of the record are rounded; the loop is simulated without steps, as the
+            method does on any record
+    place: loop
+            every run is a record simulated anew, the encoder of the loop with steps of Delta and a
+            random phase for each encoder:
 
-        arm, controller and record answer      y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
+        arm, controller and record answer
+                y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
 
-Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next to nothing of didim, which reads one position.
-In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for every Delta and method; so have the runs that they are
-compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e is what the steps alone do. `around` of estimate.options
+Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next
+to nothing of didim, which reads one position.
+In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for
+every Delta and method; so have the runs that they are
+compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e is
+what the steps alone do. `around` of estimate.options
 then serves every method.
 """
 
@@ -17,22 +26,25 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from runtime.errors import SettingsError
-from runtime.estimators.closed_loop import ClosedLoop, LoopSimulator, closed_loop
-from runtime.estimators.methods import CLOSED_LOOP
-from runtime.model.casadi import load_symbolic
-from runtime.model.generated import GeneratedModel, ModelText
-from runtime.motion.reference import Reference, reference_of
-from runtime.observation.system import LoopRows, Observation
+from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.methods import CLOSED_LOOP
+from runtime.loop.reference import Reference, reference_of
+from runtime.model.casadi import SymbolicModel
+from runtime.model.generated import GeneratedModel
 from runtime.records.provenance import SIMULATED
 from runtime.records.record import Record
 from runtime.resolution.rounding import stream
 from runtime.resolution.runs import Level
+from runtime.rows.observation import LoopRows, Observation
 from runtime.settings.study import EstimateSettings, Study
+
+if TYPE_CHECKING:
+    from runtime.loop.simulation import Simulator
 
 Array = np.ndarray
 
@@ -53,7 +65,7 @@ class Loop:
     model : GeneratedModel
     study : Study
         With the median of study.cestac in its signals.
-    simulator : LoopSimulator
+    simulator : Simulator
         Without steps of its own making: its law has the encoder of the study.
     records : tuple of Record
         Measured ones; of place loop, those that the reference may come from.
@@ -61,13 +73,21 @@ class Loop:
 
     model: GeneratedModel
     study: Study
-    simulator: LoopSimulator
+    simulator: Simulator
     records: tuple[Record, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes: what makes the simulator, which is not pickled."""
+        return _loop, (self.model, self.study, self.simulator.symbolic, self.records)
 
     @property
     def options(self) -> Mapping[str, Any]:
         """estimate.options that are the loop's."""
-        return {key: self.study.estimate.options[key] for key in ALIKE if key in self.study.estimate.options}
+        return {
+            key: self.study.estimate.options[key]
+            for key in ALIKE
+            if key in self.study.estimate.options
+        }
 
     @cached_property
     def reference(self) -> Reference:
@@ -77,99 +97,117 @@ class Loop:
     @cached_property
     def truth(self) -> Array:
         """Base parameters of the simulated arm, shape (b,)."""
-        from runtime.motion.simulation import parameters_of
+        from runtime.loop.simulation import parameters_of
 
         return parameters_of(self.model, self.simulator.controller)
 
     @cached_property
     def closed(self) -> ClosedLoop:
-        """The loop of the measured records; of place loop, of one made with the encoder of the study."""
+        """The loop of the measured records; of place loop, of one made with the encoder of the
+        study.
+        """
         if self.study.cestac.place == "record":
             return closed_loop(self.model, self.records, self.study, self.simulator, **self.options)
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
-        """`observation` of the perturbed positions of every record, shape (N, n), with the loop attached."""
-        parts = [replace(part, record=replace(part.record, q=np.asarray(q))) for part, q in zip(self.closed.parts, positions, strict=True)]
-        return replace(observation, closed_loop=LoopRows(replace(self.closed, parts=tuple(parts)), np.arange(len(observation.Y))))
+        """`observation` of the perturbed positions of every record, shape (N, n), with the loop
+        attached.
+        """
+        parts = [
+            replace(
+                part,
+                prepared=replace(part.prepared, record=replace(part.record, q=np.asarray(q))),
+            )
+            for part, q in zip(self.closed.parts, positions, strict=True)
+        ]
+        return replace(
+            observation,
+            closed_loop=LoopRows(
+                replace(self.closed, parts=tuple(parts)), np.arange(len(observation.Y))
+            ),
+        )
 
     def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record made with encoders of steps of level.delta; of those of the study at a level without steps."""
+        """The loop of a record made with encoders of steps of level.delta; of those of the study at
+        a level without steps.
+        """
         random = stream(self.study.cestac.seed, draw[-1])
         law, n = self.simulator.law, len(self.model.JOINTS)
         phase = level.delta * random.random(n)
         simulator: Any = copy(self.simulator)
         if level.delta:
-            simulator.law = replace(law, encoder_step=np.full(n, level.delta), offset=law.offset + np.linalg.solve(law.R, phase))
+            simulator.law = replace(
+                law,
+                encoder_step=np.full(n, level.delta),
+                offset=law.offset + np.linalg.solve(law.R, phase),
+            )
         return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
-        """A record made by `simulator`, under the loop without its steps; the reader of counts is told them, and needs some."""
-        record = simulator.run(self.truth, self.reference, seed=seed, name=f"{SIMULATED} {self.model.NAME}").record()
+        """A record made by `simulator`, under the loop without its steps; the reader of counts is
+        told them, and needs some.
+        """
+        record = simulator.run(
+            self.truth, self.reference, seed=seed, name=f"{SIMULATED} {self.model.NAME}"
+        ).record()
         signals, step = self.study.signals, delta or self.simulator.controller.encoder.step
         if signals.reader == "counts" and step:
             signals = replace(signals, step=step, side=self.study.cestac.side)
         elif signals.reader == "counts":
             signals = replace(signals, reader="lowpass", step=None, side="joint")
-        return closed_loop(self.model, [record], replace(self.study, signals=signals), self.simulator, **self.options)
+        return closed_loop(
+            self.model,
+            [record],
+            replace(self.study, signals=signals),
+            self.simulator,
+            **self.options,
+        )
 
 
-@dataclass(frozen=True)
-class LoopText:
-    """The loop of one study for another process: its CasADi model as text."""
+def _loop(
+    model: GeneratedModel, study: Study, symbolic: SymbolicModel | None, records: tuple[Record, ...]
+) -> Loop:
+    """The loop with a simulator of study.controller."""
+    from runtime.loop.simulation import Simulator
 
-    symbolic: ModelText
-    study: Study
-    records: tuple[Record, ...]
-
-    @classmethod
-    def of(cls, loop: Loop) -> LoopText:
-        """InputError where the CasADi model has no file."""
-        simulator: Any = loop.simulator
-        return cls(ModelText.of(simulator.symbolic), loop.study, loop.records)
-
-    def load(self, model: GeneratedModel) -> Loop:
-        """The loop of `model`."""
-        from runtime.motion.simulation import Simulator
-
-        assert self.study.controller is not None
-        with self.symbolic.stored() as path:
-            symbolic = load_symbolic(path, of=model)
-        return Loop(model, self.study, Simulator(model, self.study.controller, symbolic=symbolic), self.records)
+    assert study.controller is not None
+    return Loop(model, study, Simulator(model, study.controller, symbolic=symbolic), records)
 
 
-def loop_of(model: GeneratedModel, records: Sequence[Record], study: Study, simulator: LoopSimulator | None) -> Loop | None:
-    """The loop of a study that simulates one; else None. simulator : default: that of study.controller."""
+def loop_of(
+    model: GeneratedModel, records: Sequence[Record], study: Study, simulator: Simulator | None
+) -> Loop | None:
+    """The loop of a study that simulates one; else None. simulator : default: that of
+    study.controller.
+    """
     if not has_loop(study):
         return None
     if study.controller is None:
         asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
         raise SettingsError(
-            f"{asked} simulates the closed loop, and this study tells none; give a section `controller` with law, rate and reference, "
+            f"{asked} simulates the closed loop, and this study tells none; give a section "
+            "`controller` with law, rate and reference, "
             "or use ols, wls, irls or tls on recorded positions",
             path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),
         )
     quiet = replace(study, signals=replace(study.signals, median=study.cestac.median))
-    if study.cestac.place == "loop":  # the encoder on the side of the study, of any step: only then is it in the law
+    if (
+        study.cestac.place == "loop"
+    ):  # the encoder on the side of the study, of any step: only then is it in the law
         encoder = replace(study.controller.encoder, side=study.cestac.side)
         quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
-    made = simulator if simulator is not None and simulator.controller == quiet.controller else None
-    if made is None:
-        made = _simulator(model, quiet, simulator)
-    return Loop(model, quiet, made, tuple(records))
-
-
-def _simulator(model: GeneratedModel, study: Study, given: LoopSimulator | None) -> LoopSimulator:
-    """The simulator of study.controller, with the CasADi model of `given`."""
-    from runtime.motion.simulation import Simulator
-
-    known: Any = given
-    assert study.controller is not None
-    return Simulator(model, study.controller, symbolic=None if known is None else known.symbolic)
+    if simulator is not None and simulator.controller == quiet.controller:
+        return Loop(model, quiet, simulator, tuple(records))
+    symbolic = None if simulator is None else simulator.symbolic
+    return _loop(model, quiet, symbolic, tuple(records))
 
 
 def without_loop_options(settings: EstimateSettings) -> EstimateSettings:
     """The settings as a method that simulates no loop takes them."""
     if settings.method in CLOSED_LOOP:
         return settings
-    return replace(settings, options={key: value for key, value in settings.options.items() if key not in ALIKE})
+    return replace(
+        settings,
+        options={key: value for key, value in settings.options.items() if key not in ALIKE},
+    )

@@ -1,10 +1,15 @@
 """The encoder that made a record, and what it allows to say of coarser ones by law phase.
 
     Delta >= 5 own steps        the positions are taken as exact and quantised
-    own step < Delta            positions drawn from the posterior of the record's own counts are quantised, another draw in every run
-    Delta <= own step           refused: counts rounded at their own step are only shifted, and runs that agree so well would say nothing
+    own step < Delta
+            positions drawn from the posterior of the record's own counts are quantised, another
+            draw in every run
+    Delta <= own step
+            refused: counts rounded at their own step are only shifted, and runs that agree so well
+            would say nothing
 
-A record whose positions lie on no lattice (floats of a simulation, positions that a driver averaged) has a step of its own near zero.
+A record whose positions lie on no lattice (floats of a simulation, positions that a driver
+averaged) has a step of its own near zero.
 """
 
 from __future__ import annotations
@@ -15,16 +20,14 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.observation.counts import Reading, read_counts
-from runtime.observation.encoder_lattice import smallest_step
 from runtime.records.record import Record
 from runtime.settings.study import Study
+from runtime.signals.counts.lattice import smallest_step
+from runtime.signals.counts.reading import Reading, read_counts
 
 Array = np.ndarray
-
-FINER = 5.0
-"""Own steps in Delta from which a recorded position counts as exact: its own error then has a 25th of the variance of that of Delta."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +49,18 @@ class OwnEncoder:
     drives: Drives | None
 
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
-        """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as measured, or a draw."""
-        if self.reading is None or delta >= (1 - 1e-9) * FINER * self.step.max():
+        """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as
+        measured, or a draw.
+        """
+        if self.reading is None or delta >= (1 - 1e-9) * LIMIT.EXACT_FROM * self.step.max():
             return q
         drawn = self.reading.draw(rng)
         return drawn if self.drives is None else self.drives.joint_position(drawn)
 
 
 def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncoder | None:
-    """The encoder of a record under law phase; None for other laws, which take every position as exact.
+    """The encoder of a record under law phase; None for other laws, which take every position as
+    exact.
 
     Raises
     ------
@@ -69,23 +75,35 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     own_drives = drives if settings.side == "motor" else None
     q = record.q if own_drives is None else own_drives.motor_position(record.q)
     known = signals.step is not None and signals.side == settings.side
-    missing = np.zeros(q.shape, dtype=bool) if record.missing is None else record.missing.at_encoders(own_drives)
-    given: Any = signals.step if known else [smallest_step(x[~gaps]) for x, gaps in zip(q.T, missing.T, strict=True)]
+    missing = (
+        np.zeros(q.shape, dtype=bool)
+        if record.missing is None
+        else record.missing.at_encoders(own_drives)
+    )
+    given: Any = (
+        signals.step
+        if known
+        else [smallest_step(x[~gaps]) for x, gaps in zip(q.T, missing.T, strict=True)]
+    )
     step = np.broadcast_to(np.asarray(given, dtype=float), (record.n,))
     finest, coarsest = min(settings.delta, default=np.inf), int(np.argmax(step))
     if finest <= 1.001 * step[coarsest]:
         raise SettingsError(
-            f"{finest:.4g}, while encoder {coarsest + 1} of {record.name} has steps of {step[coarsest]:.4g} itself: counts rounded at their own step or "
-            f"finer are only shifted, which would look like certainty; ask for more than {step[coarsest]:.4g}",
+            f"{finest:.4g}, while encoder {coarsest + 1} of {record.name} has steps of "
+            f"{step[coarsest]:.4g} itself: counts rounded at their own step or "
+            "finer are only shifted, which would look like certainty; ask for more than "
+            f"{step[coarsest]:.4g}",
             path=("cestac", "delta"),
         )
-    if finest >= (1 - 1e-9) * FINER * step[coarsest]:
+    if finest >= (1 - 1e-9) * LIMIT.EXACT_FROM * step[coarsest]:
         return OwnEncoder(step, None, None)
     try:
         reading = read_counts(np.where(missing, np.nan, q), record.rate, step, name=record.name)
     except InputError as e:
         raise InputError(
-            f"a step of {finest:.4g} is less than {FINER:g} steps of encoder {coarsest + 1} ({step[coarsest]:.4g}), so positions would be drawn from "
+            f"a step of {finest:.4g} is less than {LIMIT.EXACT_FROM:g} steps of encoder "
+            f"{coarsest + 1} "
+            f"({step[coarsest]:.4g}), so positions would be drawn from "
             f"the counts, which cannot be read: {e.message}",
             file=record.name,
         ) from e

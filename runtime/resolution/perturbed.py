@@ -1,9 +1,12 @@
-"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they make, eqs. (15), (16), (28).
+"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they
+make, eqs. (15), (16), (28).
 
-    q_CESTAC = R^-1 rounded(R (q - offset)) + offset        on the motor side; R = 1 on the joint side
-    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC)           through the filters of the identification, on the rows of the measured record
+    q_CESTAC = R^-1 rounded(R (q - offset)) + offset
+            on the motor side; R = 1 on the joint side
+    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC)   through the filters, on the measured rows
 
-Every record draws from streams of its own (`runtime.resolution.rounding.stream`), torques from others than positions, so that a draw is the same with
+Every record draws from streams of its own (`runtime.resolution.rounding.stream`), torques from
+others than positions, so that a draw is the same with
 and without torques and whatever records follow.
 """
 
@@ -11,28 +14,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.closed_loop import LoopPart
 from runtime.estimators.essential import essential_of
-from runtime.estimators.methods import linear_companion, observed, point_estimate
-from runtime.model.compiled import text_of
+from runtime.estimators.method import linear_companion
+from runtime.loop.closed_loop import LoopPart
+from runtime.loop.methods import method_of, observed, point_estimate
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, ModelText, base_columns, loaded
-from runtime.observation.filters import States, filtered_states
-from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, stack
-from runtime.observation.rows import Selection, select_rows
-from runtime.observation.states import observed_states
+from runtime.model.generated import GeneratedModel, base_columns
 from runtime.records.missing import COUNTS, Missing, require_positions
-from runtime.records.record import Record
-from runtime.resolution.loop import Loop, LoopText
+from runtime.resolution.loop import Loop
 from runtime.resolution.own_encoder import OwnEncoder, own_encoder
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.runs import Level
+from runtime.rows.observation import Observation, stack
+from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states
+from runtime.rows.selection import Selection, select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
+from runtime.signals.filters import States, filtered_states
+from runtime.signals.states import observed_states
 
 Array = np.ndarray
 
@@ -81,8 +83,7 @@ class Task:
     Attributes
     ----------
     records : tuple of PreparedRecord
-    model : GeneratedModel or ModelText
-        The module; its text in other processes.
+    model : GeneratedModel
     names : tuple of str
         Columns, as fitted.
     estimate, settings : EstimateSettings, CestacSettings
@@ -91,162 +92,238 @@ class Task:
         Motor side.
     constants : mapping
         Values in place of the robot file's.
-    loop : Loop, LoopText or None
-        Closed loop, of a study that simulates one; its text in other processes.
+    loop : Loop or None
+        Closed loop, of a study that simulates one.
     errors : ndarray, shape (n, b, b), or None
-        Of method tls: covariance of the errors of one row of joint j, by encoder errors of variance 1.
+        Of method tls: covariance of the errors of one row of joint j, by encoder errors of variance
+        1.
     """
 
     records: tuple[PreparedRecord, ...]
-    model: GeneratedModel | ModelText
+    model: GeneratedModel
     names: tuple[str, ...]
     estimate: EstimateSettings
     settings: CestacSettings
     levels: tuple[Level, ...]
     drives: Drives | None
     constants: Mapping[str, float]
-    loop: Loop | LoopText | None = None
+    loop: Loop | None = None
     errors: Array | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
-        """For other processes: model and loop as text."""
-        loop = LoopText.of(self.loop) if isinstance(self.loop, Loop) else self.loop
-        return {**vars(self), "model": text_of(self.model), "loop": loop}
 
-    def opened(self) -> tuple[Task, GeneratedModel]:
-        """The task and the model as they run in this process."""
-        model = loaded(self.model)
-        return (replace(self, loop=self.loop.load(model)) if isinstance(self.loop, LoopText) else self), model
-
-
-def prepared(
-    model: GeneratedModel, record: Record, study: Study, drives: Drives | None = None, part: LoopPart | None = None
+def prepared_record(
+    own: Prepared, study: Study, drives: Drives | None = None, part: LoopPart | None = None
 ) -> PreparedRecord:
-    """Rows and torques of the measured record, through the filters of the study with the median of study.cestac.
+    """Rows and torques of the measured record, through the filters of the study with the median of
+    study.cestac.
 
     part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
     """
-    signals = replace(study.signals, median=study.cestac.median)
-    own, counts, note = own_encoder(record, study, drives), None, ""
-    if signals.reader == "counts" and (signals.step is not None or record.missing or (own is not None and own.reading is not None)):
-        known = signals if signals.step is not None or own is None else replace(signals, step=tuple(own.step), side=study.cestac.side)
-        counts = observed_states(model, record.q, record.rate, known, drives=drives, missing=record.missing, name=record.name)
+    signals, record = replace(study.signals, median=study.cestac.median), own.record
+    encoder, counts, note = own_encoder(record, study, drives), None, ""
+    if signals.reader == "counts" and (
+        signals.step is not None
+        or record.missing
+        or (encoder is not None and encoder.reading is not None)
+    ):
+        known = (
+            signals
+            if signals.step is not None or encoder is None
+            else replace(signals, step=tuple(encoder.step), side=study.cestac.side)
+        )
+        own = replace(own, study=study, drives=drives).by(replace(study, signals=known))
+        counts = own.states
     elif signals.reader == "counts":
-        note = f"Beside these steps the positions of {record.name} count as exact: the estimate that runs are compared with reads them by the low-pass."
+        note = (
+            f"Beside these steps the positions of {record.name} count as exact: the estimate "
+            "that runs are compared with reads them by the low-pass."
+        )
     if counts is None:
         require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
-    if part is None:
-        states = counts or (filtered_states(record.q, record.rate, signals) if np.any(study.rows.low_speed) else None)
-        selection = select_rows(record, record.q if states is None else states.qd, signals, study.rows)  # without a limit any speed will do
-        torque = decimated_torque(record.tau, selection)
-    else:
+        own = own.by(replace(study, signals=signals))
+    if part is not None:
         selection, torque = part.selection, part.torque
-    return PreparedRecord(record.q, record.tau, record.rate, dict(record.files), selection, torque, counts, own, record.missing, note)
+    else:  # without a limit any speed will do
+        speeds = (counts or own.filtered).qd if np.any(study.rows.low_speed) else record.q
+        selection = select_rows(record, speeds, signals, study.rows)
+        torque = decimated_torque(record.torque, selection)
+    return PreparedRecord(
+        record.q,
+        record.torque,
+        record.rate,
+        dict(record.files),
+        selection,
+        torque,
+        counts,
+        encoder,
+        record.missing,
+        note,
+    )
 
 
 def prepared_records(
-    model: GeneratedModel, records: Sequence[Record], study: Study, drives: Drives | None = None, loop: Loop | None = None
+    records: Sequence[Prepared],
+    study: Study,
+    drives: Drives | None = None,
+    loop: Loop | None = None,
 ) -> tuple[PreparedRecord, ...]:
-    """Rows and torques of every record; none where the encoder stands in the loop, whose records are made anew."""
+    """Rows and torques of every record; none where the encoder stands in the loop, whose records
+    are made anew.
+    """
     if study.cestac.place == "loop":
         return ()
     parts = [None] * len(records) if loop is None else list(loop.closed.parts)
-    return tuple(prepared(model, record, study, drives, part) for record, part in zip(records, parts, strict=True))
+    return tuple(
+        prepared_record(record, study, drives, part)
+        for record, part in zip(records, parts, strict=True)
+    )
 
 
-def column_errors(model: GeneratedModel, records: Sequence[Record], study: Study, names: Sequence[str]) -> Array | None:
-    """Covariance of the errors of one row of joint j, shape (n, b, b), by encoder errors of variance 1, for method tls."""
+def column_errors(
+    model: GeneratedModel, records: Sequence[Prepared], study: Study, names: Sequence[str]
+) -> Array | None:
+    """Covariance of the errors of one row of joint j, shape (n, b, b), by encoder errors of
+    variance 1, for a method that asks for them.
+    """
     signals = replace(study.signals, median=study.cestac.median)
-    unit = EstimateSettings("tls", options={"position_error": 1.0})
-    return observed(model, records, replace(study, signals=signals, estimate=unit)).columns(names).errors
+    unit = replace(study.estimate, options={"position_error": 1.0})
+    return (
+        observed(model, records, replace(study, signals=signals, estimate=unit))
+        .columns(names)
+        .errors
+    )
 
 
 def study_columns(
     model: GeneratedModel,
-    records: Sequence[Record],
+    records: Sequence[Prepared],
     study: Study,
     columns: Sequence[str] | None,
     constants: Mapping[str, float] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Columns of study.cestac.columns: a list, all, or the essential ones of the identification that `study` describes.
+    """Columns of study.cestac.columns: a list, all, or the essential ones of the identification
+    that `study` describes.
 
-    columns : essential names where they are known.   Raises SettingsError for a name that is no base parameter.
+    columns : essential names where they are known.
+            Raises SettingsError for a name that is no base parameter.
     """
     if study.cestac.columns == "essential" and columns is None:
-        seen = stack([observe(model, record, study, constants=constants) for record in records]) if loop is None else loop.closed.measured()
+        seen = (
+            stack([own.by(study).observation(model, None, constants) for own in records])
+            if loop is None
+            else loop.closed.measured()
+        )
         return essential_of(seen, study.essential, linear_companion(study.estimate)).names
     return base_columns(model, study.cestac.columns, columns or (), "cestac", "columns")
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1), positions of record 0 `draw` itself."""
+    """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1),
+    positions of record 0 `draw` itself.
+    """
     return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
 
 
-def perturbed_position(q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
-    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random stream."""
+def perturbed_position(
+    q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
+) -> Array:
+    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random
+    stream.
+    """
     if not level.delta:
         return q
     rng = stream(settings.seed, *key)
     if settings.side == "joint" or drives is None:
         return rounded(q, level.delta, settings.rounding, rng, settings.uneven)
-    return drives.joint_position(rounded(drives.motor_position(q), level.delta, settings.rounding, rng, settings.uneven))
+    return drives.joint_position(
+        rounded(drives.motor_position(q), level.delta, settings.rounding, rng, settings.uneven)
+    )
 
 
-def perturbed_torque(tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]) -> Array:
-    """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques where there are no drives."""
+def perturbed_torque(
+    tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
+) -> Array:
+    """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques
+    where there are no drives.
+    """
     rng = stream(settings.seed, *key)
     if drives is None:
         return rounded(tau, level.torque, settings.rounding, rng)
     motor = drives.motor_command(tau) * drives.torque_constant
-    return drives.joint_torque(rounded(motor, level.torque, settings.rounding, rng) / drives.torque_constant)
+    return drives.joint_torque(
+        rounded(motor, level.torque, settings.rounding, rng) / drives.torque_constant
+    )
 
 
 def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """Y of one record before rows are left out, shape (n, K): as measured, or rounded in steps of Phi."""
+    """Y of one record before rows are left out, shape (n, K): as measured, or rounded in steps of
+    Phi.
+    """
     if not level.torque:
         return record.torque
-    return decimated_torque(perturbed_torque(record.tau, level, task.settings, task.drives, key), record.selection)
+    return decimated_torque(
+        perturbed_torque(record.tau, level, task.settings, task.drives, key), record.selection
+    )
 
 
-def perturbed(model: GeneratedModel, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
-    """The system with perturbed measurements; that of the measurements themselves at a level without steps."""
+def perturbed(
+    model: GeneratedModel, task: Task, level: Level, draw: tuple[int, ...]
+) -> Observation:
+    """The system with perturbed measurements; that of the measurements themselves at a level
+    without steps.
+    """
     loop = task.loop
-    assert not isinstance(loop, LoopText)
     if loop is not None and task.settings.place == "loop":
         return (loop.simulated(level, draw) if draw else loop.closed).measured().columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
-    positions = [run_position(task, r, level, own) for r, (own, _) in zip(task.records, keys, strict=True)]
-    torques = [torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)]
+    positions = [
+        run_position(task, r, level, own) for r, (own, _) in zip(task.records, keys, strict=True)
+    ]
+    torques = [
+        torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)
+    ]
     observation = system_of(model, task, positions, torques, level)
     return observation if loop is None else loop.perturbed(observation, positions)
 
 
 def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
-    """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than those of the record, from a draw."""
+    """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than
+    those of the record, from a draw.
+    """
     q = record.q
     if level.delta and record.own is not None:
         q = record.own.positions(q, level.delta, stream(task.settings.seed, *key, 0))
     return perturbed_position(q, level, task.settings, task.drives, key)
 
 
-def run_states(model: GeneratedModel, task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
-    """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps of the level but not their phase."""
+def run_states(
+    model: GeneratedModel, task: Task, record: PreparedRecord, q: Array, level: Level
+) -> States:
+    """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps
+    of the level but not their phase.
+    """
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
         return record.states or filtered_states(q, record.rate, signals)
     known = replace(signals, step=level.delta, side=task.settings.side)
     try:
-        return observed_states(model, q, record.rate, known, drives=task.drives, missing=record.missing)
+        return observed_states(q, record.rate, known, task.drives, missing=record.missing)
     except np.linalg.LinAlgError as e:
-        raise InputError(f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps") from e
+        raise InputError(
+            f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps"
+        ) from e
 
 
 def system_of(
-    model: GeneratedModel, task: Task, positions: Sequence[Array], torques: Sequence[Array], level: Level | None = None
+    model: GeneratedModel,
+    task: Task,
+    positions: Sequence[Array],
+    torques: Sequence[Array],
+    level: Level | None = None,
 ) -> Observation:
-    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every record, by the way of the identification.
+    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every
+    record, by the way of the identification.
 
     level : steps that the reader of counts is told; default: none, positions as they are.
     """
@@ -265,11 +342,21 @@ def system_of(
     return observations[0] if len(observations) == 1 else stack(observations)
 
 
-def with_deviation(observation: Observation, task: Task, level: Level) -> tuple[Observation, EstimateSettings]:
-    """The observation and the settings of its estimate; method tls is told the deviation of the positions, that of the level included."""
+def with_deviation(
+    observation: Observation, task: Task, level: Level
+) -> tuple[Observation, EstimateSettings]:
+    """The observation and the settings of its estimate, with the deviation of the positions, that
+    of
+    the level included, where the method asks for it.
+    """
     settings = point_estimate(task.estimate)
-    if settings.method != "tls":
+    if method_of(settings).position_error is None:
         return observation, settings
-    variance = float(settings.options.get("position_error", 0.0)) ** 2 + VARIANCE[task.settings.rounding] * level.delta**2
+    variance = (
+        float(settings.options.get("position_error", 0.0)) ** 2
+        + VARIANCE[task.settings.rounding] * level.delta**2
+    )
     errors = None if task.errors is None else variance * task.errors
-    return replace(observation, errors=errors), replace(settings, options={**settings.options, "position_error": variance**0.5})
+    return replace(observation, errors=errors), replace(
+        settings, options={**settings.options, "position_error": variance**0.5}
+    )

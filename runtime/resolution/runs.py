@@ -9,7 +9,10 @@ import numpy as np
 
 Array = np.ndarray
 
-NORMAL, TRIANGULAR = "normal equations", "triangular factor"  # How the least squares of a run was solved
+NORMAL, TRIANGULAR = (
+    "normal equations",
+    "triangular factor",
+)  # How the least squares of a run was solved
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,10 @@ class Runs(Sequence[Run]):
     def joined(cls, parts: Sequence[Runs], b: int) -> Runs:
         """All runs of the parts, by level and number; of a run that comes twice, the first."""
         parts = [cls.of((), b), *parts]
-        fields = [np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__]
+        fields = [
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in cls.__dataclass_fields__
+        ]
         _, first = np.unique(np.stack(fields[:2]), axis=1, return_index=True)
         return cls(*(field[first] for field in fields))
 
@@ -89,7 +95,13 @@ class Runs(Sequence[Run]):
 
     def __getitem__(self, i: int) -> Run:  # type: ignore[override]
         method = NORMAL if self.normal[i] else TRIANGULAR
-        return Run(int(self.level[i]), int(self.run[i]), tuple(self.X[i].tolist()), float(self.residual_norm[i]), method)
+        return Run(
+            int(self.level[i]),
+            int(self.run[i]),
+            tuple(self.X[i].tolist()),
+            float(self.residual_norm[i]),
+            method,
+        )
 
 
 @dataclass(frozen=True)
@@ -113,7 +125,11 @@ class Level:
         parts = []
         if self.delta:
             counts = 2 * np.pi / self.delta
-            parts.append(f"2*pi/{counts:.0f}" if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts else f"{self.delta:.4g}")
+            parts.append(
+                f"2*pi/{counts:.0f}"
+                if counts >= 2 and abs(counts - round(counts)) < 1e-9 * counts
+                else f"{self.delta:.4g}"
+            )
         if self.torque:
             parts.append(f"Phi {self.torque:.4g}")
         return " + ".join(parts) or "none"

@@ -1,1 +1,3 @@
-"""A study file as checked values: what an experiment is, apart from the robot and the measured numbers."""
+"""A study file as checked values: what an experiment is, apart from the robot and the measured
+numbers.
+"""

@@ -1,4 +1,5 @@
-"""Numbers written as arithmetic, `2*pi/10000`: numbers, pi, + - * / ** and parentheses, nothing else.
+"""Numbers written as arithmetic, `2*pi/10000`: numbers, pi, + - * / ** and parentheses, nothing
+else.
 
 The text is parsed to a syntax tree and the tree is walked; no text is ever executed.
 """
@@ -11,7 +12,7 @@ import operator
 import warnings
 from collections.abc import Callable
 
-LONGEST = 200  # characters: a number, not a program
+from runtime.limits import LIMIT
 
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -23,11 +24,15 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def number(text: str) -> float:
-    """The value of an arithmetic text; ValueError for other texts and for values that are not finite and real."""
-    if len(text) > LONGEST:
-        raise ValueError(f"a number of {len(text)} characters; at most {LONGEST}")
+    """The value of an arithmetic text; ValueError for other texts and for values that are not
+    finite and real.
+    """
+    if len(text) > LIMIT.NUMBER_CHARACTERS:
+        raise ValueError(f"a number of {len(text)} characters; at most {LIMIT.NUMBER_CHARACTERS}")
     try:
-        with warnings.catch_warnings(action="ignore"):  # of Python, about numbers that run into words
+        with warnings.catch_warnings(
+            action="ignore"
+        ):  # of Python, about numbers that run into words
             value = _value(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, RecursionError, MemoryError):
         raise ValueError(f"{text!r} is not a number; write e.g. 1e-3 or 2*pi/10000") from None
@@ -50,4 +55,6 @@ def _value(node: ast.expr) -> float:
             return _value(x)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             return _BINARY[type(op)](_value(left), _value(right))
-    raise ValueError(f"{ast.unparse(node)!r} is not allowed in a number; use numbers, pi, + - * / ** ( )")
+    raise ValueError(
+        f"{ast.unparse(node)!r} is not allowed in a number; use numbers, pi, + - * / ** ( )"
+    )

@@ -1,4 +1,5 @@
-"""The `controller` section of a study file: the closed loop that moves the arm, its reference, encoders and drives.
+"""The `controller` section of a study file: the closed loop that moves the arm, its reference,
+encoders and drives.
 
     controller:
       law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]}
@@ -18,7 +19,19 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from runtime.settings.schema import Count, Many, NotNegative, PerJoint, Positive, Real, Seed, Settings, Text, Whole, require
+from runtime.settings.schema import (
+    Count,
+    Many,
+    NotNegative,
+    PerJoint,
+    Positive,
+    Real,
+    Seed,
+    Settings,
+    Text,
+    Whole,
+    require,
+)
 from runtime.settings.trajectories import motion_from_mapping
 
 
@@ -28,10 +41,12 @@ def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 class Law(Settings):
-    """Control law of every joint on its own; e = q_r - q_m, u in the unit of the drive, torque = gain u.
+    """Control law of every joint on its own; e = q_r - q_m, u in the unit of the drive, torque =
+    gain u.
 
     pid      u = kp e + kd (qd_r - qd_m) + ki I,                       I = integral of e
-    cascade  u = kv (kp e + cv qd_r - qd_m) + ki I + ca qdd_r,         I = integral of kp e + cv qd_r - qd_m
+    cascade  u = kv (kp e + cv qd_r - qd_m) + ki I + ca qdd_r,
+            I = integral of kp e + cv qd_r - qd_m
 
     Attributes
     ----------
@@ -72,7 +87,8 @@ class Law(Settings):
 
 
 class Encoder(Settings):
-    """Measured position: white noise is added, then the sum is rounded to steps. Rad or m of its side.
+    """Measured position: white noise is added, then the sum is rounded to steps. Rad or m of its
+    side.
 
     Attributes
     ----------
@@ -114,7 +130,8 @@ class Torque(Settings):
 
 
 class Points(Settings):
-    """Motion between random points in the middle of the range, as fast as the limits of the robot file allow.
+    """Motion between random points in the middle of the range, as fast as the limits of the robot
+    file allow.
 
     Attributes
     ----------
@@ -134,11 +151,13 @@ class ReferenceSettings(Settings):
     Attributes
     ----------
     file : str or None
-        CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m; missing derivatives are differences.
+        CSV with columns q1 ..., qd1 ..., qdd1 ... (and t), at the controller rate, rad or m;
+        missing derivatives are differences.
     record : int or None
         Index, from 0, of a record that holds its reference, columns qr1 ...
     motion : mapping or None
-        Parts with their coefficients, as `runtime.settings.trajectories.motion_from_mapping` reads them.
+        Parts with their coefficients, as `runtime.settings.trajectories.motion_from_mapping` reads
+        them.
     points : Points or None
         Random points.
     limits : str
@@ -153,7 +172,11 @@ class ReferenceSettings(Settings):
 
     def __post_init__(self) -> None:
         given = [k for k in ("file", "record", "motion", "points") if getattr(self, k) is not None]
-        require(len(given) <= 1, f"{' and '.join(given)}; expected one of file, record, motion, points", *given[1:2])
+        require(
+            len(given) <= 1,
+            f"{' and '.join(given)}; expected one of file, record, motion, points",
+            *given[1:2],
+        )
 
 
 class Controller(Settings):
@@ -170,7 +193,8 @@ class Controller(Settings):
     velocity : str
         qd_m as the difference of two positions, or averaged, (q_k - q_(k-2))/2T.
     feedforward : str
-        values adds the torque of the reference with the parameters of the robot file; record adds the recorded one, `record.columns.tau_ff`.
+        values adds the torque of the reference with the parameters of the robot file; record adds
+        the recorded one, `record.columns.tau_ff`.
     encoder : Encoder
         Measurement of the positions.
     torque : Torque

@@ -36,14 +36,17 @@ class ExcitationSettings(Settings):
     Attributes
     ----------
     parts : tuple of mapping
-        Families in the order of the motion (`runtime.settings.trajectories`), each a mapping with its `family`.
+        Families in the order of the motion (`runtime.settings.trajectories`), each a mapping with
+        its `family`.
     criterion : str
-        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the largest predicted %sigma over that of the motion of
+        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
+        largest predicted %sigma over that of the motion of
         the record: below 1, every parameter is told better than by it.
     columns : str or tuple of str
         essential (of an estimate), all, or names.
     limits : mapping
-        q, qd, qdd, tau in place of those of the robot file: one value per joint, or [lower, upper] for q.
+        q, qd, qdd, tau in place of those of the robot file: one value per joint, or [lower, upper]
+        for q.
     torque_rms : tuple of float or None, N m or N
         Largest root mean square of each torque; null: unlimited.
     torque_rate : tuple of float or None, N m/s or N/s
@@ -59,7 +62,8 @@ class ExcitationSettings(Settings):
     spheres : tuple of Sphere
         Balls on the links.
     apart : tuple of pairs of int or None
-        Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not next to each other.
+        Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not
+        next to each other.
     gap : float, m
         Smallest distance between the surfaces of such a pair.
     smooth : float, rad/s or m/s
@@ -98,7 +102,11 @@ class ExcitationSettings(Settings):
 
     def __post_init__(self) -> None:
         for pair in self.apart or ():
-            require(all(1 <= k <= len(self.spheres) for k in pair), f"{list(pair)}; there are {len(self.spheres)} spheres", "apart")
+            require(
+                all(1 <= k <= len(self.spheres) for k in pair),
+                f"{list(pair)}; there are {len(self.spheres)} spheres",
+                "apart",
+            )
         _ = self.families
 
     @property
@@ -112,4 +120,9 @@ class ExcitationSettings(Settings):
         if self.apart is not None:
             return tuple((a - 1, b - 1) for a, b in self.apart)
         count = range(len(self.spheres))
-        return tuple((a, b) for a in count for b in count if a < b and abs(self.spheres[a].frame - self.spheres[b].frame) > 1)
+        return tuple(
+            (a, b)
+            for a in count
+            for b in count
+            if a < b and abs(self.spheres[a].frame - self.spheres[b].frame) > 1
+        )

@@ -1,12 +1,20 @@
-"""Families of trajectories that rest at both ends: finite Fourier series, sinusoids of free frequency, point to point, triangular.
+"""Families of trajectories that rest at both ends: finite Fourier series, sinusoids of free
+frequency, point to point, triangular.
 
-    Fourier        q = q0 + sum_l a_l/(w l) sin(w l t) - b_l/(w l) cos(w l t),   w = 2 pi/period       (Swevers et al. 1997)
-    Sinusoids      q = q0 + e(t) sum_l A_l sin(2 pi f_l t + phi_l), e(t) rising from 0 to 1 and falling to 0
-    PointToPoint   constant velocities between points, at rest in each of them                          (chapter, figure 3)
-    Triangular     constant velocities between points, turning without rest                             (chapter, section 4.2.1)
+    Fourier        q = q0 + sum_l a_l/(w l) sin(w l t) - b_l/(w l) cos(w l t),   w = 2 pi/period
+            (Swevers et al. 1997)
+    Sinusoids
+            q = q0 + e(t) sum_l A_l sin(2 pi f_l t + phi_l), e(t) rising from 0 to 1 and falling to
+            0
+    PointToPoint   constant velocities between points, at rest in each of them
+            (chapter, figure 3)
+    Triangular     constant velocities between points, turning without rest
+            (chapter, section 4.2.1)
 
-A family turns the coefficients p of one joint into its motion. The same text evaluates arrays (numpy) and expressions (casadi): `math` is the
-module whose sin and cos apply. All but Sinusoids are linear in p. Position, velocity and acceleration are continuous. SI, rad.
+A family turns the coefficients p of one joint into its motion. The same text evaluates arrays
+(numpy) and expressions (casadi): `math` is the
+module whose sin and cos apply. All but Sinusoids are linear in p. Position, velocity and
+acceleration are continuous. SI, rad.
 """
 
 from __future__ import annotations
@@ -19,14 +27,13 @@ import numpy as np
 from pydantic import Field
 
 from runtime.errors import SettingsError
+from runtime.limits import LIMIT
 from runtime.settings.schema import Path, Positive, Settings, Whole, require, structure
-
-MOST = 1000  # harmonics, terms or points of one part: far more than a motion of a robot has, few enough for any memory
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
-Terms = Annotated[Whole, Field(ge=1, le=MOST)]
-Corners = Annotated[Whole, Field(ge=2, le=MOST)]
+Terms = Annotated[Whole, Field(ge=1, le=LIMIT.PART_SIZE)]
+Corners = Annotated[Whole, Field(ge=2, le=LIMIT.PART_SIZE)]
 
 
 class Family:
@@ -43,11 +50,15 @@ class Family:
         raise NotImplementedError
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape (P,)."""
+        """q, qd, qdd of one joint at the times t, shape (N,), from its coefficients p, shape
+        (P,).
+        """
         raise NotImplementedError
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
-        """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no faster than about `speed`."""
+        """Random coefficients, shape (P,), of a motion about the middle of [lower, upper], no
+        faster than about `speed`.
+        """
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
@@ -56,7 +67,8 @@ class Family:
 
 
 class Fourier(Family, Settings):
-    """Finite Fourier series. At rest at its ends where sum a_l = 0 and sum l b_l = 0, a condition on p that the search imposes.
+    """Finite Fourier series. At rest at its ends where sum a_l = 0 and sum l b_l = 0, a condition
+    on p that the search imposes.
 
     Attributes
     ----------
@@ -85,7 +97,11 @@ class Fourier(Family, Settings):
         wl = 2 * np.pi / self.period * np.arange(1, self.harmonics + 1)
         c, s = np.cos(np.outer(t, wl)), np.sin(np.outer(t, wl))
         one, zero = np.ones((len(t), 1)), np.zeros((len(t), 1))
-        q, qd, qdd = np.hstack([one, s / wl, -c / wl]), np.hstack([zero, c, s]), np.hstack([zero, -s * wl, c * wl])
+        q, qd, qdd = (
+            np.hstack([one, s / wl, -c / wl]),
+            np.hstack([zero, c, s]),
+            np.hstack([zero, -s * wl, c * wl]),
+        )
         return _linear((q, qd, qdd), p, math)
 
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
@@ -118,7 +134,10 @@ class Sinusoids(Family, Settings):
     ramp: Positive = 1.0
 
     def __post_init__(self) -> None:
-        message = f"sinusoids rise and fall within {self.ramp} s each, more than their length of {self.length} s; shorten it"
+        message = (
+            f"sinusoids rise and fall within {self.ramp} s each, more than their length of "
+            f"{self.length} s; shorten it"
+        )
         require(2 * self.ramp <= self.length, message, "ramp")
 
     @property
@@ -131,14 +150,23 @@ class Sinusoids(Family, Settings):
         return ("q0", *(f"{letter}{k}" for letter in ("A", "f", "phi") for k in terms))
 
     def joint(self, t: Array, p: Any, math: Any) -> States:
-        e, ed, edd = (rise + fall for rise, fall in zip(_step(t, self.ramp), _step(self.length - t, self.ramp, -1.0), strict=True))
+        e, ed, edd = (
+            rise + fall
+            for rise, fall in zip(
+                _step(t, self.ramp), _step(self.length - t, self.ramp, -1.0), strict=True
+            )
+        )
         e = e - 1.0
         L = self.terms
         s = sd = sdd = 0.0 * t if math is np else math.DM(0.0 * t)
         for k in range(L):
             A, w, phi = p[1 + k], 2 * np.pi * p[1 + L + k], p[1 + 2 * L + k]
             angle = (t if math is np else math.DM(t)) * w + phi
-            s, sd, sdd = s + A * math.sin(angle), sd + A * w * math.cos(angle), sdd - A * w**2 * math.sin(angle)
+            s, sd, sdd = (
+                s + A * math.sin(angle),
+                sd + A * w * math.cos(angle),
+                sdd - A * w**2 * math.sin(angle),
+            )
         return p[0] + e * s, ed * s + e * sd, edd * s + 2 * ed * sd + e * sdd
 
     def bounds(self) -> tuple[Array, Array]:
@@ -150,11 +178,15 @@ class Sinusoids(Family, Settings):
     def guess(self, rng: np.random.Generator, lower: float, upper: float, speed: float) -> Array:
         f = rng.uniform(0.1, 1.0, self.terms) * self.highest
         A = 0.5 * np.minimum((upper - lower) / 2, speed / (2 * np.pi * f)) / self.terms
-        return np.concatenate([[_between(rng, lower, upper)], A, f, rng.uniform(-np.pi, np.pi, self.terms)])
+        return np.concatenate(
+            [[_between(rng, lower, upper)], A, f, rng.uniform(-np.pi, np.pi, self.terms)]
+        )
 
 
 class Polyline(Family):
-    """Positions p0, p1 ... at constant velocities between them, corners rounded; `ramps` tells when each velocity begins and ends."""
+    """Positions p0, p1 ... at constant velocities between them, corners rounded; `ramps` tells when
+    each velocity begins and ends.
+    """
 
     points: int
     blend: float
@@ -176,7 +208,9 @@ class Polyline(Family):
         basis = np.zeros((3, len(t), self.points))
         basis[0, :, 0] = 1.0
         for k, (start, stop) in enumerate(self.ramps):
-            piece = (_corner(t - start, self.blend) - _corner(t - stop, self.blend)) / (stop - start)
+            piece = (_corner(t - start, self.blend) - _corner(t - stop, self.blend)) / (
+                stop - start
+            )
             basis[:, :, k] -= piece
             basis[:, :, k + 1] += piece
         return _linear(tuple(basis), p, math)
@@ -206,7 +240,10 @@ class PointToPoint(Polyline, Settings):
     blend: Positive = 0.3
 
     def __post_init__(self) -> None:
-        message = f"point-to-point: gaining and losing speed takes {2 * self.blend} s of {self.travel} s; shorten it"
+        message = (
+            f"point-to-point: gaining and losing speed takes {2 * self.blend} s of "
+            f"{self.travel} s; shorten it"
+        )
         require(2 * self.blend <= self.travel, message, "blend")
 
     @property
@@ -216,7 +253,9 @@ class PointToPoint(Polyline, Settings):
     @property
     def ramps(self) -> list[tuple[float, float]]:
         half = self.blend / 2
-        return [(self.travel * k + half, self.travel * (k + 1) - half) for k in range(self.points - 1)]
+        return [
+            (self.travel * k + half, self.travel * (k + 1) - half) for k in range(self.points - 1)
+        ]
 
     def stride(self, speed: float) -> float:
         return 0.5 * speed * (self.travel - self.blend)
@@ -243,7 +282,10 @@ class Triangular(Polyline, Settings):
     speed: Positive = 0.5
 
     def __post_init__(self) -> None:
-        message = f"triangular: a corner takes {self.blend} s, more than the {self.travel} s between corners; shorten it"
+        message = (
+            f"triangular: a corner takes {self.blend} s, more than the {self.travel} s "
+            "between corners; shorten it"
+        )
         require(self.blend <= self.travel, message, "blend")
 
     @property
@@ -267,7 +309,8 @@ FAMILIES: Mapping[str, type[Family]] = {
 
 
 def family_from_mapping(mapping: Mapping[str, Any], path: Path = ()) -> Family:
-    """A family from {"family": "fourier", "period": 10 ...}; settings that are left out have their defaults.
+    """A family from {"family": "fourier", "period": 10 ...}; settings that are left out have their
+    defaults.
 
     Parameters
     ----------
@@ -277,7 +320,10 @@ def family_from_mapping(mapping: Mapping[str, Any], path: Path = ()) -> Family:
     settings = dict(mapping)
     kind = FAMILIES.get(str(settings.pop("family", None)))
     if kind is None:
-        raise SettingsError(f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}", path=(*path, "family"))
+        raise SettingsError(
+            f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}",
+            path=(*path, "family"),
+        )
     return structure(kind, settings, path)
 
 
@@ -292,17 +338,23 @@ def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:
 
 
 def _step(t: Array, width: float, sign: float = 1.0) -> tuple[Array, Array, Array]:
-    """A smooth step from 0 to 1 within [0, width], 10 x^3 - 15 x^4 + 6 x^5, and its derivatives by time, of time running as `sign`."""
+    """A smooth step from 0 to 1 within [0, width], 10 x^3 - 15 x^4 + 6 x^5, and its derivatives by
+    time, of time running as `sign`.
+    """
     x = np.clip(t / width, 0.0, 1.0)
     speed, bend = 30 * x**2 * (1 - x) ** 2 / width, 60 * x * (1 - x) * (1 - 2 * x) / width**2
     return x**3 * (10 - 15 * x + 6 * x**2), sign * speed, bend
 
 
 def _corner(u: Array, blend: float) -> Array:
-    """A ramp max(u, 0) whose corner is rounded within |u| < blend/2, with its two derivatives, shape (3, N); the speed rises as 3 x^2 - 2 x^3."""
+    """A ramp max(u, 0) whose corner is rounded within |u| < blend/2, with its two derivatives,
+    shape (3, N); the speed rises as 3 x^2 - 2 x^3.
+    """
     x = np.clip(u / blend + 0.5, 0.0, 1.0)
     beyond = np.maximum(u - blend / 2, 0.0)
-    return np.array([blend * (x**3 - x**4 / 2) + beyond, 3 * x**2 - 2 * x**3, 6 * x * (1 - x) / blend])
+    return np.array(
+        [blend * (x**3 - x**4 / 2) + beyond, 3 * x**2 - 2 * x**3, 6 * x * (1 - x) / blend]
+    )
 
 
 def _between(rng: np.random.Generator, lower: float, upper: float) -> float:

@@ -1,4 +1,6 @@
-"""Study files: YAML 1.2, read to plain values with the line of every key, so that an error names its line."""
+"""Study files: YAML 1.2, read to plain values with the line of every key, so that an error names
+its line.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +9,10 @@ from typing import TypeVar
 
 from runtime.errors import InputError, SettingsError
 from runtime.files import require_file
+from runtime.limits import LIMIT
 from runtime.settings.schema import structure
 from runtime.settings.study import Study
-from runtime.settings.yaml import LONGEST, yaml_values
+from runtime.settings.yaml import yaml_values
 
 T = TypeVar("T")
 
@@ -22,12 +25,17 @@ def load_study(path: str | Path) -> Study:
 def text_of(path: str | Path) -> str:
     """The text of a file of settings."""
     path = Path(path)
-    if require_file(path) > 4 * LONGEST:  # bytes of so many characters
-        raise InputError(f"more than {4 * LONGEST} bytes; a file of settings has a few thousand", file=str(path))
+    if require_file(path) > 4 * LIMIT.YAML_CHARACTERS:  # bytes of so many characters
+        raise InputError(
+            f"more than {4 * LIMIT.YAML_CHARACTERS} bytes; a file of settings has a few thousand",
+            file=str(path),
+        )
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as e:
-        raise InputError(f"byte {e.start} is not UTF-8; save the file as UTF-8", file=str(path)) from e
+        raise InputError(
+            f"byte {e.start} is not UTF-8; save the file as UTF-8", file=str(path)
+        ) from e
     except OSError as e:
         raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
 
@@ -57,4 +65,6 @@ def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
         return structure(kind, {} if values is None else values)
     except SettingsError as e:
         known = (e.path[:k] for k in range(len(e.path), -1, -1) if e.path[:k] in lines)
-        raise SettingsError(e.reason, path=e.path, file=file, line=lines.get(next(known, ()))) from None
+        raise SettingsError(
+            e.reason, path=e.path, file=file, line=lines.get(next(known, ()))
+        ) from None

@@ -1,4 +1,6 @@
-"""Files that a study names: relative to the study file, to the current folder, or to the folder where the study is written."""
+"""Files that a study names: relative to the study file, to the current folder, or to the folder
+where the study is written.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,14 @@ def located(study: Study, folder: Path) -> Study:
 
 
 def study_text(study: Study, destination: Path) -> str:
-    """The text of study.yaml in the folder `destination`: every setting, defaults included; files relative to that folder."""
-    return yaml_text(to_mapping(_with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())))
+    """The text of study.yaml in the folder `destination`: every setting, defaults included; files
+    relative to that folder.
+    """
+    return yaml_text(
+        to_mapping(
+            _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
+        )
+    )
 
 
 def _with_files(study: Study, change: Callable[[str], str]) -> Study:
@@ -27,13 +35,22 @@ def _with_files(study: Study, change: Callable[[str], str]) -> Study:
 
     def changed(records: tuple[RecordSettings, ...]) -> tuple[RecordSettings, ...]:
         return tuple(
-            record if record.dataset is not None else replace(record, files=tuple(map(change, record.files))) for record in records
+            record
+            if record.dataset is not None
+            else replace(record, files=tuple(map(change, record.files)))
+            for record in records
         )
 
-    study = replace(study, record=changed(study.record), validate=replace(study.validate, record=changed(study.validate.record)))
+    study = replace(
+        study,
+        record=changed(study.record),
+        validate=replace(study.validate, record=changed(study.validate.record)),
+    )
     if study.payload is not None:
         study = replace(study, payload=replace(study.payload, record=changed(study.payload.record)))
     if study.controller is not None and study.controller.reference.file is not None:
-        reference = replace(study.controller.reference, file=change(study.controller.reference.file))
+        reference = replace(
+            study.controller.reference, file=change(study.controller.reference.file)
+        )
         study = replace(study, controller=replace(study.controller, reference=reference))
     return study

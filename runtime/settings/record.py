@@ -1,4 +1,6 @@
-"""Settings of measured records: where they lie, what their columns mean, what is done about their time stamps. Part of a Study."""
+"""Settings of measured records: where they lie, what their columns mean, what is done about their
+time stamps. Part of a Study.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from runtime.settings.schema import Many, NotNegative, PerJoint, Positive, Real, Settings, Text, require
+from runtime.settings.schema import (
+    Many,
+    NotNegative,
+    PerJoint,
+    Positive,
+    Real,
+    Settings,
+    Text,
+    require,
+)
 from runtime.settings.units import COMMANDS, position_unit, time_unit, torque_unit
-
-SHORTEST = 10  # samples of a record, or of a block of one: fewer cannot be filtered nor differentiated twice
 
 
 def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -49,8 +58,10 @@ BY_NAME = ("names",)  # columns found by the names of the joints
 class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
-    A name may be the number of the column (from 1) in a file without header, or an (N, n) array of a .npz or .mat file, which stands
-    for its n columns. `names` stands for the labels of the joints in the robot file: a column is called as the joint, or q_ and the joint,
+    A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
+    a .npz or .mat file, which stands
+    for its n columns. `names` stands for the labels of the joints in the robot file: a column is
+    called as the joint, or q_ and the joint,
     joint.position, tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
 
     Attributes
@@ -62,11 +73,14 @@ class Columns(Settings):
     tau : tuple of str
         Torques.
     qr : tuple of str
-        Reference positions, where the file of the positions holds them; unit and side are those of q.
+        Reference positions, where the file of the positions holds them; unit and side are those of
+        q.
     tau_ff : tuple of str
-        Feed-forward torques that the controller added, in the file of the torques; unit and side are those of tau. For methods that simulate it.
+        Feed-forward torques that the controller added, in the file of the torques; unit and side
+        are those of tau. For methods that simulate it.
     tau_known : tuple of str
-        Torques of the drives that do not come from the model (a counterbalance, a cable), computed elsewhere; N m or N, joint side. They are
+        Torques of the drives that do not come from the model (a counterbalance, a cable), computed
+        elsewhere; N m or N, joint side. They are
         subtracted from tau. 0 in place of a name: none on this joint.
     """
 
@@ -81,7 +95,8 @@ class Columns(Settings):
 class Units(Settings):
     """Units of the columns: one, or one per joint, by any name that `runtime.settings.units` knows.
 
-    Counts need the counts per revolution; units of current and voltage are turned into torque by the torque constant.
+    Counts need the counts per revolution; units of current and voltage are turned into torque by
+    the torque constant.
 
     Attributes
     ----------
@@ -99,7 +114,8 @@ class Units(Settings):
 
 
 class Scale(Settings):
-    """Factors on the columns before their unit applies: a number, one per joint, or the name of a scalar in the file.
+    """Factors on the columns before their unit applies: a number, one per joint, or the name of a
+    scalar in the file.
 
     Attributes
     ----------
@@ -121,10 +137,12 @@ class Resample(Settings):
     rate : float or None, Hz
         Sampling rate made; default: record.rate, else the mean rate of the record.
     method : str
-        cubic or linear interpolate between the stamps; count takes the samples as they are, for a logger whose stamps jitter while the
+        cubic or linear interpolate between the stamps; count takes the samples as they are, for a
+        logger whose stamps jitter while the
         controller samples uniformly.
     gaps : str
-        refuse a record with gaps or with time that goes back, or split it at these places into records of their own.
+        refuse a record with gaps or with time that goes back, or split it at these places into
+        records of their own.
     longest : float, sampling periods
         Steps up to this length are bridged, longer ones are gaps.
     shortest : float, s
@@ -144,7 +162,8 @@ class RecordSettings(Settings):
     Attributes
     ----------
     files : tuple of str
-        One file with all columns, or two: positions (and time), then torques; then, where it is apart, the file of the known torques. Relative to
+        One file with all columns, or two: positions (and time), then torques; then, where it is
+        apart, the file of the known torques. Relative to
         the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
@@ -161,7 +180,8 @@ class RecordSettings(Settings):
     counts_per_revolution : float or tuple of float or None
         Counts in one turn of the encoder, on the side of q; needed where the unit of q is counts.
     torque_constant : float or tuple of float or None, N*m/A or N*m/V
-        For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor, or with the gear in it for the joint.
+        For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
+        or with the gear in it for the joint.
     coupling : str
         Use the off-diagonal part of R for both, for position or torque alone, or for none.
     jitter : float, sampling periods
@@ -173,11 +193,13 @@ class RecordSettings(Settings):
     topic : str or None
         Topic of a bag that holds several of sensor_msgs/JointState.
     decimal : str
-        Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or blanks).
+        Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or
+        blanks).
     resample : Resample or None
         How a time column that is not uniform is made so; null: it is refused.
     also : tuple of tuple of str
-        Files of further records with the same settings, each a record of its own: [b.csv, c.csv], or pairs of files.
+        Files of further records with the same settings, each a record of its own: [b.csv, c.csv],
+        or pairs of files.
     """
 
     files: Many[Text] = ()
@@ -201,18 +223,31 @@ class RecordSettings(Settings):
     def __post_init__(self) -> None:
         most = 3 if self.columns.tau_known else 2
         message = f"{len(self.files)} files; expected one, or two (positions, then torques)"
-        require(len(self.files) <= most, message + (", and one of known torques" if most > 2 else ""), "files")
+        require(
+            len(self.files) <= most,
+            message + (", and one of known torques" if most > 2 else ""),
+            "files",
+        )
         for i, files in enumerate(self.also):
-            message = f"{len(files)} files; expected {len(self.files)}, as in files: {list(self.files)}"
+            message = (
+                f"{len(files)} files; expected {len(self.files)}, as in files: {list(self.files)}"
+            )
             require(len(files) == len(self.files), message, "also", i)
         counts = any(position_unit(unit)[0] == "counts" for unit in _each(self.units.q))
         commands = any(torque_unit(unit)[0] in COMMANDS for unit in _each(self.units.tau))
-        require(self.counts_per_revolution is not None or not counts, "missing; positions in counts need it", "counts_per_revolution")
+        require(
+            self.counts_per_revolution is not None or not counts,
+            "missing; positions in counts need it",
+            "counts_per_revolution",
+        )
         for key, used, unit, units in (
             ("counts_per_revolution", counts, "q", "counts"),
             ("torque_constant", commands, "tau", "mA, A or V"),
         ):
-            message = f"given, but units.{unit} is {', '.join(_each(getattr(self.units, unit)))}; say {units} there, or leave this out"
+            message = (
+                f"given, but units.{unit} is {', '.join(_each(getattr(self.units, unit)))}; "
+                f"say {units} there, or leave this out"
+            )
             require(getattr(self, key) is None or used, message, key)
 
     @property
@@ -226,7 +261,10 @@ def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...
     return tuple(
         single
         for record in settings
-        for single in (replace(record, also=()), *(replace(record, files=files, also=(), name=None) for files in record.also))
+        for single in (
+            replace(record, also=()),
+            *(replace(record, files=files, also=(), name=None) for files in record.also),
+        )
     )
 
 

@@ -1,4 +1,5 @@
-"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields, mappings in and out.
+"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields,
+mappings in and out.
 
     class Lowpass(Settings):
         cutoff: Positive = 50.0
@@ -6,7 +7,8 @@
     Lowpass(cutoff=-1)                       # SettingsError: cutoff: -1; expected more than 0
     structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
 
-A number may be an arithmetic text (`2*pi/10000`), one value stands for a list of one, an integer stands for its text.
+A number may be an arithmetic text (`2*pi/10000`), one value stands for a list of one, an integer
+stands for its text.
 """
 
 from __future__ import annotations
@@ -16,7 +18,15 @@ from dataclasses import field, fields
 from numbers import Integral
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs
 
@@ -30,7 +40,8 @@ CONFIG = ConfigDict(extra="forbid", defer_build=True)  # built when the first in
 
 
 class Written:
-    """Annotation of a type that a file may write in a further way: what the JSON Schema of the type says in its place.
+    """Annotation of a type that a file may write in a further way: what the JSON Schema of the type
+    says in its place.
 
     Parameters
     ----------
@@ -41,7 +52,9 @@ class Written:
     def __init__(self, form: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
         self.form = form
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: Callable[[Any], dict[str, Any]]
+    ) -> dict[str, Any]:
         return self.form(handler(schema))
 
 
@@ -61,12 +74,17 @@ def _text(value: Any) -> Any:
 
 
 def _list(value: Any) -> Any:
-    several = value is None or (isinstance(value, Iterable) and not isinstance(value, str | Mapping))
+    several = value is None or (
+        isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    )
     return value if several else (value,)
 
 
 Real = Annotated[
-    float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_number), Written(lambda s: {**s, "type": ["number", "string"]})
+    float,
+    Field(strict=True, allow_inf_nan=False),
+    BeforeValidator(_number),
+    Written(lambda s: {**s, "type": ["number", "string"]}),
 ]
 Positive = Annotated[Real, Field(gt=0)]
 NotNegative = Annotated[Real, Field(ge=0)]
@@ -74,15 +92,21 @@ Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
 Count = Annotated[Whole, Field(ge=1)]
 Seed = Annotated[Whole, Field(ge=0)]
 Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, BeforeValidator(_text), Written(lambda s: {**s, "type": ["string", "integer"]})]
+Text = Annotated[
+    str, BeforeValidator(_text), Written(lambda s: {**s, "type": ["string", "integer"]})
+]
 PerJoint: TypeAlias = T | tuple[T, ...]
 """One value for all joints, or one per joint."""
-Many = Annotated[tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyOf": [s, s["items"]]})]
+Many = Annotated[
+    tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyOf": [s, s["items"]]})
+]
 """A list; one value stands for a list of one."""
 
 
 def require(ok: bool, message: str, *path: str | int) -> None:
-    """SettingsError about the key at `path` unless `ok`; from __post_init__, `path` starts at the settings that call this function."""
+    """SettingsError about the key at `path` unless `ok`; from __post_init__, `path` starts at the
+    settings that call this function.
+    """
     if not ok:
         raise SettingsError(message, path=path)
 
@@ -110,7 +134,9 @@ Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 
 
 class SettingsType(type):
-    """Type of settings: values that pydantic refuses become a SettingsError, which names the key and what it expects."""
+    """Type of settings: values that pydantic refuses become a SettingsError, which names the key
+    and what it expects.
+    """
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         try:
@@ -118,13 +144,18 @@ class SettingsType(type):
         except ValidationError as e:
             problem = settings_error(e, {**dict(enumerate(args)), **kwargs})
             names: dict[str | int, str | int] = dict(enumerate(f.name for f in fields(cls)))  # type: ignore[arg-type]
-            raise SettingsError(problem.reason, path=tuple(names.get(k, k) for k in problem.path[:1]) + problem.path[1:]) from None
+            raise SettingsError(
+                problem.reason,
+                path=tuple(names.get(k, k) for k in problem.path[:1]) + problem.path[1:],
+            ) from None
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
 @dataclass(frozen=True, config=CONFIG)
 class Settings(metaclass=SettingsType):
-    """Base of all settings. A subclass is a frozen dataclass of which only instances with valid values can be made."""
+    """Base of all settings. A subclass is a frozen dataclass of which only instances with valid
+    values can be made.
+    """
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, config=CONFIG)(cls)
@@ -137,10 +168,15 @@ class Settings(metaclass=SettingsType):
             return given
         names = [f.name for f in fields(cls)]
         if not isinstance(given, Mapping):
-            raise SettingsError(f"{shown(given)}; expected a mapping with some of {', '.join(names)}")
+            raise SettingsError(
+                f"{shown(given)}; expected a mapping with some of {', '.join(names)}"
+            )
         if unknown := [str(k) for k in given if k not in names]:
             several = "s" if len(unknown) > 1 else ""
-            raise SettingsError(f"unknown key{several} {', '.join(unknown)}; known: {', '.join(names)}", path=(unknown[0],))
+            raise SettingsError(
+                f"unknown key{several} {', '.join(unknown)}; known: {', '.join(names)}",
+                path=(unknown[0],),
+            )
         return value
 
 
@@ -168,5 +204,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
 
 
 def to_mapping(settings: Any) -> dict[str, Any]:
-    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections; study_from_mapping(to_mapping(s)) == s."""
+    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections;
+    study_from_mapping(to_mapping(s)) == s.
+    """
     return plain(settings)  # type: ignore[no-any-return]

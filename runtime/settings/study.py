@@ -4,8 +4,10 @@
     study.signals.lowpass.order        # 4, the default
     to_mapping(study)                  # complete, defaults filled: written into every result
 
-Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1): Butterworth of order 4 at 50 Hz forward and backward on q and qd, central
-differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the threshold 1.04, five CESTAC runs.
+Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1): Butterworth of order 4 at 50 Hz
+forward and backward on q and qd, central
+differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
+threshold 1.04, five CESTAC runs.
 Units: SI, rad, Hz. Values are checked where they are made, so a Study that exists is a valid one.
 """
 
@@ -18,9 +20,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from runtime.limits import LIMIT
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.record import SHORTEST, Columns, Records, RecordSettings, Resample, Scale, Units
+from runtime.settings.record import (
+    Columns,
+    Records,
+    RecordSettings,
+    Resample,
+    Scale,
+    Units,
+)
 from runtime.settings.schema import (
     Count,
     Flag,
@@ -77,7 +87,8 @@ class Lowpass(Settings):
 
 
 class Decimate(Settings):
-    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB, 0.8/factor, zero phase, one sample kept in `factor`.
+    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB,
+    0.8/factor, zero phase, one sample kept in `factor`.
 
     Attributes
     ----------
@@ -100,7 +111,8 @@ class Signals(Settings):
     Attributes
     ----------
     median : int
-        Window of the median filter on positions and torques, odd number of samples; 1 switches it off.
+        Window of the median filter on positions and torques, odd number of samples; 1 switches it
+        off.
     lowpass : Lowpass or None
         Low-pass filter; null switches it off.
     ends : str
@@ -108,14 +120,16 @@ class Signals(Settings):
     decimate : Decimate or None
         Decimation; null switches it off.
     reader : str
-        Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of an encoder, which bound the motion, and
+        Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of
+        an encoder, which bound the motion, and
         needs no median.
     step : float or tuple of float or None, rad or m
         Step of the encoders, for counts; null: from the record.
     side : str
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
     lines : str
-        Lines of the encoders at unequal distances, for counts: detected widens the bounds by their deviation; estimated finds them with the motion.
+        Lines of the encoders at unequal distances, for counts: detected widens the bounds by their
+        deviation; estimated finds them with the motion.
     """
 
     median: OddWindow = 5
@@ -128,8 +142,16 @@ class Signals(Settings):
     lines: Literal["detected", "estimated"] = "detected"
 
     def __post_init__(self) -> None:
-        for key, given in (("step", self.step is not None), ("side", self.side != "joint"), ("lines", self.lines != "detected")):
-            require(self.reader == "counts" or not given, "given, but reader is lowpass; it is a setting of reader: counts", key)
+        for key, given in (
+            ("step", self.step is not None),
+            ("side", self.side != "joint"),
+            ("lines", self.lines != "detected"),
+        ):
+            require(
+                self.reader == "counts" or not given,
+                "given, but reader is lowpass; it is a setting of reader: counts",
+                key,
+            )
 
     @property
     def admits_missing(self) -> bool:
@@ -147,7 +169,8 @@ class Rows(Settings):
     trim : int
         Decimated samples left out at each end of the window, where the filters start.
     low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may have another unit: 2 rpm.
+        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
+        have another unit: 2 rpm.
     """
 
     window: Interval = (None, None)
@@ -203,7 +226,11 @@ class ValidateSettings(Settings):
     record: Records = ()
 
     def __post_init__(self) -> None:
-        require(len(self.split) != 1, "one window; expected at least two, the first to fit, the others to predict", "split")
+        require(
+            len(self.split) != 1,
+            "one window; expected at least two, the first to fit, the others to predict",
+            "split",
+        )
 
 
 class PayloadSettings(Settings):
@@ -216,9 +243,11 @@ class PayloadSettings(Settings):
     link : int or None
         Number of the link with the load; default: the last, or that of the frame.
     frame : int or None
-        Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the load are meant; default: that of the link.
+        Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
+        load are meant; default: that of the link.
     known : mapping of float, SI
-        Those of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at that frame, that were weighed or computed.
+        Those of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at that frame, that were weighed or
+        computed.
     friction : bool
         The records with the load have friction of their own.
     gains : bool
@@ -234,9 +263,20 @@ class PayloadSettings(Settings):
 
     def __post_init__(self) -> None:
         for family in self.known:
-            require(family in LOAD, f"unknown parameter; a load has {', '.join(LOAD)}", "known", family)
-        require(self.known.get("M", 1.0) > 0, f"{self.known.get('M')} kg; expected a positive mass", "known", "M")
-        require(not self.gains or "M" in self.known, "torque constants need a weighed load: set known: {M: ...}", "gains")
+            require(
+                family in LOAD, f"unknown parameter; a load has {', '.join(LOAD)}", "known", family
+            )
+        require(
+            self.known.get("M", 1.0) > 0,
+            f"{self.known.get('M')} kg; expected a positive mass",
+            "known",
+            "M",
+        )
+        require(
+            not self.gains or "M" in self.known,
+            "torque constants need a weighed load: set known: {M: ...}",
+            "gains",
+        )
 
 
 class CestacSettings(Settings):
@@ -247,11 +287,13 @@ class CestacSettings(Settings):
     side : str
         Side of the encoder: joint or motor.
     rounding : str
-        Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is random by joint and run.
+        Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is
+        random by joint and run.
     uneven : float
         Deviation of the lines of law phase from even spacing, in steps.
     place : str
-        What is rounded: the positions of the record, or, in the closed loop of study.controller simulated anew in every run, its encoder.
+        What is rounded: the positions of the record, or, in the closed loop of study.controller
+        simulated anew in every run, its encoder.
     delta : tuple of float, rad or m
         Steps of the perturbed position.
     runs : int
@@ -282,13 +324,31 @@ class CestacSettings(Settings):
 
     def __post_init__(self) -> None:
         law, loop = self.rounding, self.place == "loop"
-        require(not self.uneven or law == "phase", f"{self.uneven} with rounding: {law}; uneven lines belong to rounding: phase", "uneven")
         require(
-            not (self.common and law == "phase"), "the phase of rounding: phase is drawn anew for every step; set common: false", "common"
+            not self.uneven or law == "phase",
+            f"{self.uneven} with rounding: {law}; uneven lines belong to rounding: phase",
+            "uneven",
         )
-        require(not loop or law == "phase", f"{law} with place: loop; the encoder in the loop rounds by the law phase alone", "rounding")
-        require(not (loop and self.uneven), f"{self.uneven} with place: loop; the encoder in the loop has even lines", "uneven")
-        require(not (loop and self.torque), "with place: loop; steps of the torque there are controller.torque.step", "torque")
+        require(
+            not (self.common and law == "phase"),
+            "the phase of rounding: phase is drawn anew for every step; set common: false",
+            "common",
+        )
+        require(
+            not loop or law == "phase",
+            f"{law} with place: loop; the encoder in the loop rounds by the law phase alone",
+            "rounding",
+        )
+        require(
+            not (loop and self.uneven),
+            f"{self.uneven} with place: loop; the encoder in the loop has even lines",
+            "uneven",
+        )
+        require(
+            not (loop and self.torque),
+            "with place: loop; steps of the torque there are controller.torque.step",
+            "torque",
+        )
 
 
 class Study(Settings):
@@ -319,7 +379,8 @@ class Study(Settings):
     excitation : ExcitationSettings or None
         Search for an exciting motion.
     stream : int or str
-        Samples of the blocks by which records are read; auto: blocks for large files, off: whole records.
+        Samples of the blocks by which records are read; auto: blocks for large files, off: whole
+        records.
     """
 
     symgen: Version = SCHEMA
@@ -333,13 +394,15 @@ class Study(Settings):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
-    stream: Literal["auto", "off"] | Annotated[Whole, Field(ge=SHORTEST)] = "auto"
+    stream: Literal["auto", "off"] | Annotated[Whole, Field(ge=LIMIT.FEWEST_SAMPLES)] = "auto"
 
 
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
-    """The Study of a mapping as read from a study file; raises SettingsError with the path of the offending key.
+    """The Study of a mapping as read from a study file; raises SettingsError with the path of the
+    offending key.
 
-    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta, record).
+    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
+    record).
     """
     return structure(Study, mapping)
 
@@ -347,7 +410,6 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
 __all__ = [
     "LOAD",
     "SCHEMA",
-    "SHORTEST",
     "CestacSettings",
     "Columns",
     "Decimate",

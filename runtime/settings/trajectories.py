@@ -1,4 +1,6 @@
-"""Trajectories: chains of families with their coefficients, each part beginning where the part before it ends. SI, rad."""
+"""Trajectories: chains of families with their coefficients, each part beginning where the part
+before it ends. SI, rad.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
 from runtime.settings.families import Array, Family, family_from_mapping, label
 from runtime.settings.schema import require, to_mapping
 
-MOST_PARTS = 100  # of a chain
 BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them for each time
 
 
@@ -27,7 +29,10 @@ class Part:
         p = np.array(self.p, dtype=float)
         if p.ndim != 2 or len(p) != len(self.family.names) or not np.all(np.isfinite(p)):
             expected = f"({len(self.family.names)}, joints)"
-            raise InputError(f"coefficients of shape {p.shape} of a {label(self.family)} part; expected {expected}, finite")
+            raise InputError(
+                f"coefficients of shape {p.shape} of a {label(self.family)} part; expected "
+                f"{expected}, finite"
+            )
         object.__setattr__(self, "p", p)
 
 
@@ -58,14 +63,20 @@ class Motion:
         start = 0.0
         for k, part in enumerate(self.parts):
             stop = start + part.family.duration
-            inside = (t >= start if k else t >= -np.inf) & (t < stop if k < len(self.parts) - 1 else t <= np.inf)
+            inside = (t >= start if k else t >= -np.inf) & (
+                t < stop if k < len(self.parts) - 1 else t <= np.inf
+            )
             rows = np.flatnonzero(inside)
             size = max(BLOCK // len(part.p), 1)
             for a in range(0, len(rows), size):
                 block = rows[a : a + size]
-                with np.errstate(over="ignore", invalid="ignore"):  # who uses the motion asks for finite ones
+                with np.errstate(
+                    over="ignore", invalid="ignore"
+                ):  # who uses the motion asks for finite ones
                     for j in range(self.n):
-                        q[block, j], qd[block, j], qdd[block, j] = part.family.joint(t[block] - start, part.p[:, j], np)
+                        q[block, j], qd[block, j], qdd[block, j] = part.family.joint(
+                            t[block] - start, part.p[:, j], np
+                        )
             start = stop
         return q, qd, qdd
 
@@ -76,21 +87,38 @@ class Motion:
 
     def to_mapping(self) -> dict[str, Any]:
         """The parts with their coefficients, by joint, for a file."""
-        return {"parts": [{"family": label(part.family), **to_mapping(part.family), "p": part.p.T.tolist()} for part in self.parts]}
+        return {
+            "parts": [
+                {"family": label(part.family), **to_mapping(part.family), "p": part.p.T.tolist()}
+                for part in self.parts
+            ]
+        }
 
 
 def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
-    """The motion that `Motion.to_mapping` wrote; raises SettingsError with the path of the offending key."""
+    """The motion that `Motion.to_mapping` wrote; raises SettingsError with the path of the
+    offending key.
+    """
     parts = mapping.get("parts")
     if not isinstance(parts, list | tuple):
-        raise SettingsError("no `parts` in this trajectory; expected a list of families with their coefficients `p`")
-    require(len(parts) <= MOST_PARTS, f"{len(parts)} parts; at most {MOST_PARTS} in one trajectory", "parts")
+        raise SettingsError(
+            "no `parts` in this trajectory; expected a list of families with their coefficients `p`"
+        )
+    require(
+        len(parts) <= LIMIT.CHAIN_PARTS,
+        f"{len(parts)} parts; at most {LIMIT.CHAIN_PARTS} in one trajectory",
+        "parts",
+    )
     made = []
     for k, part in enumerate(parts):
         path = ("parts", k)
         if not isinstance(part, Mapping) or "p" not in part:
-            raise SettingsError(f"part {k + 1} of the trajectory has no coefficients `p`", path=path)
-        family = family_from_mapping({key: value for key, value in part.items() if key != "p"}, path)
+            raise SettingsError(
+                f"part {k + 1} of the trajectory has no coefficients `p`", path=path
+            )
+        family = family_from_mapping(
+            {key: value for key, value in part.items() if key != "p"}, path
+        )
         try:
             made.append(Part(family, np.array(part["p"], dtype=float).T))
         except InputError as e:

@@ -1,11 +1,14 @@
-"""Units of measured columns, turned into SI where a record enters: the only place where pint is used. Inside, everything is SI.
+"""Units of measured columns, turned into SI where a record enters: the only place where pint is
+used. Inside, everything is SI.
 
     position_unit("deg")     ("angle", 0.017453292519943295)
     torque_unit("mA")        ("current", 0.001): the torque constant of the drive does the rest
     speed("30 rpm")          3.141592653589793
 
-The units of most records are in a table; pint is loaded for others, which it knows by their dimension. A grammar checks a unit before pint reads
-it: names, products, quotients and small powers, no numbers and no calls. Factors are computed as fractions and rounded once.
+The units of most records are in a table; pint is loaded for others, which it knows by their
+dimension. A grammar checks a unit before pint reads
+it: names, products, quotients and small powers, no numbers and no calls. Factors are computed as
+fractions and rounded once.
 """
 
 from __future__ import annotations
@@ -67,7 +70,9 @@ EXAMPLES = {
     TIMES: "s, ms, us, ns",
     SPEEDS: "rad/s, deg/s, rpm, rev/s, m/s, mm/s",
 }
-LARGEST = 1e5  # SI; units above are slips of the shift key: MA for mA, Grad (which is 1e9 rad) for deg
+LARGEST = (
+    1e5  # SI; units above are slips of the shift key: MA for mA, Grad (which is 1e9 rad) for deg
+)
 LONGEST = 40  # characters
 FACTOR = r"[^\W\d]{1,24}(?:(?:\*\*|\^)-?[1-4])?"
 GRAMMAR = re.compile(rf"{FACTOR}(?:\s?[*/·]\s?{FACTOR}| {FACTOR}){{0,3}}")
@@ -75,12 +80,16 @@ QUANTITY = re.compile(r"\s*([-+]?[0-9.]{1,30}(?:[eE][-+]?[0-9]{1,3})?)\s*([^\W\d
 
 
 def position_unit(text: str) -> Unit:
-    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m; counts are still to be divided by those per revolution."""
+    """Kind of a unit of positions, "angle", "length" or "counts", and its factor to rad or m;
+    counts are still to be divided by those per revolution.
+    """
     return _unit(text, POSITIONS)
 
 
 def torque_unit(text: str) -> Unit:
-    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m, N, A or V."""
+    """Kind of a unit of torques, "torque", "force", "current" or "voltage", and its factor to N m,
+    N, A or V.
+    """
     return _unit(text, TORQUES)
 
 
@@ -90,36 +99,54 @@ def time_unit(text: str) -> float:
 
 
 def speed(value: Any) -> Any:
-    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s; a value without unit is returned as it is."""
+    """A speed such as "30 rpm", or a list of speeds, in rad/s or m/s; a value without unit is
+    returned as it is.
+    """
     if isinstance(value, list | tuple):
         return [speed(x) for x in value]
     if isinstance(value, str) and (quantity := QUANTITY.fullmatch(value)):
         try:
             return float(quantity[1]) * _unit(quantity[2].strip(), SPEEDS)[1]
         except ValueError as e:
-            raise e if isinstance(e, InputError) else InputError(f"{value!r}; expected a number and a unit such as 30 rpm") from None
+            raise (
+                e
+                if isinstance(e, InputError)
+                else InputError(f"{value!r}; expected a number and a unit such as 30 rpm")
+            ) from None
     return value
 
 
 def _unit(text: str, kinds: tuple[str, ...]) -> Unit:
     if text == "grad":
-        raise InputError("'grad' is a 400th of a turn to some and a degree to others; write units such as gon or deg")
+        raise InputError(
+            "'grad' is a 400th of a turn to some and a degree to others; write units such as gon "
+            "or deg"
+        )
     if kinds == TORQUES and text.strip() in ("%", "percent", "per cent"):
         raise InputError(
-            f"{text!r} of what? write the unit of the rated value, such as A or N*m, and a hundredth of the rated values in record.scale"
+            f"{text!r} of what? write the unit of the rated value, such as A or N*m, and a "
+            "hundredth of the rated values in record.scale"
         )
     kind, factor = TABLE[text] if text in TABLE else _of_pint(text)
     if kind not in kinds:
         known = f"is a unit of {kind}" if kind else "is not a unit known here"
-        raise InputError(f"{text[:LONGEST]!r} {known}; expected one of {', '.join(kinds)}, such as {EXAMPLES[kinds]}")
+        raise InputError(
+            f"{text[:LONGEST]!r} {known}; expected one of {', '.join(kinds)}, such as "
+            f"{EXAMPLES[kinds]}"
+        )
     if factor > LARGEST:
-        raise InputError(f"{text!r} is {factor:g} {SI[kind]}, which nothing here is measured in; expected units such as {EXAMPLES[kinds]}")
+        raise InputError(
+            f"{text!r} is {factor:g} {SI[kind]}, which nothing here is measured in; expected units "
+            f"such as {EXAMPLES[kinds]}"
+        )
     return kind, factor
 
 
 @cache
 def _of_pint(text: str) -> Unit:
-    """Kind and factor of a unit that is not in the table; ("", nan) where pint does not know the unit, or its kind is none of SI."""
+    """Kind and factor of a unit that is not in the table; ("", nan) where pint does not know the
+    unit, or its kind is none of SI.
+    """
     nothing = ("", float("nan"))
     if len(text) > LONGEST or not GRAMMAR.fullmatch(text):
         return nothing
@@ -128,7 +155,15 @@ def _of_pint(text: str) -> Unit:
     registry = _registry()
     try:
         factor, base = registry.get_base_units(registry.parse_units(text.replace("·", "*")))
-    except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError, KeyError, SyntaxError):
+    except (
+        pint.PintError,
+        ValueError,
+        TypeError,
+        ArithmeticError,
+        AttributeError,
+        KeyError,
+        SyntaxError,
+    ):
         return nothing
     kind = next((kind for kind, si in SI.items() if registry.Unit(si) == base), "")
     return (kind, float(factor)) if kind else nothing

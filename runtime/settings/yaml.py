@@ -1,7 +1,9 @@
 """YAML 1.2 to plain values with the line of every key, within limits.
 
-Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases, tags, merge keys, repeated keys and second
-documents are refused, so that a file means what it shows and no text grows in memory. The text is read event by event and left at the first
+Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases,
+tags, merge keys, repeated keys and second
+documents are refused, so that a file means what it shows and no text grows in memory. The text is
+read event by event and left at the first
 thing that is too deep or too much.
 """
 
@@ -26,23 +28,31 @@ from ruamel.yaml.events import (
 )
 
 from runtime.errors import InputError, SettingsError, first_line
+from runtime.limits import LIMIT
 
 Path = tuple[str | int, ...]
 
-LONGEST = 500_000  # characters: read in about two seconds
-DEEPEST = 50  # levels
-LARGEST = 100_000  # values
 
 _INTEGER = re.compile(r"[-+]?[0-9]{1,40}\Z")
-_DECIMAL = re.compile(r"[-+]?(\.[0-9]{1,400}|[0-9]{1,400}(\.[0-9]{0,400})?)([eE][-+]?[0-9]{1,3})?\Z")
+_DECIMAL = re.compile(
+    r"[-+]?(\.[0-9]{1,400}|[0-9]{1,400}(\.[0-9]{0,400})?)([eE][-+]?[0-9]{1,3})?\Z"
+)
 _CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
-_CONSTANTS |= {word: value for value, words in ((True, "true True TRUE"), (False, "false False FALSE")) for word in words.split()}
+_CONSTANTS |= {
+    word: value
+    for value, words in ((True, "true True TRUE"), (False, "false False FALSE"))
+    for word in words.split()
+}
 
 
 def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
-    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of every key path; SettingsError with file and line."""
-    if len(text) > LONGEST:
-        raise InputError(f"{len(text)} characters; such a file has at most {LONGEST}", file=file)
+    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of
+    every key path; SettingsError with file and line.
+    """
+    if len(text) > LIMIT.YAML_CHARACTERS:
+        raise InputError(
+            f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
+        )
     reader = _Reader(YAML(typ="safe", pure=True).parse(text), file)
     try:
         return reader.document(), reader.lines
@@ -50,8 +60,12 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
         raise
     except MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
-        raise SettingsError(f"not YAML: {e.problem or e.context}", file=file, line=None if mark is None else mark.line + 1) from None
-    except Exception as e:  # on malformed text the scanner also raises IndexError, AttributeError and others: none of it is YAML
+        raise SettingsError(
+            f"not YAML: {e.problem or e.context}",
+            file=file,
+            line=None if mark is None else mark.line + 1,
+        ) from None
+    except Exception as e:  # the scanner raises IndexError, AttributeError and others too
         raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
 
 
@@ -79,7 +93,9 @@ class _Reader:
     def next(self) -> Event:
         event: Event = next(self.events)
         if isinstance(event, AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise self.refuse("anchors and aliases (& and *) are not read; write the value out", event)
+            raise self.refuse(
+                "anchors and aliases (& and *) are not read; write the value out", event
+            )
         if getattr(event, "tag", None) not in (None, "!"):
             raise self.refuse("tags (!) are not read; write a plain value", event)
         return event
@@ -96,8 +112,14 @@ class _Reader:
 
     def value(self, event: Event, path: Path) -> Any:
         self.count += 1
-        if len(path) > DEEPEST or self.count > LARGEST:
-            raise self.refuse(f"nested deeper than {DEEPEST} levels or more than {LARGEST} values", event)
+        if len(path) > LIMIT.YAML_LEVELS or self.count > LIMIT.YAML_VALUES:
+            raise self.refuse(
+                (
+                    f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than "
+                    f"{LIMIT.YAML_VALUES} values"
+                ),
+                event,
+            )
         self.lines.setdefault(path, event.start_mark.line + 1)
         if isinstance(event, MappingStartEvent):
             return self.mapping(path)
@@ -112,10 +134,22 @@ class _Reader:
         table: dict[str, Any] = {}
         while not isinstance(event := self.next(), MappingEndEvent):
             if not isinstance(event, ScalarEvent) or event.value == "<<":
-                raise self.refuse("a key that is no name; merge keys (<<) and lists as keys are not read", event, path)
+                raise self.refuse(
+                    "a key that is no name; merge keys (<<) and lists as keys are not read",
+                    event,
+                    path,
+                )
             key = str(event.value)
             if key in table:
-                raise self.refuse(f"key {key!r:.60} is given twice (first on line {self.lines[(*path, key)]}); keep one", event, path)
+                raise self.refuse(
+                    (
+                        f"key {key!r:.60} is given twice (first on line "
+                        f"{self.lines[(*path, key)]}); "
+                        "keep one"
+                    ),
+                    event,
+                    path,
+                )
             self.lines[(*path, key)] = event.start_mark.line + 1
             table[key] = self.value(self.next(), (*path, key))
         return table

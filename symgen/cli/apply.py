@@ -7,41 +7,65 @@ from typing import Annotated
 
 import typer
 
-from symgen.cli.session import fail, reported_errors, single_thread
+from symgen.cli import options
+from symgen.cli.session import fail, reported_errors
 
 
 def apply(
-    results: Annotated[Path, typer.Argument(help="Folder of `symgen identify -o`, or its estimate.json.")],
-    model: Annotated[Path, typer.Argument(help="The file that the values go into: .urdf, or .xml, .mjcf (MJCF).")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write; default: MODEL itself.")] = None,
-    robot: Annotated[
-        str | None, typer.Option(help="Robot file that was identified, where it is not MODEL but was converted from it.")
+    results: Annotated[
+        Path, typer.Argument(help="Folder of `symgen identify -o`, or its estimate.json.")
+    ],
+    model: Annotated[
+        Path, typer.Argument(help="The file that the values go into: .urdf, or .xml, .mjcf (MJCF).")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write; default: MODEL itself.")
     ] = None,
-    snap: Annotated[str, typer.Option(help="As of convert, and as when the robot was converted.")] = "auto",
-    lock: Annotated[list[str] | None, typer.Option(help="The same: a joint that was held, elbow=pi/2 (rad or m); repeat.")] = None,
-    chain: Annotated[tuple[str, str] | None, typer.Option(metavar="BASE TIP", help="The same: the chain that was cut out.")] = None,
-    check: Annotated[bool, typer.Option("--check", help="Tell what would change, and write nothing.")] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="Print the lines that change instead of the table.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the changes as JSON.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace OUTPUT if it exists.")] = False,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Robot file that was identified, where it is not MODEL but was converted from it. "
+            "--exact, --lock and --chain: as then."
+        ),
+    ] = None,
+    exact: options.Exact = False,
+    lock: options.Lock = None,
+    chain: options.Chain = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Tell what would change, and write nothing.")
+    ] = False,
+    diff: Annotated[
+        bool, typer.Option("--diff", help="Print the lines that change instead of the table.")
+    ] = False,
+    json: options.Json = False,
+    force: options.Force = False,
 ) -> None:
-    """Write masses, centres, inertias, friction and motor inertia of RESULTS into MODEL: numbers change, every other byte stays.
+    """Write masses, centres, inertias, friction and motor inertia of RESULTS into MODEL: numbers
+    change, every other byte stays.
 
-    The file is written whole or not at all, and only with values that a physical robot can have; else exit code 2, with the reason.
+    The file is written whole or not at all, and only with values that a physical robot can have;
+    else exit code 2, with the reason.
     """
-    single_thread()
     with reported_errors():
-        from symgen.cli.convert import snap_angle
         from symgen.description.values import assignment
         from symgen.update.apply import apply as applied_to
 
         if output is not None and output.exists() and not force and not check:
             fail(f"{output} exists already; choose another name or add --force")
         locked = dict(assignment(text, "--lock") for text in lock or ())
-        applied = applied_to(results, model, robot=robot, lock=locked, chain=chain, nearly=snap_angle(snap))
-        typer.echo(applied.to_json() if json else applied.diff() if diff else str(applied), nl=not json)
+        applied = applied_to(results, model, robot=robot, lock=locked, chain=chain, exact=exact)
+        typer.echo(
+            applied.to_json() if json else applied.diff() if diff else str(applied), nl=not json
+        )
         if not check:
             path = applied.write(output or model)
             typer.echo(f"written: {path.name if output is None else output}", err=True)
             if path.parent != model.resolve().parent and applied.names_files:
-                typer.echo(f"note: {output} lies in another folder than {model.name}; paths of meshes in it are as they were", err=True)
+                typer.echo(
+                    (
+                        f"note: {output} lies in another folder than {model.name}; paths of meshes "
+                        "in "
+                        "it are as they were"
+                    ),
+                    err=True,
+                )

@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from symgen.cli.described import AT_VALUES, described_robot
-from symgen.cli.session import NEGATIVE, reported_errors, single_thread
+from runtime.result_files import write_all
+from symgen.cli import options
+from symgen.cli.session import NEGATIVE, described_robot, reported_errors
 
 
 def check(
-    robot: Annotated[str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf).")],
-    at_values: Annotated[bool, typer.Option("--at-values", help=AT_VALUES)] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the certificate as JSON.")] = False,
+    robot: options.RobotFile,
+    at_values: options.AtValues = False,
+    exact: options.Exact = False,
+    json: options.Json = False,
+    claim: Annotated[
+        Path | None,
+        typer.Option("--certificate", help="Write what is claimed as JSON, for others to verify."),
+    ] = None,
 ) -> None:
-    """Verify ROBOT: exact rank, identities at fresh geometry, numeric rank and torques by CasADi energies, the emitted module."""
-    single_thread()
+    """Verify ROBOT: exact rank, identities at fresh geometry, numeric rank, and every function of
+    the NumPy module by other dynamics.
+    """
     with reported_errors():
         from json import dumps
 
-        from symgen.emit.certified import certify
+        from symgen.certify.claim import claim as claimed
+        from symgen.certify.modules import certify
         from symgen.regroup.regrouping import regroup
 
-        described = described_robot(robot, at_values)
-        certificate = certify(regroup(described))
+        regrouping = regroup(described_robot(robot, at_values, exact))
+        certificate = certify(regrouping)
+        if claim is not None:
+            text = dumps(claimed(regrouping, certificate), indent=1)
+            write_all(claim.parent, {claim.name: text + "\n"})
         typer.echo(dumps(certificate.mapping(), indent=2) if json else str(certificate))
     if not certificate.valid:
         raise typer.Exit(NEGATIVE)

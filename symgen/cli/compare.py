@@ -1,4 +1,6 @@
-"""`symgen compare ROBOT STUDY ...`: which treatment of the records, and which set of parameters, predicts a validation record best."""
+"""`symgen compare ROBOT STUDY ...`: which treatment of the records, and which set of parameters,
+predicts a validation record best.
+"""
 
 from __future__ import annotations
 
@@ -7,40 +9,50 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import reserved
-from symgen.cli import session
-from symgen.cli.session import NEGATIVE, ROBOT, reported_errors, single_thread
-
-STUDIES = "Study files that name the same validate.record, one for each treatment; of one alone the treatments that suggest themselves."
+from symgen.cli import options, session
 
 
 def compare(
-    robot: Annotated[str, typer.Argument(help=ROBOT)],
-    study: Annotated[list[str], typer.Argument(help=STUDIES)],
+    robot: options.RobotOrModule,
+    study: Annotated[
+        list[str],
+        typer.Argument(
+            help="Study files that name the same validate.record, one for each treatment; of one "
+            "alone the treatments that suggest themselves."
+        ),
+    ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for comparison.json and the report of the best treatment.")
+        Path | None, options.folder("comparison.json and the report of the best treatment")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print comparison.json instead of the table.")] = False,
+    trust: options.Trust = False,
+    exact: options.Exact = False,
+    json: options.Json = False,
 ) -> None:
-    """Identify ROBOT with each treatment, and order them by what they predict of the validation record.
+    """Identify ROBOT with each treatment, and order them by what they predict of the validation
+    record.
 
-    Of one study: as stated, without the rows of joints that stand, with known torques left out. In each, the essential, the physical or all
-    parameters are taken, whichever predict best. Exit code 1 where the best cannot be used.
+    Of one study: as stated, without the rows of joints that stand, with known torques left out. In
+    each, the essential, the physical or all parameters are taken, whichever predict best. Exit code
+    1 where the best cannot be used.
     """
-    single_thread()
-    with reported_errors(), session.progress_lines(), reserved(output) as results:
+    with session.progress_lines(), session.results_in(output) as results:
         import runtime
         from runtime.json_documents import json_text
 
-        model = session.model_of(robot)
+        model = session.model_of(robot, trust=trust, exact=exact)
         short = len({Path(one).stem for one in study}) == len(study)
-        candidates = {Path(one).stem if short else one: session.study_of_arguments([one]) for one in study}
+        candidates = {
+            Path(one).stem if short else one: session.study_of_arguments([one]) for one in study
+        }
         alone = next(iter(candidates.values()))
-        ranking = runtime.compare(model, candidates if len(candidates) > 1 else alone, variants=session.variants_of(robot))
+        ranking = runtime.compare(
+            model,
+            candidates if len(candidates) > 1 else alone,
+            variants=session.variants_of(robot, exact=exact),
+        )
         if results is not None:
             runtime.report(ranking, results)
-        best = ranking.best
-        text = json_text(ranking.summary()) if json else f"{ranking}\n\n{best.checklist.to_text()}"
-        session.show(text, output, json=json)
-    if best.checklist.state == "no":
-        raise typer.Exit(NEGATIVE)
+        checklist = ranking.best.checklist
+        text = json_text(ranking.summary()) if json else f"{ranking}\n\n{checklist.to_text()}"
+        session.show(text, results, json=json)
+    session.end(good=checklist.state != "no")

@@ -1,4 +1,6 @@
-"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target cannot carry."""
+"""`symgen convert IN OUT`: a robot from one format into another, with a report of what the target
+cannot carry.
+"""
 
 from __future__ import annotations
 
@@ -8,43 +10,70 @@ from typing import Annotated
 import typer
 
 from runtime.result_files import write_all
+from symgen.cli import options
 from symgen.cli.session import fail, reported_errors
-
-LARGEST_SNAP = 0.1  # rad
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="Packaged robot, or a file: .yaml, .par, .urdf, .xml or .mjcf (MJCF).")],
-    output: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix names the format: .yaml, .par, .urdf.")],
-    constant: Annotated[list[str] | None, typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat.")] = None,
-    snap: Annotated[
+    source: Annotated[
         str,
-        typer.Option(help="Angles of a URDF this close (rad) to a multiple of pi/12 become that; auto is 1e-4, 0 takes them as they are."),
-    ] = "auto",
-    lock: Annotated[list[str] | None, typer.Option(help="Of a URDF or MJCF: hold a joint, elbow=pi/2 (rad or m); repeat.")] = None,
-    chain: Annotated[
-        tuple[str, str] | None,
-        typer.Option(metavar="BASE TIP", help="Of a URDF or MJCF: the joints between two links alone; others are held at zero."),
+        typer.Argument(
+            metavar="IN",
+            help="Packaged robot, or a file: .yaml, .par, .urdf, .xml or .mjcf (MJCF).",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OUT", help="File to write; its suffix names the format: .yaml, .urdf."
+        ),
+    ],
+    constant: Annotated[
+        list[str] | None,
+        typer.Option(help="Value of a symbol of a .par file, D3=0.45 (SI, rad); repeat."),
     ] = None,
+    exact: options.Exact = False,
+    lock: options.Lock = None,
+    chain: options.Chain = None,
     keep_fixed: Annotated[
-        bool, typer.Option("--keep-fixed", help="Of a URDF or MJCF: links that fixed joints hold (tool0, flange) are frames of their own.")
+        bool,
+        typer.Option(
+            "--keep-fixed",
+            help=(
+                "Of a URDF or MJCF: links that fixed joints hold (tool0, flange) are frames of "
+                "their own."
+            ),
+        ),
     ] = False,
     values: Annotated[
         Path | None,
-        typer.Option(help="Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of a feasible estimate."),
+        typer.Option(
+            help=(
+                "Standard parameters for OUT: a CSV of name,value, as standard_parameters.csv of "
+                "a feasible estimate."
+            )
+        ),
     ] = None,
     estimate: Annotated[
-        Path | None, typer.Option(help="The same from estimate.json of a feasible estimate (study: estimate: {method: feasible}).")
+        Path | None,
+        typer.Option(
+            help=(
+                "The same from estimate.json of a feasible estimate (study: estimate: {method: "
+                "feasible})."
+            )
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
+    force: options.Force = False,
 ) -> None:
-    """Write the robot IN in the format of OUT, and say what was read otherwise than written and what OUT does not carry.
+    """Write the robot IN in the format of OUT, and say what was read otherwise than written and
+    what OUT does not carry.
 
-    OUT is written whole or not at all; where the target would hold another mechanism nothing is written, exit code 2.
+    OUT is written whole or not at all; where the target would hold another mechanism nothing is
+    written, exit code 2.
     """
     with reported_errors():
         from symgen.description.files import read_robot, write_robot
-        from symgen.description.urdf import REMARKS
+        from symgen.description.urdf import DROPPED, SNAPPED
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
 
         if output.exists() and not force:
@@ -52,7 +81,7 @@ def convert(
         robot, read = read_robot(
             source,
             constants=dict(map(assignment, constant or ())),
-            nearly=snap_angle(snap),
+            exact=exact,
             keep_fixed=keep_fixed,
             lock=dict(assignment(text, "--lock") for text in lock or ()),
             chain=chain,
@@ -64,27 +93,25 @@ def convert(
         if estimate is not None:
             from runtime.estimators.estimate import load_estimate
 
-            robot = with_estimate(robot, load_estimate(estimate).details.get("standard"), str(estimate))
-        text, written = write_robot(robot, output.name, comments=[f"Converted from {robot.file}.", *read])
+            robot = with_estimate(
+                robot, load_estimate(estimate).details.get("standard"), str(estimate)
+            )
+        comments = [f"Converted from {robot.file}.", *([robot.angles] if exact else []), *read]
+        text, written = write_robot(robot, output.name, comments=comments)
         write_all(output.parent, {output.name: text})
-        typer.echo(f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard parameters")
-        remarks = [note for note in read if note.startswith(REMARKS)]
-        others = [note for note in read if note not in remarks]
-        for head, notes in ((f"read from {source}", others), (f"not carried by {output.name}", written), (f"of {source}", remarks)):
+        typer.echo(
+            f"{output}: {robot.name}, {len(robot.joints)} joints, {len(robot.parameters)} standard "
+            "parameters"
+        )
+        remarks = [note for note in read if note.startswith(DROPPED)]
+        others = [note for note in read if not note.startswith((DROPPED, SNAPPED))]
+        for head, notes in (
+            (f"read from {source}", others),
+            (f"not carried by {output.name}", written),
+            (f"of {source}", remarks),
+        ):
             if notes:
-                typer.echo("\n".join([f"{head}:", *(f"  - {note}" for note in notes)]), err=notes is remarks)
-
-
-def snap_angle(text: str) -> float:
-    """The angle, rad, that --snap means."""
-    from symgen.description.files import SNAP
-
-    if text == "auto":
-        return SNAP
-    try:
-        angle = float(text)
-    except ValueError:
-        angle = -1.0
-    if not 0 <= angle <= LARGEST_SNAP:
-        fail(f"--snap {text[:40]}; expected auto, 0, or an angle up to {LARGEST_SNAP} rad")
-    return angle
+                typer.echo(
+                    "\n".join([f"{head}:", *(f"  - {note}" for note in notes)]),
+                    err=notes is remarks,
+                )

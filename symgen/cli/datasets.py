@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
-from symgen.cli.session import reported_errors
+from symgen.cli import options, session
 
 
-def datasets(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
-    """List datasets: name, robot, files, where they are, and where they come from. Nothing is downloaded."""
-    with reported_errors():
+def datasets(json: options.Json = False) -> None:
+    """List datasets: name, robot, files, where they are, and where they come from. Nothing is
+    downloaded.
+    """
+    with session.reported_errors():
+        from json import dumps
+
         from runtime.records.datasets import listing
 
-        rows = listing()
-        if json:
-            import json as json_module
-
-            typer.echo(json_module.dumps(rows, indent=2))
-            return
+        rows, lines = listing(), []
         for row in rows:
-            typer.echo(f"{row['name']}: {row['title']}")
+            lines.append(f"{row['name']}: {row['title']}")
             for file in row["files"]:
-                typer.echo(f"  {file['name']:<24} {file['path'] or 'not here; symgen fetches it on first use'}")
-                typer.echo(f"  {'':<24} {file['url']}\n  {'':<24} sha256 {file['sha256']}")
+                place = file["path"] or "not here; symgen fetches it on first use"
+                lines.append(f"  {file['name']:<24} {place}")
+                lines += [f"{'':<26} {text}" for text in (file["url"], f"sha256 {file['sha256']}")]
+        session.show(dumps(rows, indent=2) if json else "\n".join(lines))

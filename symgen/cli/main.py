@@ -1,4 +1,6 @@
-"""The `symgen` command. Verbs are loaded when they are called, so that `symgen --help` starts at once."""
+"""The `symgen` command. Verbs are loaded when they are called, so that `symgen --help` starts at
+once.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,8 @@ VERBS = {
     "excite": "Search a motion that excites the parameters within the limits.",
     "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows.",
-    "convert": "Write a robot in another format: .yaml, .par, .urdf.",
+    "convert": "Write a robot in another format: .yaml, .urdf.",
     "apply": "Write identified values into your own URDF or MJCF, in place.",
-    "snippet": "Write a script that uses a robot in pinocchio or Drake.",
     "new": "Write a skeleton robot file.",
     "schema": "Print the JSON Schema of robot files or of results.",
     "demo": "The main job end to end, with a report.",
@@ -34,7 +35,9 @@ VERBS = {
 
 
 class Verbs(TyperGroup):
-    """A group whose commands are modules symgen/cli/VERB.py with a function of that name; help needs none of them."""
+    """A group whose commands are modules symgen/cli/VERB.py with a function of that name; help
+    needs none of them.
+    """
 
     listing = False
 
@@ -46,7 +49,9 @@ class Verbs(TyperGroup):
             return None
         if self.listing:
             return TyperCommand(cmd_name, help=VERBS[cmd_name])
-        verb = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+        verb = typer.Typer(
+            add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+        )
         verb.command(cmd_name)(getattr(import_module(f"symgen.cli.{cmd_name}"), cmd_name))
         return get_command(verb)
 
@@ -56,10 +61,16 @@ class Verbs(TyperGroup):
 
 
 ALLOCATIONS = 500_000
-"""New objects between two searches for unreachable ones. Most objects of modules and figures stay: seeking among them takes a tenth of a report."""
+"""New objects between two searches for unreachable ones. Most objects of modules and figures stay:
+seeking among them takes a tenth of a report.
+"""
 
 app = typer.Typer(
-    cls=Verbs, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+    cls=Verbs,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
 )  # rich: 0.15 s
 
 
@@ -72,8 +83,14 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def symgen(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version.")) -> None:
-    """Symbolic robot dynamics: from a robot file to formulas, from a record to parameters, and what the encoder allows."""
+def symgen(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version."
+    ),
+) -> None:
+    """Symbolic robot dynamics: from a robot file to formulas, from a record to parameters, and what
+    the encoder allows.
+    """
 
 
 def main() -> None:
@@ -90,11 +107,15 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed one, and what a library prints."""
+    """Descriptors 0 to 2 are open, if on nothing: else a file of ours gets the number of a closed
+    one, and what a library prints.
+    """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
-        getattr(sys, name).reconfigure(errors="backslashreplace")  # names of files, titles: whatever the terminal cannot show
+        getattr(sys, name).reconfigure(
+            errors="backslashreplace"
+        )  # names of files, titles: whatever the terminal cannot show

@@ -11,7 +11,9 @@ from runtime.result_files import write_all
 from symgen.cli.session import fail, reported_errors
 
 
-def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")]) -> None:
+def new(
+    file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my_arm.yaml.")],
+) -> None:
     """Write a robot file with every section explained. Never overwrites."""
     with reported_errors():
         from symgen.description.new import skeleton_for
@@ -21,5 +23,6 @@ def new(file: Annotated[Path, typer.Argument(help="Robot file to create, e.g. my
             fail(f"{file} exists already; choose another name or edit it")
         write_all(file.parent, {file.name: text})
         typer.echo(
-            f"{file}: edit it, then\n  symgen show {file} --html     # look at it\n  symgen check {file}\n  symgen generate {file} -o models"
+            f"{file}: edit it, then\n  symgen show {file} --html     # look at it\n  symgen check "
+            f"{file}\n  symgen generate {file} -o models"
         )

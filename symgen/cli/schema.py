@@ -1,4 +1,6 @@
-"""`symgen schema`: the JSON Schema of robot files, for editors, and of study files and results, for programs that read them."""
+"""`symgen schema`: the JSON Schema of robot files, for editors, and of study files and results, for
+programs that read them.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,18 @@ KINDS = ("robot", "study", "estimate", "cestac")
 
 def schema(
     of: Annotated[
-        str, typer.Option(help="robot (robot files), study (study files), estimate (estimate.json) or cestac (cestac.json).")
+        str,
+        typer.Option(
+            help=(
+                "robot (robot files), study (study files), estimate (estimate.json) or cestac "
+                "(cestac.json)."
+            )
+        ),
     ] = "robot",
 ) -> None:
-    """Print a JSON Schema; `symgen new` refers to the installed copy of that of robot files in its first line."""
+    """Print a JSON Schema; `symgen new` refers to the installed copy of that of robot files in its
+    first line.
+    """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")
     if of == "robot":

@@ -1,10 +1,12 @@
-"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one line and exit code 2."""
+"""What the verbs share: the model of a ROBOT argument, the study of RECORD arguments, errors as one
+line and exit code 2.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,16 +17,18 @@ import typer
 if TYPE_CHECKING:
     from runtime.model.generated import GeneratedModel
     from runtime.resolution.checkpoint import Checkpoint
+    from runtime.result_files import Results
     from runtime.settings.study import Study
+    from symgen.description import Robot
 
 BAD_INPUT, NEGATIVE = 2, 1
-ROBOT = "Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py)."
-RECORDS = "Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). Further measured files like the first: records of their own."
 BROKEN_PIPE, INTERRUPTED = 141, 130  # as shells have them: 128 + SIGPIPE, 128 + SIGINT
 
 
 def single_thread() -> None:
-    """One BLAS thread unless the user set another number: matrices here are small and results then agree in every bit. Before numpy loads."""
+    """One BLAS thread unless the user set another number: matrices here are small and results then
+    agree in every bit. Before numpy loads.
+    """
     from runtime.blas import BLAS_THREADS
 
     for name in BLAS_THREADS:
@@ -33,34 +37,63 @@ def single_thread() -> None:
 
 @contextmanager
 def reported_errors() -> Iterator[None]:
-    """Bad input as one message on the error stream and exit code 2, a false certificate with exit code 1, never a traceback."""
+    """What every verb runs in: one BLAS thread; bad input as one message on the error stream and
+    exit code 2, a false certificate with exit code 1, never a traceback; angles that are read
+    otherwise than written as a note.
+    """
     from runtime.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
 
+    single_thread()
     try:
-        yield
-    except (typer.Exit, typer.Abort):
-        raise
-    except BrokenPipeError:
-        _stop_printing()
-    except CertificateError as e:
-        fail(str(e), code=NEGATIVE)
+        with _noted_angles():
+            yield
+    except BrokenPipeError as e:  # the reader has enough, as `head` has: the end is quiet
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+        raise typer.Exit(BROKEN_PIPE) from e
     except (InputError, SymgenError) as e:
-        fail(str(e), lines=isinstance(e, DataUnavailableError))
+        code = NEGATIVE if isinstance(e, CertificateError) else BAD_INPUT
+        fail(str(e), lines=isinstance(e, DataUnavailableError), code=code)
     except OSError as e:
         fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
 
 
-def _stop_printing() -> NoReturn:
-    """The reader has enough, as `head` has: what is left to print goes nowhere, the end is quiet."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
-    raise typer.Exit(BROKEN_PIPE)
+@contextmanager
+def _noted_angles() -> Iterator[None]:
+    import warnings
+
+    from symgen.description.angles import AngleWarning
+
+    with warnings.catch_warnings():
+        show = warnings.showwarning
+
+        def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
+            if issubclass(category, AngleWarning):
+                typer.echo(f"note: {message}", err=True)
+            else:
+                show(message, category, *place)
+
+        warnings.showwarning = note  # type: ignore[assignment]
+        warnings.simplefilter("default", AngleWarning)
+        yield
+
+
+@contextmanager
+def results_in(output: Path | None) -> Iterator[Any]:
+    """Like `reported_errors`; the context gives the folder as `Results`, or None."""
+    with reported_errors():
+        from runtime.result_files import reserved
+
+        with reserved(output) as results:
+            yield results
 
 
 def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoReturn:
-    """End with `message` and an exit code; on one line unless it is meant to have several: names in it may have any characters."""
+    """End with `message` and an exit code; on one line unless it is meant to have several: names in
+    it may have any characters.
+    """
     from symgen.errors import printable
 
     text = message if lines else message.replace("\n", "\\n")
@@ -73,84 +106,128 @@ def say(text: str) -> None:
     typer.echo(f"  {text}", err=True)
 
 
-def show(text: str, output: Path | None, *, json: bool) -> None:
+def show(text: str, results: Results | None = None, *, json: bool = False) -> None:
     """Print a result, and on the error stream where its report is."""
-    typer.echo(text, nl=not json)
-    if output is not None:
-        typer.echo(f"report: {output / 'report.html'}", err=True)
+    from runtime.errors import encodable
+
+    typer.echo(encodable(text), nl=not json)
+    if results is not None:
+        typer.echo(f"report: {results.folder / 'report.html'}", err=True)
 
 
-def model_of(robot: str, target: str = "numpy") -> GeneratedModel:
-    """The model of a ROBOT argument. target : "numpy", or "c" for the same in C; one line says why where NumPy serves instead."""
+def end(*, good: bool) -> None:
+    """Exit code 1 where the answer of a verb is negative."""
+    if not good:
+        raise typer.Exit(NEGATIVE)
+
+
+def model_of(
+    robot: str, target: str = "numpy", *, trust: bool = False, exact: bool = False
+) -> GeneratedModel:
+    """The model of a ROBOT argument. target : "numpy", or "c" for the same in C; one line says why
+    where NumPy serves instead. trust : run a module that was not emitted here. exact : as of
+    `load_robot`.
+    """
+    import symgen
     from runtime.model.generated import load_model
     from runtime.records.formats.table import is_measured
 
     if target not in ("numpy", "c"):
         fail(f"--target {target}; expected numpy or c")
-    if Path(robot).suffix == ".py":
-        model = load_model(Path(robot))
-        return model if target == "numpy" else _in_c(model, None)
-    if Path(robot).is_file() and is_measured(Path(robot)):
-        fail(f"{robot}: a measured file, where a robot is expected; the robot comes first, then the record")
-    import symgen
+    path = Path(robot)
+    if path.suffix != ".py" and path.is_file() and is_measured(path):
+        fail(
+            f"{robot}: a measured file, where a robot is expected; the robot comes first, then the "
+            "record"
+        )
+    if path.suffix == ".py":
+        model = load_model(path, trust=trust)
+    else:
+        model = load_model(symgen.model(symgen.load_robot(robot, exact=exact)))
+    return model if target == "numpy" else _in_c(model, robot, exact)
 
-    model = load_model(symgen.model(robot))
-    return model if target == "numpy" else _in_c(model, robot)
+
+def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
+    """The robot of a name or file, at the values of its constants where asked; notes on it go to
+    the error stream.
+    """
+    from symgen.derive.doubts import doubts
+    from symgen.description import load_robot
+    from symgen.description.at_values import at_values as with_values
+
+    robot = load_robot(source, exact=exact)
+    for sentence in doubts(robot):
+        typer.echo(f"note: {sentence}", err=True)
+    return with_values(robot) if at_values else robot
 
 
-def variants_of(robot: str) -> GeneratedModel | None:
-    """The module of a ROBOT argument with its table of frames free; None of a generated module, which has no robot file."""
-    if Path(robot).suffix == ".py":
-        return None
+def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
+    """The module of a ROBOT argument with its table of frames free; None of a generated module,
+    which has no robot file.
+    """
     import symgen
     from runtime.model.generated import load_model
 
-    return load_model(symgen.variants(robot))
+    return (
+        None
+        if Path(robot).suffix == ".py"
+        else load_model(symgen.variants(symgen.load_robot(robot, exact=exact)))
+    )
 
 
-def model_of_job(robot: str) -> GeneratedModel:
-    """The model of a job of a fleet: what is wrong with its robot file is an error of that job alone."""
+def model_of_job(robot: str, *, trust: bool = False, exact: bool = False) -> GeneratedModel:
+    """The model of a job of a fleet: what is wrong with its robot file is an error of that job
+    alone.
+    """
     from runtime.errors import InputError
     from symgen.errors import SymgenError
 
     try:
-        return model_of(robot)
+        return model_of(robot, trust=trust, exact=exact)
     except SymgenError as e:
         raise InputError(str(e)) from e
 
 
-def _in_c(model: GeneratedModel, robot: str | None) -> GeneratedModel:
-    """The model with its functions in C. robot : whose C file is emitted; None: the file beside that of the model."""
+def _source(robot: str, exact: bool) -> Path:
+    """The C file of a ROBOT argument: emitted, or beside the module."""
+    from symgen.certify.modules import c_file
+    from symgen.description import load_robot
+
+    path = Path(robot)
+    return (
+        path.with_suffix(".c") if path.suffix == ".py" else c_file(load_robot(robot, exact=exact))
+    )
+
+
+def _in_c(model: GeneratedModel, robot: str, exact: bool) -> GeneratedModel:
+    """The model of a ROBOT argument with its functions in C."""
     import warnings
 
     from runtime.model.compiled import compiled_model
     from runtime.resolution.c.workspace import usable
 
-    source = None
-    if robot is not None:
-        from symgen.emit.certified import c_file
-
-        source = c_file(robot)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        compiled = usable(compiled_model(model, source=source))
+        compiled = usable(compiled_model(model, source=_source(robot, exact)))
     for warning in caught:
         typer.echo(str(warning.message), err=True)
     return compiled
 
 
-def model_of_runs(model: GeneratedModel, robot: str) -> GeneratedModel:
-    """The model for the runs of a resolution study: with its signals in C where there is a compiler."""
+def model_of_runs(model: GeneratedModel, robot: str, *, exact: bool = False) -> GeneratedModel:
+    """The model for the runs of a resolution study: with its signals in C where there is a
+    compiler.
+    """
     from runtime.resolution.c import workspace
-    from symgen.emit.certified import c_file
 
-    return workspace.model_of_runs(model, Path(robot).with_suffix(".c") if Path(robot).suffix == ".py" else c_file(robot))
+    return workspace.model_of_runs(model, _source(robot, exact))
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:
     """The study that RECORD arguments mean, files relative to the current folder.
 
-    The first says how they are read: a study file, a dataset or a measured file; each further one is a measured file like it, a record of its own.
+    The first says how they are read: a study file, a dataset or a measured file; each further one
+    is a measured file like it, a record of its own.
     recorded : whether the study has to name a record.
     """
     from runtime.errors import InputError
@@ -161,17 +238,23 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     study = located(*study_of(records[0]))
     if recorded:
         require_record(study, records[0])
-    further = []
     for record in records[1:]:
-        path = Path(record)
-        if path.suffix.lower() in (".yaml", ".yml") or not is_measured(path):
+        if Path(record).suffix.lower() in (".yaml", ".yml") or not is_measured(Path(record)):
             raise InputError(
-                "expected a measured file after the first RECORD: its columns, units and side are those of the first", file=record
+                "expected a measured file after the first RECORD: its columns, units and side are "
+                "those of the first",
+                file=record,
             )
-        if len(study.record[-1].files) > 1:
-            raise InputError("the first RECORD has its positions and torques in two files; name further pairs in record.also", file=record)
-        further.append(replace(study.record[-1], files=(record,), dataset=None, name=None))
-    return replace(study, record=(*study.record, *further))
+        like = study.record[-1]
+        if len(like.files) > 1:
+            raise InputError(
+                "the first RECORD has its positions and torques in two files; name further pairs "
+                "in record.also",
+                file=record,
+            )
+        further = replace(like, files=(record,), dataset=None, name=None)
+        study = replace(study, record=(*study.record, further))
+    return study
 
 
 def require_record(study: Study, file: str) -> None:
@@ -179,16 +262,21 @@ def require_record(study: Study, file: str) -> None:
     from runtime.errors import InputError
 
     if not study.record:
-        raise InputError("the study names no record; set record.files, or record.dataset with record.files", file=file)
+        raise InputError(
+            "the study names no record; set record.files, or record.dataset with record.files",
+            file=file,
+        )
 
 
-def changed(study: Study, section: str, **given: Any) -> Study:
-    """The study with some settings of a section replaced, checked like those of a file; None: as in the study."""
+def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
+    """The study with some settings replaced, checked like those of a file; None: as it is."""
     from runtime.settings.study import study_from_mapping, to_mapping
 
     mapping = to_mapping(study)
-    own = {**(mapping[section] or {}), **{key: value for key, value in given.items() if value is not None}}
-    return study_from_mapping({**mapping, section: own})
+    for section, given in sections.items():
+        own = {key: value for key, value in given.items() if value is not None}
+        mapping[section] = {**(mapping[section] or {}), **own}
+    return study_from_mapping(mapping)
 
 
 def names_of(text: str | None) -> str | list[str] | None:
@@ -198,8 +286,12 @@ def names_of(text: str | None) -> str | list[str] | None:
 
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:
     """Ctrl-C says what is left of a study and ends with code 130."""
-    kept = f"{checkpoint.written} runs are in {checkpoint.folder}: the same command goes on" if checkpoint and checkpoint.written else ""
-    typer.echo(f"stopped; {kept or 'nothing is kept'}", err=True)
+    rest = (
+        f"{checkpoint.written} runs are in {checkpoint.folder}: the same command goes on"
+        if checkpoint and checkpoint.written
+        else "nothing is kept"
+    )
+    typer.echo(f"stopped; {rest}", err=True)
     raise typer.Exit(INTERRUPTED)
 
 
@@ -211,14 +303,10 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
 
     from runtime.progress import LOGGER
 
-    start = monotonic()
-
-    class Lines(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if monotonic() - start > after:
-                say(record.getMessage())
-
-    handler, level = Lines(), LOGGER.level
+    start, level = monotonic(), LOGGER.level
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("  %(message)s"))
+    handler.addFilter(lambda record: monotonic() - start > after)
     LOGGER.addHandler(handler)
     LOGGER.setLevel(logging.INFO)
     try:
@@ -230,11 +318,18 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Any]:
-    """A bar of `what` on the error stream; the context gives what long work calls with the number done and their total."""
+    """A bar of `what` on the error stream; the context gives what long work calls with the number
+    done and their total.
+    """
+    from rich import progress as rich
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    columns = (
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TimeRemainingColumn(),
+    )
+    with rich.Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)

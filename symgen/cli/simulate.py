@@ -7,34 +7,43 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import reserved
-from symgen.cli import session
-from symgen.cli.session import ROBOT, fail, reported_errors, single_thread
+from symgen.cli import options, session
 
 
 def simulate(
-    robot: Annotated[str, typer.Argument(help=ROBOT)],
-    study: Annotated[str, typer.Argument(help="Study file with a section `controller`, or a dataset that has one.")],
+    robot: options.RobotOrModule,
+    study: Annotated[
+        str,
+        typer.Argument(help="Study file with a section `controller`, or a dataset that has one."),
+    ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for simulated.csv, study.yaml, simulation.json and the figure.")
+        Path | None, options.folder("simulated.csv, study.yaml, simulation.json and the figure")
     ] = None,
-    ideal: Annotated[bool, typer.Option("--ideal", help="No noise, no steps of encoder and converter.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print simulation.json instead of a table.")] = False,
+    ideal: Annotated[
+        bool, typer.Option("--ideal", help="No noise, no steps of encoder and converter.")
+    ] = False,
+    trust: options.Trust = False,
+    exact: options.Exact = False,
+    json: options.Json = False,
 ) -> None:
-    """Simulate ROBOT under the controller of STUDY. Parameters are the values of the robot file, or those of `controller.values`.
+    """Simulate ROBOT under the controller of STUDY. Parameters are the values of the robot file, or
+    those of `controller.values`.
 
-    The record is written as `identify` reads it, with the reference in columns qr1 ...; study.yaml names it.
+    The record is written as `identify` reads it, with the reference in columns qr1 ...; study.yaml
+    names it.
     """
-    single_thread()
-    with reported_errors(), reserved(output) as results:
+    with session.results_in(output) as results:
         import runtime
         from runtime.json_documents import json_text
 
-        model = session.model_of(robot)
+        model = session.model_of(robot, trust=trust, exact=exact)
         settings = session.study_of_arguments([study], recorded=False)
         if settings.controller is None:
-            fail(f"{study} has no section `controller`; it says law, rate and reference of the closed loop")
+            session.fail(
+                f"{study} has no section `controller`; it says law, rate and reference of the "
+                "closed loop"
+            )
         result = runtime.simulate(model, settings, ideal=ideal)
         if results is not None:
             runtime.report(result, results, study=settings)
-        typer.echo(json_text(result.summary()) if json else result.to_table(), nl=not json)
+        session.show(json_text(result.summary()) if json else result.to_table(), json=json)

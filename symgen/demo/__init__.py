@@ -1,1 +1,1 @@
-"""The two demonstrations of the chapter, beside its published tables."""
+"""The main job of the chapter end to end: the Staubli TX40 beside its published tables."""

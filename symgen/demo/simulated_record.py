@@ -1,8 +1,8 @@
-"""A simulated record of any robot that has VALUES and LIMITS: for a first look where no measured one can be had.
+"""A simulated record of any robot that has VALUES and LIMITS: for a first look where no measured
+one can be had.
 
-    q(t)    point to point between random way points: velocity ramps of the third degree, constant velocity between them
-    tau     inverse dynamics of the emitted model with the base parameters of VALUES, plus white noise
-    motors  qm = R (q - offset) rounded to the encoder step, taum = R'^-1 tau plus noise
+    tau     inverse dynamics of the emitted model with the base parameters of VALUES
+    motors  qm = R (q - offset) rounded to the encoder step, taum = R'^-1 tau plus white noise
 
 Nothing here was measured, and the fit is better than that of any real arm: the model is exact.
 """
@@ -16,25 +16,19 @@ from io import BytesIO
 from math import pi
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+import runtime
 from runtime import Record, Study
+from runtime.loop.reference import Reference
 from runtime.model.drives import Drives
-from runtime.model.generated import require
-from runtime.motion.reference import Reference, point_to_point
 from runtime.records.provenance import SIMULATED
-from runtime.records.reading import read_records
-from runtime.settings.controller import Points
 from runtime.settings.study import Columns, RecordSettings
 
-Array = np.ndarray
-
 FILE = "simulated_record.csv.gz"
-RATE = 5000.0  # Hz, as the public TX40 record
 ENCODER = 2 * pi / 65536  # rad on the motor
-NOISE = 0.02  # standard deviation of the torque noise, of the largest torque of each motor
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,40 +55,42 @@ class Prepared:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def read_simulated(model: Any, study: Study, record: tuple[bytes, RecordSettings], note: str) -> Prepared:
-    """A simulated record under the settings of `study`, read from its file like any other."""
-    content, settings = record
-    study = replace(study, record=(settings,))
+def simulated_record(
+    model: Any,
+    study: Study,
+    path: Reference,
+    note: str,
+    *,
+    seed: int,
+    encoder: float = ENCODER,
+    noise: float = 0.02,
+) -> Prepared:
+    """The record of a motion, written as a .csv.gz file q1..qn,tau1..taun of the motor side and
+    read from it like any other.
+
+    study : settings but for the record. encoder : rad on the motor. noise : standard deviation, of
+    the largest torque of each motor.
+    """
+    n = len(model.JOINTS)
+    drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(n)})
+    tau = model.inverse_dynamics(path.q, path.qd, path.qdd, model.base_parameters(model.VALUES))
+    torque = drives.motor_command(tau)
+    white = np.random.default_rng([seed, 1]).standard_normal(torque.shape)
+    torque += noise * np.abs(torque).max(axis=0) * white
+    position = encoder * np.round(drives.motor_position(path.q) / encoder)
+    q, t = (tuple(f"{letter}{j}" for j in range(1, n + 1)) for letter in ("q", "tau"))
+    stream, header = BytesIO(), ",".join((*q, *t))
+    table = np.column_stack([position, torque])
+    np.savetxt(stream, table, fmt="%.7g", delimiter=",", header=header, comments="")
+    content = gzip.compress(stream.getvalue(), compresslevel=1, mtime=0)
+    settings = RecordSettings(
+        files=(FILE,),
+        columns=Columns(None, q, t),
+        side="joint" if model.DRIVES is None else "motor",
+        rate=path.rate,
+        name=f"{SIMULATED} {model.NAME}",
+    )
     with TemporaryDirectory(prefix="symgen-") as folder:
         (Path(folder) / FILE).write_bytes(content)
-        return Prepared(model, study, read_records(study.record, model, folder=Path(folder))[0], note, {FILE: content})
-
-
-def motor_record(model: Any, duration: float, seed: int) -> tuple[bytes, RecordSettings]:
-    """A .csv.gz file t,q1..qn,tau1..taun of the motor side, and the settings that read it."""
-    return recorded(model, point_to_point(model, Points(duration, seed), RATE), seed)
-
-
-def recorded(
-    model: Any, path: Reference, seed: int, *, rate: float = RATE, encoder: float = ENCODER, noise: float = NOISE
-) -> tuple[bytes, RecordSettings]:
-    """The file, and the settings that read it, of a motion: motor positions in steps of `encoder`, torques with white noise.
-
-    rate : Hz.   encoder : rad on the motor.   noise : standard deviation, of the largest torque of each motor.
-    """
-    require(model, "base_parameters", "inverse_dynamics")
-    drives = Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
-    X = model.base_parameters(model.VALUES)
-    tau = model.inverse_dynamics(path.q, path.qd, path.qdd, X)
-    command = drives.motor_command(tau)
-    rng = np.random.default_rng([seed, 1])
-    command += noise * np.abs(command).max(axis=0) * rng.standard_normal(command.shape)
-    qm = encoder * np.round(drives.motor_position(path.q) / encoder)
-    n = len(model.JOINTS)
-    q_names, tau_names = (tuple(f"{letter}{j}" for j in range(1, n + 1)) for letter in ("q", "tau"))
-    stream = BytesIO()
-    np.savetxt(stream, np.column_stack([qm, command]), fmt="%.7g", delimiter=",", header=",".join((*q_names, *tau_names)), comments="")
-    side: Literal["motor", "joint"] = "motor" if model.DRIVES is not None else "joint"
-    name = f"{SIMULATED} {model.NAME}"
-    settings = RecordSettings(files=(FILE,), columns=Columns(None, q_names, tau_names), side=side, rate=rate, name=name)
-    return gzip.compress(stream.getvalue(), compresslevel=1, mtime=0), settings
+        record = runtime.read_record(settings, model, folder=folder)
+    return Prepared(model, replace(study, record=(settings,)), record, note, {FILE: content})

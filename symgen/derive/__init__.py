@@ -1,1 +1,3 @@
-"""Mechanics, written once over scalars: geometry, recursions, loops; Lagrange by CasADi as an independent check."""
+"""Mechanics, written once over scalars: geometry, recursions, loops; Lagrange by CasADi as an
+independent check.
+"""

@@ -1,8 +1,12 @@
-"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes in which all of them exist.
+"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes
+in which all of them exist.
 
-Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p. Every other fixed angle is a whole multiple of a
-unit that is drawn at random: radians and multiples of constants (transcendental against all algebraic numbers), and fractions of pi with a
-large denominator, whose minimal polynomial has a degree of the order of that denominator. Multiples are at most LARGEST_MULTIPLE, so that
+Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p.
+Every other fixed angle is a whole multiple of a
+unit that is drawn at random: radians and multiples of constants (transcendental against all
+algebraic numbers), and fractions of pi with a
+large denominator, whose minimal polynomial has a degree of the order of that denominator. Multiples
+are at most LARGEST_MULTIPLE, so that
 degrees stay small against p.
 """
 
@@ -17,17 +21,26 @@ from symgen.description.expression import Call, Expression, Monomial, Number, qu
 from symgen.description.robot import REVOLUTE, Robot
 
 PI: Monomial = (("pi", 1),)
-LARGEST_RADICAND = 100  # roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
-LARGEST_DENOMINATOR, LARGEST_ORDER = 360, 100_000  # of a fraction of pi, and of all of them together
+# roots of larger primes are drawn by themselves: their fields share nothing with angles of small
+# denominator
+LARGEST_RADICAND = 100
+LARGEST_DENOMINATOR, LARGEST_ORDER = (
+    360,
+    100_000,
+)  # of a fraction of pi, and of all of them together
 LARGEST_MULTIPLE = 16  # of a unit angle
 SMALL = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
 FEW = 4  # of each of two unit angles in a sum
 Unit = tuple[Monomial, Fraction]  # the angle fraction * monomial
-Variable = str | Number | Call | Unit  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
+Variable = (
+    str | Number | Call | Unit
+)  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
-    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and the leading sign positive."""
+    """The distinct fixed angles of a robot that are no quarter turns, quarter turns taken off and
+    the leading sign positive.
+    """
     angles: dict[Expression, None] = {}
     for e in _angles(robot):
         rest = quarter_turns(e)[1]
@@ -39,7 +52,8 @@ def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
 class Units:
     """The unit angles of a robot: `of` writes a fixed angle as a sum of whole multiples of them.
 
-    pi/D is the first, D the common denominator of its moderate fractions of pi and of those that its square roots need.
+    pi/D is the first, D the common denominator of its moderate fractions of pi and of those that
+    its square roots need.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -47,33 +61,41 @@ class Units:
         for l in radicands(robot):
             self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
         self.free: dict[Monomial, list[Fraction]] = {}
-        self.multiples: dict[Monomial, dict[Fraction, tuple[Fraction, int]]] = {}  # {multiple of a free unit, without turns: (unit, k)}
+        self.multiples: dict[
+            Monomial, dict[Fraction, tuple[Fraction, int]]
+        ] = {}  # {multiple of a free unit, without turns: (unit, k)}
         self.sums: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}
-        self.written: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}  # amounts found once
+        self.written: dict[
+            tuple[Monomial, Fraction], list[tuple[Unit, int]]
+        ] = {}  # amounts looked at once
         angles = fixed_angles(robot)
-        for c in sorted({e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator):
+        for c in sorted(
+            {e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator
+        ):
             if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
                 self.D = lcm(self.D, c.denominator)
-        amounts: dict[Monomial, list[Fraction]] = {}
-        for e in angles:
-            for m, c in e.terms.items():
-                if m != PI:
-                    amounts.setdefault(m, []).append(abs(c))
-        for m, found in amounts.items():
-            common = lcm(*(c.denominator for c in found))
-            unit = Fraction(gcd(*(int(c * common) for c in found)), common)
-            if max(found) / unit <= LARGEST_MULTIPLE:
+        for m in dict.fromkeys(m for e in angles for m in e.terms if m != PI):
+            amounts = [abs(e.terms[m]) for e in angles if m in e.terms]
+            common = lcm(*(c.denominator for c in amounts))
+            unit = Fraction(gcd(*(int(c * common) for c in amounts)), common)
+            if max(amounts) / unit <= LARGEST_MULTIPLE:
                 self._new(m, unit)
         for e in angles:
             self.of(e)
         self._add_sums(robot)
 
     def _add_sums(self, robot: Robot) -> None:
-        """Sums of the angles about parallel axes in a row are those sums, not new units (`Geometry` turns by them at once)."""
+        """Sums of the angles about parallel axes in a row are those sums, not new units (`Geometry`
+        turns by them at once).
+        """
         angles: dict[int, tuple[Expression, ...]] = {}
         for f in robot.frames:
             following = robot.constraints.get(f.j) if f.sigma == REVOLUTE else None
-            constant = Expression() if following is None else following.substitute({f"q{i}": Expression() for i in robot.moving})
+            constant = (
+                Expression()
+                if following is None
+                else following.substitute({f"q{i}": Expression() for i in robot.moving})
+            )
             parallel = not f.alpha
             before = angles.get(f.ant, ()) if parallel else ()
             angles[f.j] = (*before, f.theta0 + constant + (f.gamma if parallel else Expression()))
@@ -84,15 +106,23 @@ class Units:
                     whole: dict[Unit, int] = {}
                     for unit, k in (pair for part in parts for pair in part):
                         whole[unit] = whole.get(unit, 0) + k
-                    self.sums |= {(m, sign * c): [(unit, sign * k) for unit, k in whole.items() if k] for sign in (1, -1)}
+                    self.sums |= {
+                        (m, sign * c): [(unit, sign * k) for unit, k in whole.items() if k]
+                        for sign in (1, -1)
+                    }
 
     @property
     def all(self) -> list[Unit]:
         """pi/D, then the free ones."""
-        return [(PI, Fraction(1, self.D)), *((m, c) for m, found in self.free.items() for c in found)]
+        return [
+            (PI, Fraction(1, self.D)),
+            *((m, c) for m, units in self.free.items() for c in units),
+        ]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
-        """[(unit, whole multiple)]; an amount that is no small multiple of known units becomes a unit."""
+        """[(unit, whole multiple)]; an amount that is no small multiple of units becomes a
+        unit.
+        """
         return [(unit, k) for m, c in angle.terms.items() for unit, k in self._multiples(m, c)]
 
     def _multiples(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]]:
@@ -102,21 +132,21 @@ class Units:
         if (m, c) in self.sums:
             return self.sums[m, c]
         if (m, c) not in self.written:
-            found = self._in_known(m, c)
-            if found is None:
+            parts = self._in_units(m, c)
+            if parts is None:
                 self._new(m, abs(c))
-                found = [((m, abs(c)), 1 if c > 0 else -1)]
-            self.written[m, c] = found
+                parts = [((m, abs(c)), 1 if c > 0 else -1)]
+            self.written[m, c] = parts
         return self.written[m, c]
 
-    def _in_known(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]] | None:
+    def _in_units(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]] | None:
         """c as a multiple of one free unit or of two, and of pi/D, if it is one."""
-        known = self.multiples.get(m, {})
-        if (hit := known.get(self._part(m, c))) is not None:
+        multiples = self.multiples.get(m, {})
+        if (hit := multiples.get(self._part(m, c))) is not None:
             return self._with_turns(m, c, [hit])
         for u in self.free.get(m, ()):
             for k in SMALL[: 2 * FEW]:
-                hit = known.get(self._part(m, c - k * u))
+                hit = multiples.get(self._part(m, c - k * u))
                 if hit is not None and abs(hit[1]) <= FEW:
                     return self._with_turns(m, c, [(u, k), hit])
         return None
@@ -125,15 +155,19 @@ class Units:
         """What is left of an amount without the multiples of pi/D."""
         return c % Fraction(1, self.D) if m == PI else c
 
-    def _with_turns(self, m: Monomial, c: Fraction, parts: list[tuple[Fraction, int]]) -> list[tuple[Unit, int]]:
+    def _with_turns(
+        self, m: Monomial, c: Fraction, parts: list[tuple[Fraction, int]]
+    ) -> list[tuple[Unit, int]]:
         rest = (c - sum(k * u for u, k in parts)) * self.D
-        return [((m, u), k) for u, k in parts] + ([((PI, Fraction(1, self.D)), int(rest))] if rest else [])
+        return [((m, u), k) for u, k in parts] + (
+            [((PI, Fraction(1, self.D)), int(rest))] if rest else []
+        )
 
     def _new(self, m: Monomial, unit: Fraction) -> None:
         self.free.setdefault(m, []).append(unit)
-        known = self.multiples.setdefault(m, {})
+        multiples = self.multiples.setdefault(m, {})
         for k in SMALL:
-            known.setdefault(self._part(m, k * unit), (unit, k))
+            multiples.setdefault(self._part(m, k * unit), (unit, k))
 
 
 @lru_cache(maxsize=64)
@@ -155,7 +189,13 @@ def _angles(robot: Robot) -> Iterator[Expression]:
 def _calls(robot: Robot) -> Iterator[Call]:
     """Functions in lengths, gravity and the rows of elements."""
     lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
-    rows = [c for e in robot.elements for table in (e.along, e.form) for row in table.values() for c in row.values()]
+    rows = [
+        c
+        for e in robot.elements
+        for table in (e.along, e.form)
+        for row in table.values()
+        for c in row.values()
+    ]
     pending = [*robot.gravity, *lengths, *rows, *robot.constraints.values()]
     while pending:
         for a in pending.pop().atoms:
@@ -173,7 +213,10 @@ def radicands(robot: Robot) -> tuple[int, ...]:
 def nested_roots(robot: Robot) -> bool:
     """Whether there are square roots of numbers that hold square roots themselves."""
     return any(
-        a.function == "sqrt" and not a.argument.symbols and any(isinstance(b, Call) for b in a.argument.atoms) for a in _calls(robot)
+        a.function == "sqrt"
+        and not a.argument.symbols
+        and any(isinstance(b, Call) for b in a.argument.atoms)
+        for a in _calls(robot)
     )
 
 

@@ -2,10 +2,11 @@
 
 The moving joints of the tree are written as linear functions of the *independent* ones,
 
-    q_j = sum_i n_ji q_i + c_j ,     qd_j = sum_i n_ji qd_i ,     qdd_j = sum_i n_ji qdd_i        (n_ji, c_j constant)
+    q_j = sum_i n_ji q_i + c_j ,     qd_j = sum_i n_ji qd_i ,     qdd_j = sum_i n_ji qdd_i
 
-Serial robots and trees: every joint is independent. Parallelograms: the actuated joints are, and G = (n_ji). General loops: the passive
-joints that no linear relation gives are independent too, and tied to the actuated ones by the closure equations, qd_u = G_u qd_a. Then
+with constant n_ji and c_j. Serial robots and trees: every joint is independent. Parallelograms: the
+actuated joints are, and G = (n_ji). General loops: the passive joints that no linear relation gives
+are independent too, and tied to the actuated ones by the closure equations, qd_u = G_u qd_a. Then
 
     Gamma_a = G' Gamma_tree
 
@@ -23,6 +24,7 @@ from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
 
 ActiveRow = tuple[tuple[int, Expression], ...]
+Relation = tuple[Mapping[int, Expression], Expression]  # row and constant
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class Closure:
     tied : tuple of int
         Independent passive joints: those of general loops.
     start : mapping
-        A configuration of all moving joints that closes the loops, rad or m; it picks the assembly mode of a general loop.
+        A configuration of all moving joints that closes the loops, rad or m; it picks the assembly
+        mode of a general loop.
     """
 
     robot: Robot
@@ -62,13 +65,17 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """The angle of revolute joint j as whole multiples of independent angles plus a constant."""
+        """The angle of revolute joint j: whole multiples of independent angles, and a constant."""
         turn = []
         for i, g in sorted(self.row[j].items()):
             c = g.constant
             if c is None or c.denominator != 1:
                 raise DescriptionError(
-                    f"q{j} turns {g} times with q{i}; a passive angle needs whole multiples of other angles", path=("constraints", f"q{j}")
+                    (
+                        f"q{j} turns {g} times with q{i}; a passive angle needs whole multiples of "
+                        "other angles"
+                    ),
+                    path=("constraints", f"q{j}"),
                 )
             turn.append((i, int(c)))
         return tuple(turn), self.offset[j]
@@ -80,13 +87,18 @@ class Closure:
             total = add(total, mul(algebra.constant(g), value[i]))
         return total
 
-    def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
-        """The row of s = row q in the independent joints."""
+    def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
+        """s = row q + c in the independent joints: its row, and its constant."""
         total: dict[int, Expression] = {}
         for j, g in row.items():
             for i, h in self.row[j].items():
                 total[i] = total.get(i, ZERO) + g * h
-        return tuple(sorted(((i, g) for i, g in total.items() if g), key=lambda ig: ig[0]))
+            c = c + g * self.offset[j]
+        return {i: g for i, g in sorted(total.items()) if g}, c
+
+    def in_independent(self, row: Mapping[int, Expression]) -> ActiveRow:
+        """The row of s = row q in the independent joints."""
+        return tuple(self.relation(row)[0].items())
 
     def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """G' Gamma_tree, by actuated joint."""

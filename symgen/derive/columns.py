@@ -1,4 +1,6 @@
-"""The columns of the standard regressor, by name: Gamma_a = sum_k D_k chi_k in the actuated joints."""
+"""The columns of the standard regressor, by name: Gamma_a = sum_k D_k chi_k in the actuated
+joints.
+"""
 
 from __future__ import annotations
 
@@ -26,25 +28,41 @@ def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
 
 
 def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:
-    """D of the parameters `names` at `count` states in floats, shape (actuated joints, count, len(names))."""
+    """D of the parameters `names` at `count` states in floats, shape (actuated joints, count,
+    len(names)).
+    """
     D = columns(motion, names)
     return np.array(
         [
-            np.stack([np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (count,)) for name in names], axis=-1)
+            np.stack(
+                [
+                    np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (count,))
+                    for name in names
+                ],
+                axis=-1,
+            )
             for j in motion.robot.joints
         ]
     )
 
 
-def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:
-    """{name: {actuated joint: D}} of the standard parameters `names`."""
+def columns(
+    motion: Motion, names: Iterable[str], axes: Axes | None = None
+) -> dict[str, dict[int, Scalar]]:
+    """{name: {actuated joint: D}} of the standard parameters `names`; `axes` are those of `motion`,
+    where they have been carried outward already.
+    """
     robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
     inertial, elements = inertial_names(robot), element_names(robot)
-    axes = Axes(motion)
+    axes = axes or Axes(motion)
     algebra.section("Contributions that several joints share")
     result: dict[str, dict[int, Scalar]] = {}
     for name in names:
         require_time()
-        tree = axes.column(*inertial[name]) if name in inertial else element_column(motion, *elements[name])
+        tree = (
+            axes.column(*inertial[name])
+            if name in inertial
+            else element_column(motion, *elements[name])
+        )
         result[name] = closure.project(algebra, tree)
     return result

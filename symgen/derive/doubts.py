@@ -1,4 +1,5 @@
-"""What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a loop under two names, numbers in degrees, mm or
+"""What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a
+loop under two names, numbers in degrees, mm or
 cm/s^2."""
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ def doubts(robot: Robot) -> list[str]:
 
 
 def nearly_round(robot: Robot) -> list[str]:
-    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones, with formulas and base parameters of their own."""
+    """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones,
+    with formulas and base parameters of their own.
+    """
     notes = []
     for f in robot.frames:
         for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
@@ -37,7 +40,8 @@ def nearly_round(robot: Robot) -> list[str]:
                 meant = PI * Fraction(k, 12)
                 notes.append(
                     f"frame {f.j}: {name} has {angle}, not {meant}: "
-                    f"another robot, with other formulas; write {meant} (of a URDF: symgen convert --snap 1e-4)"
+                    f"another robot, with other formulas; write {meant} (a URDF is read so "
+                    "without --exact)"
                 )
     return notes
 
@@ -48,38 +52,66 @@ def other_units(robot: Robot) -> list[str]:
     g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
     if g and not GRAVITY[0] <= g <= GRAVITY[1]:
         notes.append(f"gravity is {g:g} m/s^2; that of the Earth is 9.81, in m/s^2")
-    lengths = {(f.j, name): abs(getattr(f, name).value(robot.constants)) for f in robot.frames for name in ("b", "d", "r0")}
+    lengths = {
+        (f.j, name): abs(getattr(f, name).value(robot.constants))
+        for f in robot.frames
+        for name in ("b", "d", "r0")
+    }
     total = sum(lengths.values())
     for (j, name), length in lengths.items():
         if length > LONGEST or (length > 1 and length > LOPSIDED * (total - length) > 0):
-            notes.append(f"frame {j}: {name.removesuffix('0')} holds a length of {length:g} m; lengths are in m, not mm")
+            notes.append(
+                f"frame {j}: {name.removesuffix('0')} holds a length of {length:g} m; lengths are "
+                "in m, not mm"
+            )
     turning = [k for k, j in enumerate(robot.joints) if robot.frame(j).sigma == REVOLUTE]
     zeros = robot.drives.offset if robot.drives else ()
-    bounds = [max(map(abs, x)) if isinstance(x, tuple) else abs(x) for x in robot.limits.get("q", ())]
+    bounds = [
+        max(map(abs, x)) if isinstance(x, tuple) else abs(x) for x in robot.limits.get("q", ())
+    ]
     for what, values in (("drives.offset", zeros), ("limits.q", bounds)):
         for k in turning:
             if k < len(values) and DEGREES < abs(values[k]) < UNLIMITED:
                 notes.append(
-                    f"{what} of joint {robot.joints[k]}: {values[k]:g} rad are {abs(values[k]) / (2 * math.pi):.3g} turns; angles are in rad, not degrees"
+                    f"{what} of joint {robot.joints[k]}: {values[k]:g} rad are "
+                    f"{abs(values[k]) / (2 * math.pi):.3g} turns; angles are in rad, not degrees"
                 )
     return notes
 
 
 def equal_sides(robot: Robot) -> list[str]:
-    """Lengths of equal value and different names in a loop without linear relations: with one name it may be a parallelogram."""
+    """Lengths of equal value and different names in a loop without linear relations: with one name
+    it may be a parallelogram.
+    """
     if not robot.loops:
         return []
     tied = set(close(robot).tied)
     notes = []
     for loop in robot.loops:
-        frames = [robot.frame(j) for j in sorted({*robot.path(loop.cut)} ^ {*robot.path(loop.twin)})]
+        frames = [
+            robot.frame(j) for j in sorted({*robot.path(loop.cut)} ^ {*robot.path(loop.twin)})
+        ]
         if not tied & {f.j for f in frames}:
             continue
-        lengths = sorted({name for f in frames for e in (f.b, f.d, f.r) for name in e.symbols if robot.constants.get(name)})
-        pairs = [f"{a} and {b}" for a, b in combinations(lengths, 2) if math.isclose(robot.constants[a], robot.constants[b], rel_tol=1e-9)]
+        lengths = sorted(
+            {
+                name
+                for f in frames
+                for e in (f.b, f.d, f.r)
+                for name in e.symbols
+                if robot.constants.get(name)
+            }
+        )
+        pairs = [
+            f"{a} and {b}"
+            for a, b in combinations(lengths, 2)
+            if math.isclose(robot.constants[a], robot.constants[b], rel_tol=1e-9)
+        ]
         if pairs:
             notes.append(
-                f"the loop of frames {loop.cut} and {loop.twin} is taken for a general one, which is slow and has the NumPy target only; "
-                f"{', '.join(pairs)} are equal: if by construction, write one name for both, and a parallelogram is seen as one"
+                f"the loop of frames {loop.cut} and {loop.twin} is taken for a general one, which "
+                "is slow and has the NumPy target only; "
+                f"{', '.join(pairs)} are equal: if by construction, write one name for both, and a "
+                "parallelogram is seen as one"
             )
     return notes

@@ -1,4 +1,5 @@
-"""Torque columns of the elements on the joints: inertia, viscous and Coulomb friction, offset, stiffness.
+"""Torque columns of the elements on the joints: inertia, viscous and Coulomb friction, offset,
+stiffness.
 
 along G, s = G q:   Gamma += c G' x,   x = sdd | sd | sign(sd) | 1 | s
 form B:             Gamma += c B x,    x = qdd | qd | q
@@ -33,9 +34,11 @@ def _coordinate(motion: Motion, kind: str, j: int) -> Scalar:
 
 
 def _along(motion: Motion, e: Element, j: int) -> Scalar:
-    """x of the element with key j; the velocity along several joints is named after the element, since other rows may have these joints."""
+    """x of the element with key j; the velocity along several joints is named after the element,
+    since other rows may have these joints.
+    """
     if e.kind == "offset":
-        return 1 if motion.gravity else 0
+        return 1
     row = e.along[j]
     rate: Scalar = 0
     for i, g in row.items():
@@ -59,5 +62,7 @@ def _along(motion: Motion, e: Element, j: int) -> Scalar:
 def _form(motion: Motion, kind: str, form: Form) -> dict[int, Scalar]:
     column: dict[int, Scalar] = {}
     for (i, m), b in form.items():
-        column[i] = add(column.get(i, 0), mul(motion.algebra.constant(b), _coordinate(motion, kind, m)))
+        column[i] = add(
+            column.get(i, 0), mul(motion.algebra.constant(b), _coordinate(motion, kind, m))
+        )
     return column

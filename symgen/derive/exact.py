@@ -1,21 +1,29 @@
 """Robots over the prime field F_p: an algebra in which random states and geometries are exact.
 
-p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point ((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
-the unit circle. The points form a group of order p + 1; p is chosen so that this order is a multiple of 2D, D the common denominator of
+p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point
+((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
+the unit circle. The points form a group of order p + 1; p is chosen so that this order is a
+multiple of 2D, D the common denominator of
 the robot's fractions of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
 
 Every other fixed angle is a whole multiple of a unit, a random point (`derive.angles`).
 
-Square roots of rationals lie in the cyclotomic field of the fractions of pi and are taken from the same root of unity, so that sqrt(3)/2 is
-cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern
+Square roots of rationals lie in the cyclotomic field of the fractions of pi and are taken from the
+same root of unity, so that sqrt(3)/2 is
+cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l)
+(Ireland and Rosen, A Classical Introduction to Modern
 Number Theory, 6.4):
 
-    sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4),      sum_k (k/l) sin(2 pi k/l)  if l = 3 (mod 4),      sqrt(2) = 2 cos(pi/4).
+    sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4),      sum_k (k/l) sin(2 pi k/l)
+            if l = 3 (mod 4),      sqrt(2) = 2 cos(pi/4).
 
-pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue where `geometry` gives one.
+pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue
+where `geometry` gives one.
 
-Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of proportional rows G; max(sd, 0) = b sd. A torque is a
-polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero polynomial; b is drawn from F_p as every other variable.
+Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of
+proportional rows G; max(sd, 0) = b sd. A torque is a
+polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero
+polynomial; b is drawn from F_p as every other variable.
 """
 
 from __future__ import annotations
@@ -27,14 +35,26 @@ from math import lcm
 
 import numpy as np
 
-from symgen.derive.angles import LARGEST_RADICAND, PI, Unit, Variable, is_prime, nested_roots, radicands, units_of
+from symgen.derive.angles import (
+    LARGEST_RADICAND,
+    PI,
+    Unit,
+    Variable,
+    is_prime,
+    nested_roots,
+    radicands,
+    units_of,
+)
 from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Call, Expression, Number, call, quarter_turns
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 
 Array = np.ndarray
-FEW, MOST_PRIMES = 12, 300  # draws over a prime, and primes looked at, for nested square roots of numbers
+FEW, MOST_PRIMES = (
+    12,
+    300,
+)  # draws over a prime, and primes looked at, for nested square roots of numbers
 
 
 class Fp:
@@ -87,8 +107,10 @@ Point = tuple[Array, Array]  # (cos, sin) over F_p
 class Draw(Unnamed):
     """One random robot and `samples` random states over F_p: an Algebra of the derivation.
 
-    `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents of fixed angles by their unit: `count`
-    robots in the same states. Without it everything is random and redrawn until every square root exists, `attempts` times at most.
+    `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents
+    of fixed angles by their unit: `count`
+    robots in the same states. Without it everything is random and redrawn until every square root
+    exists, `attempts` times at most.
     """
 
     def __init__(
@@ -103,15 +125,18 @@ class Draw(Unnamed):
         attempts: int = 200,
     ) -> None:
         self.robot, self.samples = robot, samples
-        self.shape = (count, samples) if geometry is not None else (samples,)
-        self._geometry = geometry or {}
+        self.shape: tuple[int, ...] = (count, samples) if count else (samples,)
+        self._geometry = dict(geometry or {})
         self.units = units_of(robot)
         self.p = p if p is not None else primes_for(robot, 1)[0]
         self.rng = np.random.default_rng(seed)
         self.complete = False
         for _ in range(attempts):
             names = (*robot.constants, "pi")
-            self._constants = {name: self._geometry[name] if name in self._geometry else self._random(1) for name in names}
+            self._constants = {
+                name: self._geometry[name] if name in self._geometry else self._random(1)
+                for name in names
+            }
             self._angles: dict[Unit, Point] = {}
             self._root: Point | None = None
             self.complete = self._roots_exist()
@@ -145,6 +170,8 @@ class Draw(Unnamed):
         """The point of the angle n a."""
         if n < 0:
             a, n = (a[0], -a[1] % self.p), -n
+        if n == 1:
+            return a
         result: Point = (np.ones_like(a[0]), np.zeros_like(a[0]))
         while n:
             if n & 1:
@@ -159,7 +186,11 @@ class Draw(Unnamed):
             if unit in self._geometry:
                 self._angles[unit] = self._point_at(self._geometry[unit])
             else:
-                self._angles[unit] = self._half_turn() if unit == (PI, Fraction(1, self.units.D)) else self._circle(1)
+                self._angles[unit] = (
+                    self._half_turn()
+                    if unit == (PI, Fraction(1, self.units.D))
+                    else self._circle(1)
+                )
         return self._angles[unit]
 
     def _half_turn(self) -> Point:
@@ -190,7 +221,11 @@ class Draw(Unnamed):
         """A point of that order, a multiple of 4, a quarter of which is (0, 1)."""
         while True:
             root = self._multiple(self._circle(1), (self.p + 1) // order)
-            primitive = all(self._multiple(root, order // k)[0][0] != 1 for k in range(2, order + 1) if order % k == 0)
+            primitive = all(
+                self._multiple(root, order // k)[0][0] != 1
+                for k in range(2, order + 1)
+                if order % k == 0
+            )
             if primitive and self._multiple(root, order // 4)[1][0] == 1:
                 return root
 
@@ -212,16 +247,30 @@ class Draw(Unnamed):
             return False
         return True
 
+    def residues(self, value: Scalar) -> Array:
+        """A scalar as it is drawn: one residue, or one for each geometry or state."""
+        return value.x if isinstance(value, Fp) else np.array([value % self.p])
+
+    def spread(self, value: Scalar) -> Array:
+        """A scalar at all geometries and states, of shape `shape`."""
+        return np.broadcast_to(self.residues(value), self.shape)
+
     # --- Algebra ---
 
     def constant(self, e: Expression) -> Scalar:
         c = e.constant
         if c is not None and c in (0, 1, -1):
             return int(c)
-        return e.evaluate(lambda name: self._fp(self._constants[name]), self._call, self._number, self._kept)
+        return e.evaluate(
+            lambda name: self._fp(self._constants[name]), self._call, self._number, self._atom
+        )
 
-    def _kept(self, number: Number) -> Fp:
-        return self._fp(self._geometry[number]) if number in self._geometry else self._number(number.value)
+    def _atom(self, number: Number) -> Fp:
+        return (
+            self._fp(self._geometry[number])
+            if number in self._geometry
+            else self._number(number.value)
+        )
 
     def _number(self, c: Fraction) -> Fp:
         return self._fp(np.array([c.numerator * pow(c.denominator, -1, self.p) % self.p]))
@@ -260,29 +309,34 @@ class Draw(Unnamed):
         return self._fp(self._qdd[j])
 
     def rate(self, u: int, i: int) -> Scalar:
-        """Any value: a general loop does not close over F_p, so this proves identities of the open tree alone."""
+        """Any value: a general loop does not close over F_p, so this proves identities of the open
+        tree alone.
+        """
         return self._fp(self._rate.setdefault((u, i), self._random(self.samples)))
 
     def _forward(self, row: tuple[tuple[int, Expression], ...]) -> tuple[Fp, int]:
-        """b of the direction class of a row, and whether the row runs along (1) or against (-1) it."""
+        """b of the direction class of a row, and whether the row runs along (1) or against (-1)
+        it.
+        """
         lead = row[0][1]
         orientation = 1 if lead.value(self.robot.constants) > 0 else -1
-        inverse = power(self._residues(lead), self.p - 2, self.p)
-        key = tuple((i, tuple(np.unique(self._residues(g) * inverse % self.p))) for i, g in row)
+        inverse = power(self.residues(self.constant(lead)), self.p - 2, self.p)
+        key = tuple(
+            (i, tuple(np.unique(self.residues(self.constant(g)) * inverse % self.p)))
+            for i, g in row
+        )
         if key not in self._directions:
             self._directions[key] = self._random(self.samples)
         b = self._fp(self._directions[key])
         return b, orientation
 
-    def _residues(self, e: Expression) -> Array:
-        value = self.constant(e)
-        return value.x if isinstance(value, Fp) else np.array([value % self.p])
-
     def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Fp:
         b, orientation = self._forward(row)
         return (b + b - 1) * orientation
 
-    def one_sided(self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str) -> tuple[Scalar, Scalar]:
+    def one_sided(
+        self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str
+    ) -> tuple[Scalar, Scalar]:
         b, orientation = self._forward(row)
         if orientation < 0:
             b = 1 - b
@@ -291,7 +345,8 @@ class Draw(Unnamed):
 
 @lru_cache
 def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, ...]:
-    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the robot exist: the largest, or below a random place.
+    """`count` primes p < 2**31 with p = -1 modulo 4 and 2D, over which the square roots of the
+    robot exist: the largest, or below a random place.
 
     Raises SymgenError where so many of them nest that none of MOST_PRIMES has all.
     """
@@ -299,15 +354,16 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
     top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
     squares, nested = [c for c in radicands(robot) if c >= LARGEST_RADICAND], nested_roots(robot)
     p, tried = top // step * step - 1, 0
-    found: list[int] = []
-    while len(found) < count:
+    primes: list[int] = []
+    while len(primes) < count:
         if p < 2**20 or tried == MOST_PRIMES:
             raise SymgenError(
-                f"robot {robot.name}: no prime found over which angles pi/{step // 2} and all its square roots exist; write some of them as decimals"
+                f"robot {robot.name}: no prime found over which angles pi/{step // 2} and all its "
+                "square roots exist; write some of them as decimals"
             )
         if is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
             tried += 1
             if not nested or Draw(robot, 5, 1, p=p, attempts=FEW).complete:
-                found.append(p)
+                primes.append(p)
         p -= step
-    return tuple(found)
+    return tuple(primes)

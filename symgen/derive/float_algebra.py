@@ -1,4 +1,6 @@
-"""The algebra of floats: q, qd, qdd of the joints are given by joint number, arrays of any one shape."""
+"""The algebra of floats: q, qd, qdd of the joints are given by joint number, arrays of any one
+shape.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,13 @@ class FloatAlgebra(Unnamed):
         *,
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        self.robot, self._q, self._qd, self._qdd, self._rate = robot, q, qd or {}, qdd or {}, rate or {}
+        self.robot, self._q, self._qd, self._qdd, self._rate = (
+            robot,
+            q,
+            qd or {},
+            qdd or {},
+            rate or {},
+        )
         self.constants = {**robot.constants, **(constants or {})}
 
     def constant(self, e: Expression) -> Scalar:

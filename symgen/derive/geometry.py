@@ -1,9 +1,12 @@
 """Rotations and displacements between the frames of a robot, over any scalars.
 
-    iRj = A_j Rot(z, theta_j),   A_j = Rot(z, gamma_j) Rot(x, alpha_j),   P_ij = b e3 + d A_j e1 + r A_j e3
+    iRj = A_j Rot(z, theta_j),   A_j = Rot(z, gamma_j) Rot(x, alpha_j),
+            P_ij = b e3 + d A_j e1 + r A_j e3
 
-Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles: the *carrier* of frame j is the last frame m on
-its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum of angles). Whatever only rotates (angular velocities,
+Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles: the *carrier* of
+frame j is the last frame m on
+its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum of angles). Whatever only
+rotates (angular velocities,
 joint axes) is taken from the carrier in one step, which is where C23 and S23 come from.
 """
 
@@ -12,7 +15,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from symgen.derive.closure import Closure
-from symgen.derive.scalar import Algebra, Matrix, Scalar, Turn, Vector, add, apply, apply_transposed, is_zero, mul, sub
+from symgen.derive.scalar import (
+    Algebra,
+    Matrix,
+    Scalar,
+    Turn,
+    Vector,
+    add,
+    apply,
+    apply_transposed,
+    is_zero,
+    mul,
+    sub,
+)
 from symgen.description.expression import Expression, call
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
 
@@ -35,13 +50,21 @@ class Rotation:
 
     def up(self, v: Vector) -> Vector:
         """A Rot(z, theta) v: components in the outer frame j to components in the inner frame i."""
-        u = (sub(mul(self.c, v[0]), mul(self.s, v[1])), add(mul(self.s, v[0]), mul(self.c, v[1])), v[2])
+        u = (
+            sub(mul(self.c, v[0]), mul(self.s, v[1])),
+            add(mul(self.s, v[0]), mul(self.c, v[1])),
+            v[2],
+        )
         return u if self.A is None else apply(self.A, u)
 
     def down(self, v: Vector) -> Vector:
         """(A Rot(z, theta))' v: components in frame i to components in frame j."""
         u = v if self.A is None else apply_transposed(self.A, v)
-        return (add(mul(self.c, u[0]), mul(self.s, u[1])), sub(mul(self.c, u[1]), mul(self.s, u[0])), u[2])
+        return (
+            add(mul(self.c, u[0]), mul(self.s, u[1])),
+            sub(mul(self.c, u[1]), mul(self.s, u[0])),
+            u[2],
+        )
 
 
 @dataclass(frozen=True)
@@ -70,7 +93,11 @@ def axis_rotation(cg: Scalar, sg: Scalar, ca: Scalar, sa: Scalar) -> Matrix:
 
 def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
     """P_ij = b e3 + d A e1 + r A e3."""
-    return (add(mul(d, A[0][0]), mul(r, A[0][2])), add(mul(d, A[1][0]), mul(r, A[1][2])), add(b, mul(r, A[2][2])))
+    return (
+        add(mul(d, A[0][0]), mul(r, A[0][2])),
+        add(mul(d, A[1][0]), mul(r, A[1][2])),
+        add(b, mul(r, A[2][2])),
+    )
 
 
 class Geometry:
@@ -87,8 +114,14 @@ class Geometry:
 
     def _frame(self, f: Frame) -> None:
         algebra, j = self.algebra, f.j
-        ca, sa = (algebra.name(algebra.constant(call(trig, f.alpha)), f"{trig[0].upper()}A{j}") for trig in ("cos", "sin"))
-        cg, sg = (algebra.name(algebra.constant(call(trig, f.gamma)), f"{trig[0].upper()}G{j}") for trig in ("cos", "sin"))
+        ca, sa = (
+            algebra.name(algebra.constant(call(trig, f.alpha)), f"{trig[0].upper()}A{j}")
+            for trig in ("cos", "sin")
+        )
+        cg, sg = (
+            algebra.name(algebra.constant(call(trig, f.gamma)), f"{trig[0].upper()}G{j}")
+            for trig in ("cos", "sin")
+        )
         A = axis_rotation(cg, sg, ca, sa)
         turn: Turn = ()
         offset = f.theta0
@@ -118,7 +151,9 @@ class Geometry:
     def position(self, j: int) -> Scalar:
         """q_j of any moving joint, from the independent ones."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
-        return add(self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j]))
+        return add(
+            self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j])
+        )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:
         """Components in frame j of a vector given in the carrier's frame."""

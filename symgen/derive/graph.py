@@ -1,29 +1,72 @@
-"""Hash-consed expression graph: the one intermediate representation between the recursions and every printer.
+"""Hash-consed expression graph: the one intermediate representation between the recursions and
+every printer.
 
-A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a
-`Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0)); sqrt and inv (1/x) of constants.
+A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once.
+Signs live on the edges: a
+`Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a
+name given by the recursion that made it.
+Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0));
+sqrt and inv (1/x) of constants.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
-SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS, SQRT, INV = "sym", "const", "add", "mul", "cos", "sin", "sign", "pos", "sqrt", "inv"
+SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS, SQRT, INV = (
+    "sym",
+    "const",
+    "add",
+    "mul",
+    "cos",
+    "sin",
+    "sign",
+    "pos",
+    "sqrt",
+    "inv",
+)
+
+
+class Symbol(NamedTuple):
+    """An input of a derivation: two inputs of one name and different kinds are different.
+
+    Attributes
+    ----------
+    kind : str
+        constant, pi, q, qd, qdd, torque, rate (of a tied joint), parameter or gravity.
+    name : str
+        As it is written: D3, q1, QP1, QDP1, GAM1, G31, XX1; of gravity the axis, 0 to 2.
+    """
+
+    kind: str
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
 
 
 class Node:
-    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample (constants and parameters only).
+    """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample
+    (constants and parameters only).
 
-    `name` is what the emitted line is called; `hint` is used for the name of a node that turns out to be shared and has none.
+    `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
+    to be shared and has none.
     """
 
     __slots__ = ("fixed", "hint", "index", "name", "name_sign", "op", "operands", "value")
 
-    def __init__(self, index: int, op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> None:
-        self.index, self.op, self.operands, self.value, self.fixed = index, op, operands, value, fixed
+    def __init__(
+        self, index: int, op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool
+    ) -> None:
+        self.index, self.op, self.operands, self.value, self.fixed = (
+            index,
+            op,
+            operands,
+            value,
+            fixed,
+        )
         self.name: str | None = None
         self.hint: str | None = None
         self.name_sign = 1
@@ -69,17 +112,47 @@ class Scalar:
     def __repr__(self) -> str:
         return f"{'-' if self.sign < 0 else ''}{self.node!r}"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.graph.scalar, (self.node.index, self.sign)
+
 
 class Graph:
     """Owner of the nodes; two graphs never mix."""
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self._known: dict[tuple[Any, ...], Node] = {}
+        self._node: dict[tuple[Any, ...], Node] = {}
+        self._sealed = 0  # nodes before this one keep the names they have
 
-    def symbol(self, name: str, *, fixed: bool = False) -> Scalar:
+    def __getstate__(self) -> tuple[Any, ...]:
+        """Nodes as a flat list: a chain of operations may be deeper than Python recurses."""
+        key = {node.index: key for key, node in self._node.items()}
+        nodes = [
+            (key[n.index], [(x.node.index, x.sign) for x in n.operands])
+            + (n.op, n.value, n.fixed, n.name, n.hint, n.name_sign)
+            for n in self.nodes
+        ]
+        return nodes, self._sealed
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        self.nodes, self._node = [], {}
+        for key, operands, op, value, fixed, name, hint, name_sign in state[0]:
+            scalars = tuple(self.scalar(k, sign) for k, sign in operands)
+            node = self._scalar(key, op, scalars, value, fixed).node
+            node.name, node.hint, node.name_sign = name, hint, name_sign
+        self._sealed = state[1]
+
+    def scalar(self, index: int, sign: int) -> Scalar:
+        """The value of a node, or its opposite."""
+        return Scalar(self, self.nodes[index], sign)
+
+    def seal(self) -> None:
+        """Keep the names of the nodes there are: what is derived later renames none of them."""
+        self._sealed = len(self.nodes)
+
+    def symbol(self, symbol: Symbol, *, fixed: bool = False) -> Scalar:
         """An input of the emitted code; `fixed` if it is the same for all samples."""
-        return self._scalar((SYM, name), SYM, (), name, fixed)
+        return self._scalar((SYM, symbol), SYM, (), symbol, fixed)
 
     def number(self, c: Fraction | int) -> Scalar | int:
         """A constant; 0, 1 and -1 stay Python integers."""
@@ -97,7 +170,9 @@ class Graph:
         return s if c >= 0 else -s
 
     def add(self, a: Scalar, b: Scalar) -> Scalar | int:
-        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one node."""
+        """a + b; the node is kept with its first operand positive, so that a - b and b - a are one
+        node.
+        """
         if a.node is b.node:
             return 0 if a.sign != b.sign else self.mul(self.lift(2), a)
         for x, y in ((a, b), (b, a)):
@@ -107,7 +182,9 @@ class Graph:
             a, b = b, a
         key = (ADD, a.node.index, b.node.index, a.sign * b.sign)
         b = b if a.sign > 0 else -b
-        s = self._scalar(key, ADD, (a if a.sign > 0 else -a, b), None, a.node.fixed and b.node.fixed)
+        s = self._scalar(
+            key, ADD, (a if a.sign > 0 else -a, b), None, a.node.fixed and b.node.fixed
+        )
         return s if a.sign > 0 else -s
 
     def mul(self, a: Scalar, b: Scalar) -> Scalar | int:
@@ -123,7 +200,9 @@ class Graph:
         if a.node.index > b.node.index:
             a, b = b, a
         fixed = a.node.fixed and b.node.fixed
-        s = self._scalar((MUL, a.node.index, b.node.index), MUL, (_positive(a), _positive(b)), None, fixed)
+        s = self._scalar(
+            (MUL, a.node.index, b.node.index), MUL, (_positive(a), _positive(b)), None, fixed
+        )
         return s if sign > 0 else -s
 
     def cos(self, x: Scalar) -> Scalar:
@@ -151,21 +230,26 @@ class Graph:
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
-        if isinstance(value, Scalar) and value.node.name is None and value.node.op not in (SYM, CONST):
+        if isinstance(value, Scalar) and self._may_be_named(value.node):
             value.node.name, value.node.name_sign = name, value.sign
         return value
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
         """Suggest a name for an operation, to be used if it is needed more than once."""
-        if isinstance(value, Scalar) and value.node.name is None and value.node.hint is None and value.node.op not in (SYM, CONST):
+        if isinstance(value, Scalar) and self._may_be_named(value.node) and value.node.hint is None:
             value.node.hint, value.node.name_sign = name, value.sign
         return value
 
-    def _scalar(self, key: tuple[Any, ...], op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool) -> Scalar:
-        node = self._known.get(key)
+    def _may_be_named(self, node: Node) -> bool:
+        return node.name is None and node.op not in (SYM, CONST) and node.index >= self._sealed
+
+    def _scalar(
+        self, key: tuple[Any, ...], op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool
+    ) -> Scalar:
+        node = self._node.get(key)
         if node is None:
             node = Node(len(self.nodes), op, operands, value, fixed)
-            self._known[key] = node
+            self._node[key] = node
             self.nodes.append(node)
         return Scalar(self, node, 1)
 

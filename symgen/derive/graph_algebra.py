@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
-from symgen.derive.graph import Graph
+from symgen.derive.graph import Graph, Symbol
 from symgen.derive.names import Names
 from symgen.derive.scalar import Scalar, Turn
 from symgen.description.expression import Expression, call, quarter_turns
@@ -14,9 +12,11 @@ ActiveRow = tuple[tuple[int, Expression], ...]
 
 
 class GraphAlgebra:
-    """Scalars are nodes of one graph: inputs q1, QP1, QDP1 ... and the constants of the robot file under their names.
+    """Scalars are nodes of one graph: inputs q1, QP1, QDP1 ... and the constants of the robot file
+    under their names.
 
-    `sections` are (index of the first node, title); `angles` holds the angle of every cos and sin node, `roots` every square root.
+    `sections` are (index of the first node, title); `angles` holds the angle of every cos and sin
+    node, `roots` every square root.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -25,22 +25,33 @@ class GraphAlgebra:
         self.sections: list[tuple[int, str]] = []
         self.angles: dict[int, tuple[Turn, Expression]] = {}
         self.roots: dict[int, Expression] = {}
-        self._labels: dict[str, tuple[Turn, Expression]] = {}
+        self.labels: dict[str, tuple[Turn, Expression]] = {}
 
     def section(self, title: str) -> None:
         self.sections.append((len(self.graph.nodes), title))
 
     def constant(self, e: Expression) -> Scalar:
-        return e.evaluate(lambda name: self.graph.symbol(name, fixed=True), self._call, self._number)
+        return e.evaluate(self._constant, self._call, self.graph.number)
 
-    def _number(self, c: Fraction) -> Scalar:
-        return self.graph.number(c)
+    def _constant(self, name: str) -> Scalar:
+        return self.graph.symbol(Symbol("pi" if name == "pi" else "constant", name), fixed=True)
+
+    def parameter(self, name: str) -> Scalar:
+        """A standard or base parameter."""
+        return self.graph.symbol(Symbol("parameter", name), fixed=True)
+
+    def gravity(self, axis: int) -> Scalar:
+        symbol = Symbol("gravity", str(axis))
+        return self.graph.symbol(symbol, fixed=True) if self.robot.gravity[axis] else 0
 
     def _call(self, function: str, argument: Expression) -> Scalar:
         x = self.graph.lift(self.constant(argument))
         if function in ("cos", "sin"):
             value = self.graph.cos(x) if function == "cos" else self.graph.sin(x)
-            self.angles[value.node.index] = ((), argument if value.sign > 0 or function == "cos" else -argument)
+            self.angles[value.node.index] = (
+                (),
+                argument if value.sign > 0 or function == "cos" else -argument,
+            )
             return value
         if function == "inv":
             return self.graph.inverse(x)
@@ -57,17 +68,19 @@ class GraphAlgebra:
             turn, rest = tuple((j, -n) for j, n in turn), -rest
         angle: Scalar = 0
         for j, n in turn:
-            term = self.graph.symbol(f"q{j}")
+            term = self.graph.symbol(Symbol("q", f"q{j}"))
             angle = angle + (term if n == 1 else -term if n == -1 else term * self.graph.lift(n))
         angle = angle + self.constant(rest)
         label = self._label(turn)
-        while self._labels.setdefault(label, (turn, rest)) != (turn, rest):
+        while self.labels.setdefault(label, (turn, rest)) != (turn, rest):
             label += "b"  # the same joints with another constant
         self.graph.name(angle, "th" + label)
         c, s = self.graph.cos(angle), self.graph.sin(angle)
         for value, letter in ((c, "C"), (s, "S")):
-            backward = value.sign < 0  # the node is the sine of minus the angle: its sum begins with a joint that is subtracted
-            self.angles[value.node.index] = (tuple((j, -n) for j, n in turn), -rest) if backward else (turn, rest)
+            backward = value.sign < 0
+            self.angles[value.node.index] = (
+                (tuple((j, -n) for j, n in turn), -rest) if backward else (turn, rest)
+            )
             self.graph.name(value, letter + label)
         if not forward:
             s = -s
@@ -82,16 +95,16 @@ class GraphAlgebra:
         return text
 
     def q(self, j: int) -> Scalar:
-        return self.graph.symbol(f"q{j}")
+        return self.graph.symbol(Symbol("q", f"q{j}"))
 
     def qd(self, j: int) -> Scalar:
-        return self.graph.symbol(f"QP{j}")
+        return self.graph.symbol(Symbol("qd", f"QP{j}"))
 
     def qdd(self, j: int) -> Scalar:
-        return self.graph.symbol(f"QDP{j}")
+        return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
     def rate(self, u: int, i: int) -> Scalar:
-        return self.graph.symbol(self.named("G", u, i))
+        return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
         return self.graph.sign(rate)

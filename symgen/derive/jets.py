@@ -1,6 +1,8 @@
-"""Values with their time derivatives, over any algebra: x, xd, xdd along a motion with constant joint rates.
+"""Values with their time derivatives, over any algebra: x, xd, xdd along a motion with constant
+joint rates.
 
-A recursion that gives a residual r(q) over an algebra gives r, J qd and Jd qd over its jets: the Jacobian column of joint k is the
+A recursion that gives a residual r(q) over an algebra gives r, J qd and Jd qd over its jets: the
+Jacobian column of joint k is the
 derivative along the unit rate of joint k, and Jd qd the second derivative along qd.
 """
 
@@ -52,7 +54,7 @@ def jet(value: Scalar) -> Jet:
 
 
 class JetAlgebra:
-    """The algebra `inner` along the joint rates `rate` (missing joints stand still)."""
+    """Positions over the algebra `inner` along the joint rates `rate`; other joints stand still."""
 
     def __init__(self, inner: Algebra, rate: Mapping[int, Scalar]) -> None:
         self.inner, self._rate = inner, rate
@@ -74,27 +76,9 @@ class JetAlgebra:
     def q(self, j: int) -> Jet:
         return Jet(self.inner.q(j), self._rate.get(j, 0))
 
-    def qd(self, j: int) -> Scalar:
-        return self.inner.qd(j)
-
-    def qdd(self, j: int) -> Scalar:
-        return self.inner.qdd(j)
-
-    def rate(self, u: int, i: int) -> Scalar:
-        return self.inner.rate(u, i)
-
-    def sign(self, rate: Scalar, row: Any) -> Scalar:
-        return self.inner.sign(rate, row)
-
-    def one_sided(self, rate: Scalar, row: Any, when: str) -> tuple[Scalar, Scalar]:
-        return self.inner.one_sided(rate, row, when)
-
     def name(self, value: Scalar, name: str) -> Scalar:
         if isinstance(value, Jet):
             self.inner.name(value.x, name)
-        return value
-
-    def hint(self, value: Scalar, name: str) -> Scalar:
         return value
 
     def section(self, title: str) -> None:

@@ -1,32 +1,44 @@
-"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with the Newton-Euler recursions.
+"""Dynamics from energies, differentiated by CasADi: an independent oracle that shares nothing with
+the Newton-Euler recursions.
 
-With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about the origin of its frame,
+With T_j(q) the pose of frame j in frame 0 (4 x 4) and Sigma_j the pseudo-inertia of link j about
+the origin of its frame,
 
-    E = sum_j 1/2 tr(Tdot_j Sigma_j Tdot_j')       Sigma = | tr(J)/2 E3 - J   MS |       J  = [XX XY XZ; XY YY YZ; XZ YZ ZZ]
-    U = - sum_j (g', 0) T_j Sigma_j e4                     |      MS'          M |       MS = [MX MY MZ]'
+    E = sum_j 1/2 tr(Tdot_j Sigma_j Tdot_j')      U = - sum_j (g', 0) T_j Sigma_j e4
 
-both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrange's equations are [U65]
+    Sigma = | tr(J)/2 E3 - J   MS |      J  = [XX XY XZ; XY YY YZ; XZ YZ ZZ]
+            |      MS'          M |      MS = [MX MY MZ]'
 
-    Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0) dT_j/dq_i Sigma_j e4 ,
+both linear in the standard parameters chi. Since dTdot/dqd_i = dT/dq_i, Lagrange's equations are
+[U65]
 
-dT/dq and Tddot by CasADi. Elements with parameter c along s = G q, or of form B (G'G where they act along s), add
+    Gamma_i = d/dt dE/dqd_i - dE/dq_i + dU/dq_i = sum_j tr(dT_j/dq_i Sigma_j Tddot_j') - (g', 0)
+    dT_j/dq_i Sigma_j e4 ,
 
-    c B qdd (inertia),  c G' (offset),  c B q (stiffness),  c B qd (viscous),  c G' sign(sd) (coulomb)
+dT/dq and Tddot by CasADi. Elements with parameter c along s = G q, or of form B (G'G where they act
+along s), add
 
-with `when: positive` where sd > 0 only, negative where sd < 0. Coordinates are all joints that move, the cut and passive ones included (the
-open tree). A mechanism with loops is the tree restricted to q = f(qa), where phi(q) = 0 closes the loops:
+    c B qdd (inertia),  c G' (offset),  c B q (stiffness),  c B qd (viscous),  c G' sign(sd)
+    (coulomb)
+
+with `when: positive` where sd > 0 only, negative where sd < 0. Coordinates are all joints that
+move, the cut and passive ones included (the
+open tree). A mechanism with loops is the tree restricted to q = f(qa), where phi(q) = 0 closes the
+loops:
 
     Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
 
 The certificates and the tests import this module; nothing else does.
 
-[U65] J. J. Uicker, On the dynamic analysis of spatial linkages using 4 x 4 matrices, Northwestern University, 1965.
+[U65] J. J. Uicker, On the dynamic analysis of spatial linkages using 4 x 4 matrices, Northwestern
+University, 1965.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -38,17 +50,28 @@ from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Fra
 from symgen.errors import DescriptionError
 
 Array = np.ndarray[Any, Any]
-NEWTON_STEPS, NEWTON_STEP, CLOSED = 50, 0.5, 1e-11  # iterations, rad or m per iteration, defect of a closed loop
+NEWTON_STEPS, NEWTON_STEP, CLOSED = (
+    50,
+    0.5,
+    1e-11,
+)  # iterations, rad or m per iteration, defect of a closed loop
 SETTLED = 1e-15  # rad or m: further iterations change nothing
 ON_THE_WAY, FOLLOWED = 1e-6, 8  # the same on the way from `start`, and places on that way
-REGULAR = 0.05  # of the smallest singular value of the closure at `start`, over its largest: less is near a dead point
+# of the smallest singular value of the closure at `start`, over its largest: less is near a dead
+# point
+REGULAR = 0.05
 DRAWS = 20  # attempts to find states in which the loops close
 SX = Any  # casadi.SX
 
 
-def pose(frame: Frame, q: SX, constants: Mapping[str, float]) -> SX:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i = ant(j); 4 x 4."""
-    gamma, b, alpha, d, theta, r = (e.value(constants) for e in (frame.gamma, frame.b, frame.alpha, frame.d, frame.theta0, frame.r0))
+def pose(frame: Frame, q: SX, constants: Mapping[str, SX]) -> SX:
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), i =
+    ant(j); 4 x 4.
+    """
+    gamma, b, alpha, d, theta, r = (
+        _symbolic(e, {}, constants)
+        for e in (frame.gamma, frame.b, frame.alpha, frame.d, frame.theta0, frame.r0)
+    )
     theta = theta + q if frame.sigma == REVOLUTE else theta
     r = r + q if frame.sigma == PRISMATIC else r
     return _screw(2, gamma, b) @ _screw(0, alpha, d) @ _screw(2, theta, r)
@@ -63,7 +86,7 @@ def _screw(axis: int, angle: SX, shift: SX) -> SX:
     return T
 
 
-def poses(robot: Robot, q: Mapping[int, SX], constants: Mapping[str, float]) -> dict[int, SX]:
+def poses(robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX]) -> dict[int, SX]:
     """0Tj of every frame, by frame number; q by joint number."""
     T = {0: ca.SX.eye(4)}
     for f in robot.frames:
@@ -91,9 +114,14 @@ LINK = np.array([pseudo_inertia(name) for name in INERTIAL])  # (10, 4, 4)
 
 
 def _floats(function: Any, *arguments: Array) -> Array:
-    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows, columns)."""
+    """A CasADi function of column vectors on samples: arguments (..., m_k), result (..., rows,
+    columns).
+    """
     shape = np.broadcast_shapes(*(np.shape(a)[:-1] for a in arguments))
-    columns = [np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T for a in arguments]
+    columns = [
+        np.broadcast_to(a, (*shape, np.shape(a)[-1])).reshape(-1, np.shape(a)[-1]).T
+        for a in arguments
+    ]
     N = columns[0].shape[1]
     rows, width = function.size_out(0)
     out = np.zeros((N, width, rows))  # column-major, as CasADi writes it
@@ -113,45 +141,41 @@ def _matrices(columns: Array) -> Array:
 
 
 class Lagrange:
-    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`), geometry in floats.
+    """Dynamics of the open tree of a robot in all its moving joints (order `robot.moving`),
+    geometry in floats.
 
-    Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same leading axes. chi is (p,) in the order
+    Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same
+    leading axes. chi is (p,) in the order
     of `robot.parameters`, or (..., p).
     """
 
     def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
         self.robot, self.names = robot, robot.parameters
         self.constants = {**robot.constants, **(constants or {})}
-        n = len(robot.moving)
-        q, qd, qdd = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n)
-        T = poses(robot, {j: q[k] for k, j in enumerate(robot.moving)}, self.constants)
-        t = ca.vertcat(*(ca.vec(T[f.j]) for f in robot.frames))
-        rate = ca.jtimes(t, q, qd)
-        self._poses = ca.Function("poses", [q], [ca.densify(t)])
-        self._slopes = ca.Function("slopes", [q], [ca.densify(ca.jacobian(t, q))])
-        self._accelerations = ca.Function(
-            "accelerations", [q, qd, qdd], [ca.densify(ca.jtimes(rate, ca.vertcat(q, qd), ca.vertcat(qd, qdd)))]
-        )
-        phi = _closure(robot, T, q, self.constants)
-        self._loop = ca.Function("loop", [q], [phi])
-        self._loop_jacobian = ca.Function("loop_jacobian", [q], [ca.densify(ca.jacobian(phi, q))])
-        self._loop_rate = ca.Function("loop_rate", [q, qd], [ca.densify(ca.jtimes(ca.jtimes(phi, q, qd), q, qd))])
-        self._start = _start(robot, q, self.constants)
+        self._functions, self._values = _functions(robot), np.array([*self.constants.values(), 1.0])
         start = {j: x for loop in robot.loops for j, x in loop.start.items()}
-        self._home = np.array([start[j] for j in robot.moving]) if set(robot.moving) <= set(start) else None
+        self._home = (
+            np.array([start[j] for j in robot.moving]) if set(robot.moving) <= set(start) else None
+        )
+
+    def _floats(self, name: str, *arguments: Array) -> Array:
+        return _floats(self._functions[name], *arguments, self._values)
 
     def poses(self, q: Array) -> Array:
         """0Tj of every frame in file order, (..., frames, 4, 4)."""
-        return _matrices(_floats(self._poses, q))[..., 0, :, :, :]
+        return _matrices(self._floats("poses", q))[..., 0, :, :, :]
 
     def slopes(self, q: Array) -> Array:
         """d0Tj/dq_i, (..., n, frames, 4, 4)."""
-        return _matrices(_floats(self._slopes, q))
+        return _matrices(self._floats("slopes", q))
 
     def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
         """D with Gamma = D chi, (..., n, p)."""
         robot = self.robot
-        dT, ddT = self.slopes(q), _matrices(_floats(self._accelerations, q, qd, qdd))[..., 0, :, :, :]
+        dT, ddT = (
+            self.slopes(q),
+            _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, :, :, :],
+        )
         g = np.array([e.value(self.constants) for e in robot.gravity] + [0.0])
         column = {name: k for k, name in enumerate(self.names)}
         D = np.zeros((*dT.shape[:-3], len(self.names)))
@@ -159,7 +183,9 @@ class Lagrange:
             slope, first = dT[..., j - 1, :, :], column[parameter(INERTIAL[0], j)]
             inertia = np.einsum("...iab,...ac->...ibc", slope, ddT[..., j - 1, :, :])
             D[..., first : first + len(INERTIAL)] = np.einsum("...ibc,sbc->...is", inertia, LINK)
-            D[..., first : first + len(INERTIAL)] -= np.einsum("a,...iab,sb->...is", g, slope, LINK[:, :, 3])
+            D[..., first : first + len(INERTIAL)] -= np.einsum(
+                "a,...iab,sb->...is", g, slope, LINK[:, :, 3]
+            )
         for e in robot.elements:
             for j in e.keys:
                 D[..., column[parameter(e.family, j)]] = self._element(e, j, q, qd, qdd)
@@ -200,34 +226,85 @@ class Lagrange:
         return self.torque(q, 0 * q, 0 * q, chi)
 
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n): sum_j trace(d0Tj/dq_i Sigma_j d0Tj'/dq_l), and the inertias along rows of elements."""
+        """A = d2E/dqd2, (..., n, n): sum_j trace(d0Tj/dq_i Sigma_j d0Tj'/dq_l), and the inertias
+        along rows of elements.
+        """
         slope, robot, n = self.slopes(q), self.robot, np.shape(q)[-1]
         value = {name: np.asarray(chi)[..., k] for k, name in enumerate(self.names)}
         A = np.zeros((*np.shape(q), n))
         for j in robot.links:
-            Sigma = sum(value[parameter(name, j)][..., None, None] * unit for name, unit in zip(INERTIAL, LINK, strict=True))
-            A += np.einsum("...iab,...bc,...lac->...il", slope[..., j - 1, :, :], Sigma, slope[..., j - 1, :, :])
+            Sigma = sum(
+                value[parameter(name, j)][..., None, None] * unit
+                for name, unit in zip(INERTIAL, LINK, strict=True)
+            )
+            A += np.einsum(
+                "...iab,...bc,...lac->...il",
+                slope[..., j - 1, :, :],
+                Sigma,
+                slope[..., j - 1, :, :],
+            )
         for e in robot.elements:
             for j in e.keys if e.kind == "inertia" else ():
                 A += value[parameter(e.family, j)][..., None, None] * self._form(e, j)
         return A
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
-        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame` (default: the last) in frame 0 per qd, (..., 6, n)."""
+        """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame`
+        (default: the last) in frame 0 per qd, (..., 6, n).
+        """
         j = frame or self.robot.frames[-1].j
         slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
         W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
-        return np.swapaxes(np.concatenate([slope[..., 3], np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)], axis=-1), -1, -2)
+        return np.swapaxes(
+            np.concatenate(
+                [slope[..., 3], np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)],
+                axis=-1,
+            ),
+            -1,
+            -2,
+        )
+
+    def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
+        """Acceleration of the origin of `frame`, then angular acceleration wd from hat(wd) =
+        Rddot R' + Rdot Rdot', in frame 0, (..., 6).
+        """
+        if frame == 0:
+            return np.zeros((*np.shape(q)[:-1], 6))
+        R = self.poses(q)[..., frame - 1, :3, :3]
+        rate = np.einsum("...iab,...i->...ab", self.slopes(q)[..., frame - 1, :3, :3], qd)
+        second = _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, frame - 1, :3, :]
+        W = second[..., :3] @ np.swapaxes(R, -1, -2) + rate @ np.swapaxes(rate, -1, -2)
+        angular = np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
+        return np.concatenate([second[..., 3], angular], axis=-1)
+
+    def potential_energy(self, q: Array, chi: Array) -> Array:
+        """U of gravity, springs and offsets, (...)."""
+        value, T = dict(zip(self.names, chi, strict=True)), self.poses(q)
+        g = np.array([e.value(self.constants) for e in self.robot.gravity] + [0.0])
+        U = np.zeros(np.shape(q)[:-1])
+        for j in self.robot.links:
+            first = np.array([value[parameter(name, j)] for name in ("MX", "MY", "MZ", "M")])
+            U -= T[..., j - 1, :, :] @ first @ g
+        for e in self.robot.elements:
+            for j in e.keys:
+                if e.kind == "offset":
+                    U += value[parameter(e.family, j)] * (q @ self._row(e, j))
+                elif e.kind == "stiffness":
+                    Bq = q @ self._form(e, j) * q / 2
+                    U += value[parameter(e.family, j)] * Bq.sum(axis=-1)
+        return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
-        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd (..., n_a).
+        """Tree motion q, qd, qdd (..., n) and G = dq/dqa (..., n, n_a) of the actuated q, qd, qdd
+        (..., n_a).
 
-        Loops are closed by Newton's method from the constraints, or followed from a `start` of all joints; a state that it cannot close, or reach
+        Loops are closed by Newton's method from the constraints, or followed from a `start` of all
+        joints; a state that it cannot close, or reach
         without passing near a dead point, is NaN.
         """
         actuated = [self.robot.moving.index(j) for j in self.robot.joints]
         passive = [self.robot.moving.index(j) for j in self.robot.passive]
-        x = _floats(self._start, q)[..., 0]
+        x = self._floats("start", q)[..., 0]
         G = np.zeros((*x.shape, len(actuated)))
         G[..., actuated, :] = np.eye(len(actuated))
         if not passive:
@@ -237,24 +314,32 @@ class Lagrange:
         for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
             x[..., actuated] = first + share * (wanted - first)
             for _ in range(NEWTON_STEPS):
-                step = np.linalg.pinv(_floats(self._loop_jacobian, x)[..., passive]) @ _floats(self._loop, x)
+                step = np.linalg.pinv(
+                    self._floats("loop_jacobian", x)[..., passive]
+                ) @ self._floats("loop", x)
                 x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
                 if np.abs(step[regular]).max(initial=0.0) < (SETTLED if share == 1 else ON_THE_WAY):
                     break
             if self._home is not None:
-                regular &= self._regularity(x, passive) > REGULAR * self._regularity(self._home, passive)
-        J = _floats(self._loop_jacobian, x)
+                regular &= self._regularity(x, passive) > REGULAR * self._regularity(
+                    self._home, passive
+                )
+        J = self._floats("loop_jacobian", x)
         inverse = np.linalg.pinv(J[..., passive])
         G[..., passive, :] = -inverse @ J[..., actuated]
         xd = (G @ np.asarray(qd)[..., None])[..., 0]
         xdd = (G @ np.asarray(qdd)[..., None])[..., 0]
-        xdd[..., passive] -= (inverse @ _floats(self._loop_rate, x, xd))[..., 0]  # Jp qddp + Ja qdda + Jdot qd = 0
-        x[(np.abs(_floats(self._loop, x)).max(axis=(-2, -1)) > CLOSED) | ~regular] = np.nan
+        xdd[..., passive] -= (inverse @ self._floats("loop_rate", x, xd))[
+            ..., 0
+        ]  # Jp qddp + Ja qdda + Jdot qd = 0
+        x[(np.abs(self._floats("loop", x)).max(axis=(-2, -1)) > CLOSED) | ~regular] = np.nan
         return x, xd, xdd, G
 
     def _regularity(self, x: Array, passive: list[int]) -> Array:
-        """Smallest over largest singular value of the closure's derivatives by the passive joints."""
-        s = np.linalg.svd(_floats(self._loop_jacobian, x)[..., passive], compute_uv=False)
+        """Smallest over largest singular value of the closure's derivatives by the passive
+        joints.
+        """
+        s = np.linalg.svd(self._floats("loop_jacobian", x)[..., passive], compute_uv=False)
         return np.asarray(s[..., -1] / s[..., 0])
 
     def actuated_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
@@ -268,8 +353,39 @@ class Lagrange:
         return np.asarray(np.swapaxes(G, -1, -2) @ self.inertia_matrix(x, chi) @ G)
 
 
-def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, float]) -> SX:
-    """phi(q), zero where every twin coincides with its cut frame and every constrained joint has its value."""
+@lru_cache(maxsize=8)
+def _functions(robot: Robot) -> dict[str, Any]:
+    """The functions of q, qd, qdd of all moving joints, then of the constants and a number more."""
+    n, symbols = len(robot.moving), ca.SX.sym("c", len(robot.constants) + 1)
+    constants = dict(zip(robot.constants, ca.vertsplit(symbols), strict=False))
+    q, qd, qdd = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("qdd", n)
+    T = poses(robot, {j: q[k] for k, j in enumerate(robot.moving)}, constants)
+    t = ca.vertcat(*(ca.vec(T[f.j]) for f in robot.frames))
+    rate = ca.jtimes(t, q, qd)
+    phi = _closure(robot, T, q, constants)
+    actuated, start = _start(robot, q, constants)
+    outputs = {
+        "poses": ([q], t),
+        "slopes": ([q], ca.jacobian(t, q)),
+        "accelerations": (
+            [q, qd, qdd],
+            ca.jtimes(rate, ca.vertcat(q, qd), ca.vertcat(qd, qdd)),
+        ),
+        "loop": ([q], phi),
+        "loop_jacobian": ([q], ca.jacobian(phi, q)),
+        "loop_rate": ([q, qd], ca.jtimes(ca.jtimes(phi, q, qd), q, qd)),
+        "start": ([actuated], start),
+    }
+    return {
+        name: ca.Function(name, [*inputs, symbols], [ca.densify(value)])
+        for name, (inputs, value) in outputs.items()
+    }
+
+
+def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, SX]) -> SX:
+    """phi(q), zero where every twin coincides with its cut frame and every constrained joint has
+    its value.
+    """
     phi = []
     for loop in robot.loops:
         cut, twin = T[loop.cut], T[loop.twin]
@@ -279,18 +395,25 @@ def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, f
     return ca.densify(ca.vertcat(*phi)) if phi else ca.SX.zeros(0)
 
 
-def _start(robot: Robot, q: SX, constants: Mapping[str, float]) -> Any:
-    """Function from the actuated joints to all: passive ones from their constraint, else from `start` of their loop, else 0."""
+def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
+    """The actuated joints, and all from them: passive ones from their constraint, else from `start`
+    of their loop, else 0.
+    """
     names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
     guess = {j: x for loop in robot.loops for j, x in loop.start.items()}
     x = [names[f"q{j}"] if j in robot.joints else ca.SX(guess.get(j, 0.0)) for j in robot.moving]
     for _ in robot.constraints:  # a constraint may name joints that have one themselves
         now = dict(zip(names, x, strict=True))
-        x = [_symbolic(robot.constraints[j], now, constants) if j in robot.constraints else now[f"q{j}"] for j in robot.moving]
-    return ca.Function("start", [ca.vertcat(*(names[f"q{j}"] for j in robot.joints))], [ca.densify(ca.vertcat(*x))])
+        x = [
+            _symbolic(robot.constraints[j], now, constants)
+            if j in robot.constraints
+            else now[f"q{j}"]
+            for j in robot.moving
+        ]
+    return ca.vertcat(*(names[f"q{j}"] for j in robot.joints)), ca.vertcat(*x)
 
 
-def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, float]) -> SX:
+def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -> SX:
     values = {"pi": np.pi, **constants, **q}
 
     def function(name: str, argument: Expression) -> SX:
@@ -327,28 +450,50 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Largest coefficient of each actuated joint among the rows of elements that several joints share, at least 1; shape (n,)."""
+    """Largest coefficient of each actuated joint among the rows of elements that several joints
+    share, at least 1; shape (n,).
+    """
     shared = [row for e in robot.elements for row in e.along.values() if len(row) > 1]
-    return np.array([max([1.0, *(abs(row[j].value(constants)) for row in shared if j in row)]) for j in robot.joints])
+    return np.array(
+        [
+            max([1.0, *(abs(row[j].value(constants)) for row in shared if j in row)])
+            for j in robot.joints
+        ]
+    )
 
 
-def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None) -> Sample:
-    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops within 0.5 of their start.
+def sampled(
+    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
+) -> Sample:
+    """The standard regressor at `states` random states: q within pi rad or 1 m, general loops
+    within 0.5 of their start.
 
-    Velocities and accelerations are standard normal; in every other state each velocity is divided by its leverage, so that the sign of
-    q4 + 101.25 q5 is not that of q5 alone. Raises DescriptionError where the loops close in too few of the states.
+    Velocities and accelerations are standard normal; in every other state each velocity is divided
+    by its leverage, so that the sign of
+    q4 + 101.25 q5 is not that of q5 alone. Raises DescriptionError where the loops close in too few
+    of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
-    longest = max([abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0)
+    longest = max(
+        [abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0
+    )
     slide = 1.0 if free else min(0.5, longest / 4)
-    reach = np.array([(np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide for j in robot.joints])
+    reach = np.array(
+        [
+            (np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide
+            for j in robot.joints
+        ]
+    )
     centre = np.array([start.get(j, 0.0) for j in robot.joints])
     n, leverage = len(robot.joints), _leverage(robot, model.constants)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):
-        q, qd, qdd = centre + reach * rng.uniform(-1, 1, (states, n)), *rng.standard_normal((2, states, n))
+        q, qd, qdd = (
+            centre + reach * rng.uniform(-1, 1, (states, n)),
+            *rng.standard_normal((2, states, n)),
+        )
         qd[::2] /= leverage
         block = model.actuated_regressor(q, qd, qdd)
         closed = np.isfinite(block).all(axis=(1, 2))
@@ -358,28 +503,33 @@ def sampled(robot: Robot, states: int, seed: int = 0, constants: Mapping[str, fl
             return Sample(model, state[0], state[1], state[2], D)
     if not robot.passive:
         raise DescriptionError(
-            f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; check their values", path=("constants",)
+            (
+                f"{robot.name}: torques are not finite for the constants {dict(robot.constants)}; "
+                "check their values"
+            ),
+            path=("constants",),
         )
     raise DescriptionError(
-        f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near their start; give each loop a `start` that closes it",
+        (
+            f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near "
+            "their "
+            "start; give each loop a `start` that closes it"
+        ),
         path=("loops",),
     )
 
 
-def numeric_regressor(
-    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
-) -> tuple[Array, tuple[str, ...]]:
-    """W of `states` random states as `sampled` draws them, shape (n*states, p), rows joint-major, and the names of its columns."""
-    return sampled(robot, states, seed, constants).W, robot.parameters
-
-
 def in_one_mode(robot: Robot) -> Robot:
-    """`robot` with its passive joints declared where they are linear in the actuated ones: no state lies in an antiparallelogram.
+    """`robot` with its passive joints declared where they are linear in the actuated ones: no state
+    lies in an antiparallelogram.
 
-    The dynamics by energies still closes every loop itself and refuses states in which the declared joints do not close it.
+    The dynamics by energies still closes every loop itself and refuses states in which the declared
+    joints do not close it.
     """
     closure = close(robot)
     if closure.tied:
-        return replace(robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops))
-    declared = {j: sum((g * Expression.symbol(f"q{i}") for i, g in closure.row[j].items()), closure.offset[j]) for j in robot.passive}
+        return replace(
+            robot, loops=tuple(replace(loop, start=dict(closure.start)) for loop in robot.loops)
+        )
+    declared = {j: closure.formula(j) for j in robot.passive}
     return replace(robot, constraints=declared)

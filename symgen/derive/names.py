@@ -1,7 +1,9 @@
 """Families of named quantities, and how their indices are written.
 
-Order of indices: component digits, link, then the joint it belongs to: W12 is component 1 of link 2, U312 row 3 column 1 of
-link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than nine frames indices are separated: W1_12.
+Order of indices: component digits, link, then the joint it belongs to: W12 is component 1 of link
+2, U312 row 3 column 1 of
+link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than nine frames indices are
+separated: W1_12.
 """
 
 from __future__ import annotations
@@ -60,10 +62,15 @@ class Names:
         return family + self.separator.join(str(i) for i in indices)
 
 
-MEMBER = re.compile(rf"({'|'.join(sorted(FAMILIES, key=len, reverse=True))})(?:\d[\d_mxb]*|(?<=QP)[A-Za-z]+\d+)\Z")
+FAMILY = "|".join(sorted(FAMILIES, key=len, reverse=True))
+MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_mxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za-z]+\d+)[a-z]*_*\Z")
+"""W12, C23, Z132, QPFSM6, DG1ZZ2, a part N16a of N16, and C1_ where C1 is the user's."""
 
 
 def families_of(names: Iterable[str]) -> tuple[str, ...]:
-    """The families that `names` belong to, in the order of FAMILIES; products and sums of names belong to none."""
-    occurring = {match[1] for name in names if (match := MEMBER.match(name))}
+    """The families that `names` belong to, in the order of FAMILIES; products and sums of names
+    belong to none.
+    """
+    matches = filter(None, map(MEMBER.match, names))
+    occurring = {match[1] or match[2] for match in matches}
     return tuple(family for family in FAMILIES if family in occurring)

@@ -2,24 +2,43 @@
 
 Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew(wd) + skew(w)**2:
 
-    w_j  = iRj' w_i  + qd_j e3                          wd_j = iRj' wd_i + qdd_j e3 + (iRj' w_i) x (qd_j e3)      revolute
-    a_j  = iRj' (a_i + U_i P_ij)  [+ 2 w_j x (qd_j e3) + qdd_j e3   prismatic],        a_0 = -gravity
+    w_j  = iRj' w_i  + qd_j e3
+            wd_j = iRj' wd_i + qdd_j e3 + (iRj' w_i) x (qd_j e3)      revolute
+    a_j  = iRj' (a_i + U_i P_ij)  [+ 2 w_j x (qd_j e3) + qdd_j e3   prismatic],
+            a_0 = -gravity
     F_j  = M_j a_j + U_j MS_j ,     N_j = J_j wd_j + w_j x (J_j w_j) + MS_j x a_j
-    f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k) ,   k over the frames carried by j
+    f_j  = F_j + sum_k jRk f_k ,    n_j = N_j + sum_k (jRk n_k + P_jk x jRk f_k) ,
+            k over the frames carried by j
 
-N_j is written in product form (see `moment`): with base parameters YY = MZ = M = 0, which is where the saving is.
+N_j is written in product form (see `moment`): with base parameters YY = MZ = M = 0, which is where
+the saving is.
 
-W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9.
+W. Khalil, J.-F. Kleinfinger, ICRA 1986; Khalil and Dombre, Modeling, Identification and Control of
+Robots, 2002, ch. 9.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from symgen.derive.geometry import Geometry
 from symgen.derive.names import Names
-from symgen.derive.scalar import ZERO3, Matrix, Scalar, Vector, add, apply, cross, dot, is_zero, mul, scale, sub, vadd
+from symgen.derive.scalar import (
+    ZERO3,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    is_zero,
+    mul,
+    scale,
+    sub,
+    vadd,
+)
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, parameter
 
@@ -57,44 +76,34 @@ REST = LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, ZERO3)
 
 
 class Motion:
-    """Outward recursion: q, qd, qdd of the actuated joints move the whole tree.
+    """Outward recursion: q, qd, qdd of the actuated joints and gravity move the whole tree.
 
     Parameters
     ----------
     geometry : Geometry
         Rotations and positions of the frames.
-    gravity, velocity, acceleration : bool
-        Whether that part of the motion is there.
-    unit : int or None
-        Actuated joint that alone accelerates, from rest, with qdd = 1 and without gravity: its torques are a column of the inertia matrix. The
-        steps are then named with this joint as last index.
+    tag : tuple of int
+        Last indices of the names of the steps.
     """
 
-    def __init__(
-        self, geometry: Geometry, *, gravity: bool = True, velocity: bool = True, acceleration: bool = True, unit: int | None = None
-    ) -> None:
+    def __init__(self, geometry: Geometry, *, tag: tuple[int, ...] = ()) -> None:
         self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
-        self.named = Names(len(self.robot.frames))
-        self.gravity = gravity and unit is None
-        self.tag: tuple[int, ...] = () if unit is None else (unit,)
-        closure = geometry.closure
-        self._qd = {i: self.algebra.qd(i) if velocity and unit is None else 0 for i in closure.independent}
-        self._qdd = {i: self._acceleration(i, acceleration, velocity, unit) for i in closure.independent}
-        g = tuple(self.algebra.constant(-e) for e in self.robot.gravity) if self.gravity else ZERO3
-        self.link: dict[int, LinkMotion] = {0: REST if is_zero(g) else LinkMotion(ZERO3, ZERO3, ZERO33, ZERO3, ZERO33, g)}
+        self.named, self.tag = Names(len(self.robot.frames)), tag
+        independent = geometry.closure.independent
+        self._qd = {i: self.algebra.qd(i) for i in independent}
+        self._qdd = {i: self.algebra.qdd(i) for i in independent}
+        self.link: dict[int, LinkMotion] = {0: self._base()}
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)
 
-    def _acceleration(self, i: int, acceleration: bool, velocity: bool, unit: int | None) -> Scalar:
-        """qdd_i of an independent joint; a tied one accelerates with the others, and from velocities alone."""
-        tied = i in self.geometry.closure.tied
-        if unit is not None:
-            return self.algebra.rate(i, unit) if tied else int(i == unit)
-        return self.algebra.qdd(i) if acceleration or (tied and velocity) else 0
+    def _base(self) -> LinkMotion:
+        """The base, which is at rest and accelerates against gravity."""
+        x, y, z = (self.algebra.gravity(axis) for axis in range(3))
+        return REST if is_zero((x, y, z)) else replace(REST, a=(x, y, z))
 
     def q(self, j: int) -> Scalar:
-        """Position of any moving joint; 0 where gravity, and so every force at rest, is left out."""
-        return self.geometry.position(j) if self.gravity else 0
+        """Position of any moving joint."""
+        return self.geometry.position(j)
 
     def qd(self, j: int) -> Scalar:
         """Velocity of any moving joint."""
@@ -106,12 +115,18 @@ class Motion:
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
         """The same vector, its components named family + component + indices."""
-        x, y, z = (self.algebra.name(v, self.named(family, k, *indices, *self.tag)) for k, v in enumerate(value, start=1))
+        x, y, z = (
+            self.algebra.name(v, self.named(family, k, *indices, *self.tag))
+            for k, v in enumerate(value, start=1)
+        )
         return x, y, z
 
     def hinted(self, family: str, value: Vector, *indices: int) -> Vector:
         """The same vector, its components to be named so if they are used more than once."""
-        x, y, z = (self.algebra.hint(v, self.named(family, k, *indices, *self.tag)) for k, v in enumerate(value, start=1))
+        x, y, z = (
+            self.algebra.hint(v, self.named(family, k, *indices, *self.tag))
+            for k, v in enumerate(value, start=1)
+        )
         return x, y, z
 
     def _link(self, j: int) -> LinkMotion:
@@ -123,13 +138,25 @@ class Motion:
         acceleration: Scalar = 0
         for k, multiple in carrier.turn:
             n = self.algebra.constant(Expression.number(multiple))
-            rate, acceleration = add(rate, mul(n, self._qd[k])), add(acceleration, mul(n, self._qdd[k]))
+            rate, acceleration = (
+                add(rate, mul(n, self._qd[k])),
+                add(acceleration, mul(n, self._qdd[k])),
+            )
         slides = (self.qd(j), self.qdd(j)) if f.sigma == PRISMATIC else (0, 0)
-        if inner is REST and i is REST and is_zero((rate, acceleration, 0)) and is_zero((*slides, 0)):
+        if (
+            inner is REST
+            and i is REST
+            and is_zero((rate, acceleration, 0))
+            and is_zero((*slides, 0))
+        ):
             return REST
         w0, wd0 = geometry.from_carrier(j, inner.w), geometry.from_carrier(j, inner.wd)
         w = self.vector("W", (w0[0], w0[1], add(w0[2], rate)), j)
-        wd = self.vector("WP", (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)), j)
+        wd = self.vector(
+            "WP",
+            (add(wd0[0], mul(w[1], rate)), sub(wd0[1], mul(w[0], rate)), add(wd0[2], acceleration)),
+            j,
+        )
         DV, DW, U = self._products(w, wd, j)
         P = geometry.P[j]
         VSP = self.vector("VSP", vadd(i.a, apply(i.U, P)), j)
@@ -141,17 +168,40 @@ class Motion:
 
     def _products(self, w: Vector, wd: Vector, j: int) -> tuple[Matrix, Vector, Matrix]:
         name, named = self.algebra.name, self.named
-        D = {(k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j, *self.tag)) for k in range(3) for m in range(k, 3)}
-        DV: Matrix = tuple(tuple(D[min(k, m), max(k, m)] for m in range(3)) for k in range(3))  # type: ignore[assignment]
-        DW = tuple(name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j, *self.tag)) for k, m in ((1, 2), (2, 0), (0, 1)))
+        D = {
+            (k, m): name(mul(w[k], w[m]), named("DV", k + 1, m + 1, j, *self.tag))
+            for k in range(3)
+            for m in range(k, 3)
+        }
+        DV: Matrix = (
+            (D[0, 0], D[0, 1], D[0, 2]),
+            (D[0, 1], D[1, 1], D[1, 2]),
+            (D[0, 2], D[1, 2], D[2, 2]),
+        )
+        DW = tuple(
+            name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j, *self.tag))
+            for k, m in ((1, 2), (2, 0), (0, 1))
+        )
 
         def off(k: int, m: int, value: Scalar) -> Scalar:
             return name(value, named("U", k, m, j, *self.tag))
 
         U: Matrix = (
-            (off(1, 1, -add(DV[1][1], DV[2][2])), off(1, 2, sub(DV[0][1], wd[2])), off(1, 3, add(DV[0][2], wd[1]))),
-            (off(2, 1, add(DV[0][1], wd[2])), off(2, 2, -add(DV[0][0], DV[2][2])), off(2, 3, sub(DV[1][2], wd[0]))),
-            (off(3, 1, sub(DV[0][2], wd[1])), off(3, 2, add(DV[1][2], wd[0])), off(3, 3, -add(DV[0][0], DV[1][1]))),
+            (
+                off(1, 1, -add(DV[1][1], DV[2][2])),
+                off(1, 2, sub(DV[0][1], wd[2])),
+                off(1, 3, add(DV[0][2], wd[1])),
+            ),
+            (
+                off(2, 1, add(DV[0][1], wd[2])),
+                off(2, 2, -add(DV[0][0], DV[2][2])),
+                off(2, 3, sub(DV[1][2], wd[0])),
+            ),
+            (
+                off(3, 1, sub(DV[0][2], wd[1])),
+                off(3, 2, add(DV[1][2], wd[0])),
+                off(3, 3, -add(DV[0][0], DV[1][1])),
+            ),
         )
         return DV, DW, U
 
@@ -164,7 +214,8 @@ def force(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
     """N = J wd + w x (J w) + MS x a, in product form.
 
-    N1 = XX wd1 + (ZZ - YY) w2 w3 + YZ (w2**2 - w3**2) + XZ U21 - XY U31 + (MS x a)1, and cyclically.
+    N1 = XX wd1 + (ZZ - YY) w2 w3 + YZ (w2**2 - w3**2) + XZ U21 - XY U31 + (MS x a)1, and
+    cyclically.
     """
     (XX, XY, XZ, YY, YZ, ZZ), MS = (K[p] for p in INERTIAL[:6]), (K["MX"], K["MY"], K["MZ"])
     DV, DW, U, wd = m.DV, m.DW, m.U, m.wd
@@ -177,7 +228,8 @@ def moment(m: LinkMotion, K: Mapping[str, Scalar]) -> Vector:
 
 
 def joint_torques(motion: Motion, K: Mapping[str, Scalar]) -> dict[int, Scalar]:
-    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the tree.
+    """Inward recursion: the part of Gamma_j that moves the links, for every moving joint of the
+    tree.
 
     K maps a standard parameter's name to its scalar; a parameter that is not in K counts as 0.
     """

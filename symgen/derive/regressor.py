@@ -1,10 +1,13 @@
-"""The regressor in axis form: Gamma_i = sum_k D_ik chi_k, column by column, without propagating a wrench.
+"""The regressor in axis form: Gamma_i = sum_k D_ik chi_k, column by column, without propagating a
+wrench.
 
-Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame j,
+Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame
+j,
 
     D_ik = z_ij . N_k + v_ij . F_k
 
-z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are carried outward:
+z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are
+carried outward:
 z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its direction.
 """
 
@@ -81,7 +84,13 @@ class Axes:
         entries: dict[int, Scalar] = {}
         for i in motion.robot.path(j):
             if motion.robot.frame(i).sigma != FIXED:
-                turning = motion.algebra.hint(dot(self.z[i, j], N), f"{motion.named('DN', i)}{parameter}{j}")
-                pushing = motion.algebra.hint(dot(self.v[i, j], F), f"{motion.named('DF', i)}{parameter}{j}")
-                entries[i] = motion.algebra.hint(add(turning, pushing), f"{motion.named('DG', i)}{parameter}{j}")
+                turning = motion.algebra.hint(
+                    dot(self.z[i, j], N), f"{motion.named('DN', i)}{parameter}{j}"
+                )
+                pushing = motion.algebra.hint(
+                    dot(self.v[i, j], F), f"{motion.named('DF', i)}{parameter}{j}"
+                )
+                entries[i] = motion.algebra.hint(
+                    add(turning, pushing), f"{motion.named('DG', i)}{parameter}{j}"
+                )
         return entries

@@ -1,8 +1,11 @@
 """The scalar protocol: what the recursions need of a number, and vectors of three of them.
 
-A scalar is anything with + - * and unary minus: a float array, an array over F_p, a graph node, a CasADi SX. The Python integers 0,
-1 and -1 are structural in every algebra: they are known while the recursion runs, cost nothing and never reach the scalar.
-An `Algebra` turns the symbols of a robot (constants, angles, joint rates, signs) into scalars and receives the name of each step.
+A scalar is anything with + - * and unary minus: a float array, an array over F_p, a graph node, a
+CasADi SX. The Python integers 0,
+1 and -1 are structural in every algebra: they are known while the recursion runs, cost nothing and
+never reach the scalar.
+An `Algebra` turns the symbols of a robot (constants, angles, joint rates, signs) into scalars and
+receives the name of each step.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from symgen.description.expression import Expression
+from symgen.description.robot import Robot
 
 Scalar = Any
 Vector = tuple[Scalar, Scalar, Scalar]
@@ -25,7 +29,12 @@ class Algebra(Protocol):
     """Where the scalars of one derivation come from."""
 
     def constant(self, e: Expression) -> Scalar:
-        """A constant expression: number, length, component of gravity, cos or sin of a fixed angle."""
+        """A constant expression: number, length, component of gravity, cos or sin of a fixed
+        angle.
+        """
+
+    def gravity(self, axis: int) -> Scalar:
+        """Component of minus the acceleration of gravity in frame 0, m/s**2."""
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         """cos and sin of sum n_j q_j + offset."""
@@ -40,12 +49,16 @@ class Algebra(Protocol):
         """Acceleration of joint j."""
 
     def rate(self, u: int, i: int) -> Scalar:
-        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint i."""
+        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint
+        i.
+        """
 
     def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Scalar:
         """sign(sd), sd = G qd = `rate`, G = `row`."""
 
-    def one_sided(self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str) -> tuple[Scalar, Scalar]:
+    def one_sided(
+        self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str
+    ) -> tuple[Scalar, Scalar]:
         """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
 
     def name(self, value: Scalar, name: str) -> Scalar:
@@ -59,7 +72,12 @@ class Algebra(Protocol):
 
 
 class Unnamed:
-    """Part of an algebra that prints nothing: names and headings are left aside."""
+    """Part of an algebra of numbers, which prints nothing: names and headings are left aside."""
+
+    robot: Robot
+
+    def gravity(self, axis: int) -> Scalar:
+        return self.constant(-self.robot.gravity[axis])  # type: ignore[attr-defined]
 
     def name(self, value: Scalar, name: str) -> Scalar:
         return value

@@ -1,4 +1,6 @@
-"""A limit on the processor time of a derivation: whatever a robot file holds, a command ends with a result or with one sentence."""
+"""A limit on the processor time of a derivation: whatever a robot file holds, a command ends with a
+result or with one sentence.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ _end: ContextVar[tuple[float, str]] = ContextVar("_end", default=(math.inf, ""))
 
 @contextmanager
 def limited(what: str) -> Iterator[None]:
-    """Let `require_time` raise after SECONDS of processor time. what : what is being done, "the regrouping of tx40"."""
+    """Let `require_time` raise after SECONDS of processor time. what : what is being done, "the
+    regrouping of tx40".
+    """
     token = _end.set((time.process_time() + SECONDS, what))
     try:
         yield
@@ -30,6 +34,7 @@ def require_time() -> None:
     end, what = _end.get()
     if time.process_time() > end:
         raise SymgenError(
-            f"{what} takes more than {SECONDS:g} s of processor time and was ended; write decimal angles as fractions of pi and let fewer symbols "
+            f"{what} takes more than {SECONDS:g} s of processor time and was ended; write decimal "
+            "angles as fractions of pi and let fewer symbols "
             "into the frame table, or divide the robot (convert --chain, --lock)"
         )

@@ -1,17 +1,17 @@
 """What a user writes: robot files, read into the frozen Robot."""
 
+from symgen.description.angles import AngleWarning
 from symgen.description.expression import Expression
 from symgen.description.files import load_robot, packaged_robots, read_robot
 from symgen.description.grammar import parse
 from symgen.description.new import skeleton
 from symgen.description.par import read_par
-from symgen.description.par_write import write_par
 from symgen.description.robot import Drives, Element, Frame, Loop, Robot
 from symgen.description.schema import json_schema
-from symgen.description.yaml import parse_robot
-from symgen.description.yaml_write import write_yaml
+from symgen.description.yaml import parse_robot, write_yaml
 
 __all__ = [
+    "AngleWarning",
     "Drives",
     "Element",
     "Expression",
@@ -26,6 +26,5 @@ __all__ = [
     "read_par",
     "read_robot",
     "skeleton",
-    "write_par",
     "write_yaml",
 ]

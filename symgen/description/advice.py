@@ -1,4 +1,6 @@
-"""What a message adds when a novice's mistake is recognised: the thing to write instead. Each returns "" where it has nothing to say."""
+"""What a message adds when a novice's mistake is recognised: the thing to write instead. Each
+returns "" where it has nothing to say.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,18 @@ FULL_TURN = 2 * math.pi  # rad: a larger constant in an angle, pi aside, was mea
 
 _YAML = {  # what the scanner says: what to change
     "'\\t'": "a tab stands here; indent with spaces",
-    "mapping values are not allowed here": "a second `: ` on this line; put text that holds one between quotes",
-    "but found '<block mapping start>'": "this line is indented otherwise than those above it; give rows of one table the same indent",
-    "<block end>, ": "the lines above are a list (-) or are indented otherwise; write every row as `1: {...}`, with the same indent",
+    "mapping values are not allowed here": (
+        "a second `: ` on this line; put text that holds one between quotes"
+    ),
+    "but found '<block mapping start>'": (
+        "this line is indented otherwise than those above it; "
+        "give rows of one table the same indent"
+    ),
+    "<block end>, ": (
+        "the lines above are a list (-) or are indented otherwise; write every row "
+        "as "
+        "`1: {...}`, with the same indent"
+    ),
     "expected ',' or '}'": "look here, or at the end of the row above, for a missing , or }",
     "expected ',' or ']'": "look here, or at the end of the row above, for a missing , or ]",
 }
@@ -27,9 +38,11 @@ def yaml_advice(problem: str) -> str:
 
 def symbol_advice(name: str, declared: Iterable[str]) -> str:
     """The declared symbol that was probably meant by `name`, else where one is declared."""
-    known = [*declared, "pi"]
-    same = [symbol for symbol in known if symbol.lower() == name.lower()]
-    close = same or difflib.get_close_matches(name, [symbol for symbol in known if len(symbol) > 2], 1)
+    symbols = [*declared, "pi"]
+    same = [symbol for symbol in symbols if symbol.lower() == name.lower()]
+    close = same or difflib.get_close_matches(
+        name, [symbol for symbol in symbols if len(symbol) > 2], 1
+    )
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
@@ -44,9 +57,19 @@ def unit_advice(token: str) -> str:
 
 
 def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
-    """For an angle that exceeds a full turn by more than multiples of pi: it was meant in degrees. angle : without q_j."""
+    """For an angle that exceeds a full turn by more than multiples of pi: it was meant in degrees.
+    angle : without q_j.
+    """
     turn = angle - PI * angle.coefficient("pi")
     if "pi" in turn.atoms or turn.symbols - constants.keys():
         return ""
     value = turn.value(constants)
-    return f"{value:g} rad are {abs(value) / FULL_TURN:.3g} turns; angles are in rad: 90 degrees are pi/2" if abs(value) > FULL_TURN else ""
+    return (
+        (
+            f"{value:g} rad are {abs(value) / FULL_TURN:.3g} turns; angles are in rad: 90 degrees "
+            "are "
+            "pi/2"
+        )
+        if abs(value) > FULL_TURN
+        else ""
+    )

@@ -1,4 +1,6 @@
-"""A robot at the values of its constants: symbols replaced by their numbers, for geometries at which the generic formulas do not hold."""
+"""A robot at the values of its constants: symbols replaced by their numbers, for geometries at
+which the generic formulas do not hold.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +8,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import TypeAlias, TypeVar
 
 from symgen.description.expression import PI, Expression, twelfths
+from symgen.description.parts import ANGLES, GEOMETRY
 from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
+from symgen.errors import DescriptionError
 
 K = TypeVar("K")
 Change: TypeAlias = Callable[[Expression], Expression]
@@ -17,7 +22,8 @@ WITHIN = 1e-9  # rad, of a multiple of pi/12: rounding of 1.5707963267948966
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
-    """`robot` with every constant as a number: decimals exactly, angles that are multiples of pi/12 as such; or some constants at given values.
+    """`robot` with every constant as a number: decimals exactly, angles that are multiples of pi/12
+    as such; or some constants at given values.
 
     Parameters
     ----------
@@ -29,25 +35,39 @@ def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> R
     Returns
     -------
     Robot
-        The same mechanism without these constants; base parameters and formulas are those that hold for these values alone.
+        The same mechanism without these constants; base parameters and formulas are those that hold
+        for these values alone.
     """
     replaced = _numbers(robot) if values is None else values
 
-    def substituted(e: Expression) -> Expression:
-        return e.substitute(replaced)
-
+    change = partial(substituted, values=replaced)
     constants = {name: x for name, x in robot.constants.items() if name not in replaced}
-    return replace(mapped(robot, substituted, substituted), constants=constants)
+    return replace(mapped(robot, change, change), constants=constants)
+
+
+def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:
+    """`e` at these values; raises DescriptionError where it has none there."""
+    try:
+        return e.substitute(values)
+    except (ArithmeticError, ValueError) as error:
+        given = ", ".join(f"{name} = {values[name]}" for name in sorted(e.symbols & values.keys()))
+        raise DescriptionError(
+            f"{e} has no finite real value at {given}; give another value"
+        ) from error
 
 
 def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
-    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of its angles."""
+    """`robot` with `length` of its lengths, gravity, ratios and rows of elements, and `angle` of
+    its angles.
+    """
 
     def rows(table: Mapping[int, Mapping[K, Expression]]) -> dict[int, dict[K, Expression]]:
         return {j: {i: length(g) for i, g in row.items()} for j, row in table.items()}
 
     def frame(f: Frame) -> Frame:
-        return replace(f, b=length(f.b), d=length(f.d), r=length(f.r), gamma=angle(f.gamma), alpha=angle(f.alpha), theta=angle(f.theta))
+        changes = {name: angle if name in ANGLES else length for name in GEOMETRY}
+        fields = {name: change(getattr(f, name)) for name, change in changes.items()}
+        return replace(f, **fields)  # type: ignore[arg-type]
 
     x, y, z = map(length, robot.gravity)
     return replace(
@@ -55,14 +75,22 @@ def mapped(robot: Robot, length: Change, angle: Change = lambda e: e) -> Robot:
         frames=tuple(map(frame, robot.frames)),
         gravity=(x, y, z),
         elements=tuple(replace(e, along=rows(e.along), form=rows(e.form)) for e in robot.elements),
-        constraints={j: (length if robot.frame(j).sigma == PRISMATIC else angle)(e) for j, e in robot.constraints.items()},
+        constraints={
+            j: (length if robot.frame(j).sigma == PRISMATIC else angle)(e)
+            for j, e in robot.constraints.items()
+        },
     )
 
 
 def _numbers(robot: Robot) -> dict[str, Expression]:
     """The constants as exact numbers."""
     in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols}
-    in_angles |= {s for j, e in robot.constraints.items() if robot.frame(j).sigma == REVOLUTE for s in e.symbols}
+    in_angles |= {
+        s
+        for j, e in robot.constraints.items()
+        if robot.frame(j).sigma == REVOLUTE
+        for s in e.symbols
+    }
     return {name: exact(value, angle=name in in_angles) for name, value in robot.constants.items()}
 
 

@@ -1,11 +1,13 @@
-"""Exact constants and linear or quadratic forms: polynomials over symbols. `grammar.parse` reads them from text.
+"""Exact constants and linear or quadratic forms: polynomials over symbols. `grammar.parse` reads
+them from text.
 
-An expression is kept as a polynomial with rational coefficients
+An expression is a polynomial with rational coefficients
 
-    e = sum_k c_k prod_i atom_i**n_ki ,      atom = symbol, number kept as it is written, or cos(e), sin(e), sqrt(e), inv(e)
+    e = sum_k c_k prod_i atom_i**n_ki ,
 
-so that two equal forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once, square roots of
-rationals become products of sqrt(prime) to the first power.
+each atom a symbol, a number as it is written, or cos(e), sin(e), sqrt(e), inv(e), so that two equal
+forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once,
+square roots of rationals become products of sqrt(prime) to the first power.
 """
 
 from __future__ import annotations
@@ -24,14 +26,20 @@ Monomial = tuple[tuple["str | Number | Call", int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt or inv (1/argument)."""
+    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt or inv
+    (1/argument).
+    """
 
     function: str
     argument: Expression
 
     @cached_property
     def text(self) -> str:
-        return f"1/({self.argument})" if self.function == "inv" else f"{self.function}({self.argument})"
+        return (
+            f"1/({self.argument})"
+            if self.function == "inv"
+            else f"{self.function}({self.argument})"
+        )
 
     def __str__(self) -> str:
         return self.text
@@ -39,7 +47,9 @@ class Call:
 
 @dataclass(frozen=True)
 class Number:
-    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not 0.18645124. See `regroup.numbers`."""
+    """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not
+    0.18645124. See `regroup.numbers`.
+    """
 
     value: Fraction
 
@@ -53,7 +63,9 @@ class Number:
 
 
 class Expression:
-    """Polynomial with rational coefficients over symbols and calls; immutable, hashable, equal by value."""
+    """Polynomial with rational coefficients over symbols and calls; immutable, hashable, equal by
+    value.
+    """
 
     __slots__ = ("_hash", "terms")
 
@@ -123,6 +135,10 @@ class Expression:
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Expression) and self.terms == other.terms
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its terms: the hash of a text is another in another process."""
+        return Expression, (self.terms,)
+
     def __hash__(self) -> int:
         if self._hash is None:
             self._hash = hash(frozenset(self.terms.items()))
@@ -152,11 +168,19 @@ class Expression:
         """Names of all symbols, those inside calls included; `pi` is not a symbol."""
         names: set[str] = set()
         for a in self.atoms:
-            names |= a.argument.symbols if isinstance(a, Call) else {a} - {"pi"} if isinstance(a, str) else set()
+            names |= (
+                a.argument.symbols
+                if isinstance(a, Call)
+                else {a} - {"pi"}
+                if isinstance(a, str)
+                else set()
+            )
         return names
 
     def coefficient(self, *names: str) -> Expression:
-        """The cofactor of the monomial `names` (each to the first power per mention) in the other atoms."""
+        """The cofactor of the monomial `names` (each to the first power per mention) in the other
+        atoms.
+        """
         wanted: dict[str | Number | Call, int] = {}
         for name in names:
             wanted[name] = wanted.get(name, 0) + 1
@@ -188,11 +212,12 @@ class Expression:
         value: Callable[[str], Any],
         function: Callable[[str, Expression], Any],
         number: Callable[[Fraction], Any],
-        kept: Callable[[Number], Any] | None = None,
+        written: Callable[[Number], Any] | None = None,
     ) -> Any:
-        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a call, `number` of a rational.
+        """Fold over any scalars: `value` of a symbol (and of pi), `function(name, argument)` of a
+        call, `number` of a rational.
 
-        `kept` is the value of a Number, by default that of its rational.
+        `written` is the value of a Number, by default that of its rational.
         """
         total: Any = number(Fraction(0))
         for m, c in self.ordered:
@@ -203,8 +228,8 @@ class Expression:
                     if isinstance(a, Call)
                     else value(a)
                     if isinstance(a, str)
-                    else kept(a)
-                    if kept
+                    else written(a)
+                    if written
                     else number(a.value)
                 )
                 factor = base
@@ -218,7 +243,9 @@ class Expression:
         return self.value({})
 
     def value(self, values: Mapping[str, float]) -> float:
-        """The number this expression has where `values` gives its symbols. Raises KeyError naming a missing one."""
+        """The number this expression has where `values` gives its symbols. Raises KeyError naming a
+        missing one.
+        """
 
         def function(name: str, argument: Expression) -> float:
             x = argument.value(values)
@@ -263,7 +290,11 @@ def decimal(c: Fraction) -> str:
 def _factors(m: Monomial, c: Fraction) -> str:
     up = [f"{a}" if n == 1 else f"{a}**{n}" for a, n in m if n > 0 and not _is_inverse(a)]
     down = [(f"{a}" if n == -1 else f"{a}**{-n}") for a, n in m if n < 0]
-    down += [f"({a.argument})" if n == 1 else f"({a.argument})**{n}" for a, n in m if n > 0 and isinstance(a, Call) and a.function == "inv"]
+    down += [
+        f"({a.argument})" if n == 1 else f"({a.argument})**{n}"
+        for a, n in m
+        if n > 0 and isinstance(a, Call) and a.function == "inv"
+    ]
     c = abs(c)
     text = decimal(c)
     if m and "/" in text:
@@ -294,7 +325,9 @@ def _product(m1: Monomial, m2: Monomial) -> Monomial:
 
 
 def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
-    """The monomial with every sqrt(rational) to the power 0 or 1, and the rational factor that leaves: sqrt(3)**-1 = sqrt(3)/3."""
+    """The monomial with every sqrt(rational) to the power 0 or 1, and the rational factor that
+    leaves: sqrt(3)**-1 = sqrt(3)/3.
+    """
     if not any(n != 1 and isinstance(a, Call) and a.function == "sqrt" for a, n in m):
         return m, Fraction(1)
     factor, powers = Fraction(1), []
@@ -313,7 +346,9 @@ def _atom(function: str, argument: Expression) -> Expression:
 
 
 def _sqrt_of_rational(c: Fraction) -> Expression:
-    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) * rest."""
+    """sqrt(m/n) = sqrt(m n)/n, m n = square * product of primes (trial division to LARGEST_PRIME) *
+    rest.
+    """
     if c < 0:
         raise ValueError("square root of a negative number")
     rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
@@ -330,7 +365,9 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
 
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are taken out exactly."""
+    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are
+    taken out exactly.
+    """
     if function == "tan":
         return call("sin", argument) * call("cos", argument).inverse()
     if function == "inv":
@@ -349,18 +386,27 @@ def call(function: str, argument: Expression) -> Expression:
         sign, turns = -sign, turns - 2
     if not rest:
         return Expression.number(sign if turns == 0 else 0)
-    return _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign  # cos(x + pi/2) = -sin x
+    return (
+        _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign
+    )  # cos(x + pi/2) = -sin x
 
 
 def with_known_cosines(e: Expression) -> Expression:
     """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
-    if not any(isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN for a in e.atoms):
+    if not any(
+        isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN
+        for a in e.atoms
+    ):
         return e
     result = Expression()
     for m, c in e.terms.items():
         term = Expression({(): c})
         for a, n in m:
-            square = KNOWN.get(a.argument) if isinstance(a, Call) and a.function in ("cos", "sin") else None
+            square = (
+                KNOWN.get(a.argument)
+                if isinstance(a, Call) and a.function in ("cos", "sin")
+                else None
+            )
             if square is None:
                 term = term * Expression({((a, n),): Fraction(1)})
             else:
@@ -378,7 +424,9 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
 
 
 def twelfths(angle: float, within: float) -> int | None:
-    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None where none does. Drawings have such angles."""
+    """k of the multiple k pi/12 that lies within `within` rad of a decimal angle; None where none
+    does. Drawings have such angles.
+    """
     k = round(angle * 12 / math.pi)
     return k if abs(angle - k * math.pi / 12) <= within else None
 
@@ -392,4 +440,6 @@ def _isqrt(n: int) -> int | None:
     return r if r * r == n else None
 
 
-KNOWN = {PI * Fraction(1, n): Fraction(square, 4) for n, square in ((6, 3), (4, 2), (3, 1))}  # angle: cos**2
+KNOWN = {
+    PI * Fraction(1, n): Fraction(square, 4) for n, square in ((6, 3), (4, 2), (3, 1))
+}  # angle: cos**2

@@ -1,4 +1,6 @@
-"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and written by suffix."""
+"""Robots by packaged name or file: robot files (.yaml), SYMORO's `.par`, URDF and MJCF, read and
+written by suffix.
+"""
 
 from __future__ import annotations
 
@@ -7,34 +9,43 @@ from importlib import resources
 from pathlib import Path
 
 from symgen.description.par import read_par
-from symgen.description.par_write import write_par
 from symgen.description.robot import Robot
-from symgen.description.yaml import parse_robot
-from symgen.description.yaml_write import write_yaml
+from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
 TREES = (".urdf", ".xml", ".mjcf")  # suffixes of the formats of links and joints by name
-WRITTEN = (".yaml", ".yml", ".par", ".urdf")  # suffixes of the formats that are written
-SNAP = 1e-4  # rad: roll, pitch and yaw of a URDF this close to a multiple of pi/12 are taken as that
+WRITTEN = (".yaml", ".yml", ".urdf")  # suffixes of the formats that are written
 MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
 
 
 def packaged_robots() -> tuple[str, ...]:
     """Names that `load_robot` knows without a path."""
     folder = resources.files("symgen.description") / "robots"
-    return tuple(sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml")))
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".yaml")
+            for entry in folder.iterdir()
+            if entry.name.endswith(".yaml")
+        )
+    )
 
 
-def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
+def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = False) -> Robot:
     """The robot of a file, or a packaged one by its name.
 
     Parameters
     ----------
     source : str or Path
-        Name of a packaged robot (`tx40`), or path of a robot file (`arm.yaml`, `./tx40`), a `.par` file, a URDF (`.urdf`) or an MJCF
-        (`.xml`, `.mjcf`; extra `mjcf`). Angles of a URDF within SNAP of a multiple of pi/12 are taken as that.
+        Name of a packaged robot (`tx40`), or path of a robot file (`arm.yaml`, `./tx40`), a `.par`
+        file, a URDF (`.urdf`) or an MJCF
+        (`.xml`, `.mjcf`; extra `mjcf`).
     keep_fixed : bool
-        Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by `read_urdf`.
+        Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by
+        `read_urdf`.
+    exact : bool
+        Of a URDF or `.par` file: angles are those of the file, as a calibrated one needs it. Else
+        angles within 1e-4 rad of a multiple of pi/12 are taken as that, and an AngleWarning tells
+        which, and by how much the tool then moves.
 
     Returns
     -------
@@ -46,66 +57,73 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False) -> Robot:
     DescriptionError
         The file cannot be read or describes no robot; the message names file and line.
     """
-    return read_robot(source, keep_fixed=keep_fixed)[0]
+    return read_robot(source, keep_fixed=keep_fixed, exact=exact)[0]
 
 
 def read_robot(
     source: str | Path,
     *,
     constants: Mapping[str, float] | None = None,
-    nearly: float = SNAP,
+    exact: bool = False,
     keep_fixed: bool = False,
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read otherwise than written, or not at all.
+    """The robot of a file as by `load_robot`, and notes on what of a foreign format was read
+    otherwise than written, or not at all.
 
     Parameters
     ----------
-    source, keep_fixed
+    source, keep_fixed, exact
         As of `load_robot`.
     constants : mapping, SI and rad
         Values of the symbols of a `.par` file, which has no place for them.
-    nearly : float, rad
-        As of `read_urdf`; 0 takes the file as it is.
     lock : mapping, rad or m
         Of a URDF or MJCF: joints that are held, by name, and where.
     chain : tuple of str
-        Of a URDF or MJCF: links between which joints move, base and tip; the other joints outward of the base are held at zero.
+        Of a URDF or MJCF: links between which joints move, base and tip; the other joints outward
+        of the base are held at zero.
 
     Raises
     ------
     DescriptionError
-        As by `load_robot`; `lock` or `chain` of another format, or of a joint or link that the file does not have.
+        As by `load_robot`; `lock` or `chain` of another format, or of a joint or link that the file
+        does not have.
     """
     suffix = "" if source in packaged_robots() else Path(source).suffix.lower()
     if (lock or chain) and suffix not in TREES:
         raise DescriptionError(
-            f"{source}: joints are locked and chains cut out of {', '.join(TREES)}; edit the frames of this file instead"
+            f"{source}: joints are locked and chains cut out of {', '.join(TREES)}; edit the "
+            "frames of this file instead"
         )
     if source in packaged_robots():
         file = f"{source}.yaml"
-        return parse_robot((resources.files("symgen.description") / "robots" / file).read_bytes(), file), ()
+        return parse_robot(
+            (resources.files("symgen.description") / "robots" / file).read_bytes(), file
+        ), ()
     path = Path(source)
     content = content_of(path)
     if suffix == ".par":
-        return read_par(content, path.name, constants)
+        return read_par(content, path.name, constants, exact=exact)
     if suffix in TREES:
-        from symgen.description.tree_parts import Part  # numpy, which robot files do without
+        from symgen.description.tree_parts import TreePart  # numpy, which robot files do without
 
-        part = Part(lock or {}, chain)
+        part = TreePart(lock or {}, chain)
         if suffix == ".urdf":
             from symgen.description.urdf import read_urdf
 
-            return read_urdf(content, path.name, nearly=nearly, keep_fixed=keep_fixed, part=part)
+            return read_urdf(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
         from symgen.description.mjcf import read_mjcf  # mujoco, an extra
 
         return read_mjcf(content, path.name, keep_fixed=keep_fixed, part=part)
     return parse_robot(content, path.name), ()
 
 
-def write_robot(robot: Robot, file: str, *, comments: Sequence[str] = ()) -> tuple[str, tuple[str, ...]]:
-    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the format does not carry.
+def write_robot(
+    robot: Robot, file: str, *, comments: Sequence[str] = ()
+) -> tuple[str, tuple[str, ...]]:
+    """Text of `robot` in the format that the suffix of `file` names, and notes on what of it the
+    format does not carry.
 
     Parameters
     ----------
@@ -128,19 +146,26 @@ def write_robot(robot: Robot, file: str, *, comments: Sequence[str] = ()) -> tup
         from symgen.description.urdf_write import write_urdf  # numpy, which robot files do without
 
         return write_urdf(robot)
-    return write_par(robot) if suffix == ".par" else (write_yaml(robot, comments=comments), ())
+    return write_yaml(robot, comments=comments), ()
 
 
 def content_of(path: Path) -> bytes:
-    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError where it cannot be read."""
-    known = ", ".join(packaged_robots())
+    """Bytes of a robot file, one more than MAX_BYTES at most; DescriptionError where it cannot be
+    read.
+    """
+    names = ", ".join(packaged_robots())
     try:
         if path.exists() and not path.is_file():  # a pipe may never answer, a device never end
             raise OSError(0, "it is a folder, a pipe or a device")
         with path.open("rb") as stream:
             return stream.read(MAX_BYTES + 1)
     except FileNotFoundError as error:
-        raise DescriptionError(f"no file {path} and no packaged robot of that name; packaged are {known}", file=path.name) from error
+        raise DescriptionError(
+            f"no file {path} and no packaged robot of that name; packaged are {names}",
+            file=path.name,
+        ) from error
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise DescriptionError(f"cannot read {path}: {reason}; expected a robot file or one of {known}", file=path.name) from error
+        raise DescriptionError(
+            f"cannot read {path}: {reason}; expected a robot file or one of {names}", file=path.name
+        ) from error

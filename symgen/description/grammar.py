@@ -6,7 +6,8 @@
     power   = primary ["**" ["-"] primary]          exponent: a whole number
     primary = number | name | function "(" sum ")" | "(" sum ")"
 
-Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt; anything else is an ExpressionError at its column. Length,
+Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt; anything else is an
+ExpressionError at its column. Length,
 depth, exponents, terms and digits are bounded, so that no text takes long to read.
 """
 
@@ -24,7 +25,8 @@ FUNCTIONS = ("sin", "cos", "tan", "sqrt")
 MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT, MAX_TERMS, MAX_DIGITS = 2000, 40, 32, 400, 60
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))", re.ASCII
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))",
+    re.ASCII,
 )
 
 
@@ -35,14 +37,21 @@ class _Parser:
         self.depth = 0
         self.tokens: list[tuple[str, str, int]] = []
         if len(text) > MAX_LENGTH:
-            raise self.error(f"expression of {len(text)} characters; at most {MAX_LENGTH} are read", 1)
+            raise self.error(
+                f"expression of {len(text)} characters; at most {MAX_LENGTH} are read", 1
+            )
         position, end = 0, len(text.rstrip())
         while position < end:
             match = _TOKEN.match(text, position)
             if match is None:
                 at = len(text) - len(text[position:].lstrip())
                 raise self.error(
-                    f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** ( ), sin, cos, tan, sqrt",
+                    (
+                        f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** "
+                        "( "
+                        "), "
+                        "sin, cos, tan, sqrt"
+                    ),
                     at + 1,
                     unit_advice(text[at]),
                 )
@@ -65,10 +74,16 @@ class _Parser:
     def guard(self, e: Expression) -> Expression:
         if len(e.terms) > MAX_TERMS or any(abs(n) > MAX_EXPONENT for m in e.terms for _, n in m):
             raise self.error(
-                f"expression expands to more than {MAX_TERMS} terms or powers above {MAX_EXPONENT}; introduce a constant",
+                (
+                    f"expression expands to more than {MAX_TERMS} terms or powers above "
+                    f"{MAX_EXPONENT}; introduce a constant"
+                ),
                 self.tokens[self.position][2],
             )
-        if any(len(str(c.numerator)) + len(str(c.denominator)) > 4 * MAX_DIGITS for c in e.terms.values()):
+        if any(
+            len(str(c.numerator)) + len(str(c.denominator)) > 4 * MAX_DIGITS
+            for c in e.terms.values()
+        ):
             raise self.error("number with too many digits", self.tokens[self.position][2])
         return e
 
@@ -106,14 +121,19 @@ class _Parser:
             negative = self.accept("-") is not None
             exponent = self.primary().constant
             if exponent is None or exponent.denominator != 1 or abs(exponent) > MAX_EXPONENT:
-                raise self.error(f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}", column)
+                raise self.error(
+                    f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}",
+                    column,
+                )
             n = -int(exponent) if negative else int(exponent)
             if n < 0 and not base:
                 raise self.error("division by zero", column)
             if len(base.terms) > 1 and abs(n) > 8:
                 raise self.error("power of a sum above 8; introduce a constant", column)
             factor, result = base.inverse() if n < 0 else base, Expression.number(1)
-            for _ in range(abs(n)):  # guarded step by step: nested powers are refused before they grow
+            for _ in range(
+                abs(n)
+            ):  # guarded step by step: nested powers are refused before they grow
                 result = self.guard(result * factor)
             return result
         return base
@@ -134,19 +154,27 @@ class _Parser:
         if kind == "name":
             if self.accept("("):
                 if text not in FUNCTIONS:
-                    raise self.error(f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are", column, unit_advice(text))
+                    raise self.error(
+                        f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are",
+                        column,
+                        unit_advice(text),
+                    )
                 e = self.sum()
                 if self.accept(")") is None:
                     raise self.error("missing )", self.tokens[self.position][2])
                 try:
                     return call(text, e)
                 except (ValueError, ZeroDivisionError) as error:
-                    raise self.error(f"{text} of {e}: {error or 'division by zero'}", column) from error
+                    raise self.error(
+                        f"{text} of {e}: {error or 'division by zero'}", column
+                    ) from error
             if text == "pi" or self.symbols is None or text in self.symbols:
                 return Expression.symbol(text)
             declared = sorted(self.symbols)
             raise self.error(
-                f"undeclared symbol {text!r}; declared here: {', '.join(declared) or 'none'}", column, symbol_advice(text, declared)
+                f"undeclared symbol {text!r}; declared here: {', '.join(declared) or 'none'}",
+                column,
+                symbol_advice(text, declared),
             )
         raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
 
@@ -162,5 +190,7 @@ def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expr
     e = parser.sum()
     kind, token, column = parser.tokens[parser.position]
     if kind != "end":
-        raise parser.error(f"unexpected {token!r} after a complete expression", column, unit_advice(token))
+        raise parser.error(
+            f"unexpected {token!r} after a complete expression", column, unit_advice(token)
+        )
     return e

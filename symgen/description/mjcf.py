@@ -1,11 +1,16 @@
-"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree, the tree a table of Khalil frames.
+"""MJCF to a Robot, by MuJoCo's own compiler (extra `mjcf`): its bodies and joints become a tree,
+the tree a table of Khalil frames.
 
-A body with joints 1 .. k, applied one after the other about the points p_i, is a chain of k links, all but the last without mass,
+A body with joints 1 .. k, applied one after the other about the points p_i, is a chain of k links,
+all but the last without mass,
 
-    iTb = Trans, Rot of the body;  then for each joint  Trans(p) Rot(axis, q - ref) Trans(-p)  or  Trans(axis (q - ref))
+    iTb = Trans, Rot of the body;  then for each joint  Trans(p) Rot(axis, q - ref) Trans(-p)  or
+    Trans(axis (q - ref))
 
-Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q - springref). Relations of joints and of fixed tendons
-that are linear are solved, exactly, for joints that no actuator drives. MuJoCo reads a text that names no file (`mjcf_text`).
+Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q -
+springref). Relations of joints and of fixed tendons
+that are linear are solved, exactly, for joints that no actuator drives. MuJoCo reads a text that
+names no file (`mjcf_text`).
 """
 
 from __future__ import annotations
@@ -17,23 +22,27 @@ from typing import Any
 
 import numpy as np
 
+from symgen.description.fields import located
 from symgen.description.mjcf_text import Mjcf, reduced
 from symgen.description.robot import Robot
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Relation, Tree
-from symgen.description.tree_parts import NO_PART, Part, part_of
+from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
 from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST
 from symgen.errors import DescriptionError
 
-FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
+FREE_JOINT, BALL, SLIDE_JOINT, HINGE = range(4)  # mjtJoint
 JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
 
 _Row = dict[int, Fraction]  # {joint: coefficient}
 _Solved = tuple[_Row, Fraction]  # a row and a constant
 
 
-def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False, part: Part = NO_PART) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of an MJCF file, and notes: which joint is which q, which body or site is which kept frame, and what was not read.
+def read_mjcf(
+    content: bytes, file: str, *, keep_fixed: bool = False, part: TreePart = WHOLE_TREE
+) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of an MJCF file, and notes: which joint is which q, which body or site is which
+    kept frame, and what was not read.
 
     Parameters
     ----------
@@ -42,9 +51,11 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False, part: Part
     file : str
         Its name.
     keep_fixed : bool
-        Bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else such bodies are
-        only part of the body that holds them, and sites are left out. Their inertia belongs to that body either way.
-    part : Part
+        Bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for
+        frame_poses and jacobian; else such bodies are
+        only part of the body that holds them, and sites are left out. Their inertia belongs to that
+        body either way.
+    part : TreePart
         Joints held at a position, and the chain that is kept.
 
     Raises
@@ -52,11 +63,9 @@ def read_mjcf(content: bytes, file: str, *, keep_fixed: bool = False, part: Part
     DescriptionError
         No MJCF, or no tree of hinges and slides on a resting base; the message names file and line.
     """
-    try:
+    with located(file):
         tree = part_of(parse_mjcf(content, sites=keep_fixed), part)
         return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
-    except DescriptionError as error:
-        raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
 
 
 def parse_mjcf(content: bytes, *, sites: bool = False) -> Tree:
@@ -66,7 +75,9 @@ def parse_mjcf(content: bytes, *, sites: bool = False) -> Tree:
 
 
 def _compiled(mjcf: Mjcf) -> Any:
-    """The model; MuJoCo's remarks on its own simulation of it would go to the screen and to a file of the working folder."""
+    """The model; MuJoCo's remarks on its own simulation of it would go to the screen and to a file
+    of the working folder.
+    """
     try:
         import mujoco
     except ImportError as error:
@@ -77,7 +88,10 @@ def _compiled(mjcf: Mjcf) -> Any:
         return mujoco.MjModel.from_xml_string(mjcf.text)
     except ValueError as error:
         message = " ".join(str(error).split())
-        raise DescriptionError(f"MuJoCo refuses the file: {message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}") from error
+        raise DescriptionError(
+            "MuJoCo refuses the file: "
+            f"{message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}"
+        ) from error
     finally:
         mujoco.set_mju_user_warning(before)
 
@@ -112,7 +126,15 @@ class _Growing:
 def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
     if model.njnt > MAX_JOINTS:
         raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
-    for values in (model.body_pos, model.body_mass, model.body_inertia, model.jnt_pos, model.qpos0, model.dof_damping, model.dof_armature):
+    for values in (
+        model.body_pos,
+        model.body_mass,
+        model.body_inertia,
+        model.jnt_pos,
+        model.qpos0,
+        model.dof_damping,
+        model.dof_armature,
+    ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(f"a number is not finite or larger than {LARGEST:g}")
     growing = _Growing(model, mjcf, _joint_names(model))
@@ -122,17 +144,25 @@ def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
     if sites:
         for s in range(model.nsite):
             link, pose = growing.place[int(model.site_bodyid[s])]
-            name = _new(growing, _named(model.site(s).name, "site", s))
+            name = _new(growing, model.site(s).name or f"site{s}")
             growing.links[name] = None
-            growing.joints.append(_fixed(name, link, pose @ _pose(model.site_pos[s], model.site_quat[s])))
+            growing.joints.append(
+                _fixed(name, link, pose @ _pose(model.site_pos[s], model.site_quat[s]))
+            )
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     notes = (*mjcf.notes, *_left_out(model))
     relations, joints = _relations(growing), tuple(growing.joints)
-    return Tree(mjcf.name, growing.links, joints, "world", relations, frozenset(growing.bare), (gx, gy, gz), notes, places)
-
-
-def _named(name: str, what: str, k: int) -> str:
-    return name or f"{what}{k}"
+    return Tree(
+        mjcf.name,
+        growing.links,
+        joints,
+        "world",
+        relations,
+        frozenset(growing.bare),
+        (gx, gy, gz),
+        notes,
+        places,
+    )
 
 
 def _joint_names(model: Any) -> list[str]:
@@ -174,7 +204,7 @@ def _pose(position: Array, quaternion: Array) -> Array:
 def _body(growing: _Growing, b: int) -> None:
     """The links of body b: one for each of its joints, or one that is fixed."""
     model = growing.model
-    name = _new(growing, _named(model.body(b).name, "body", b))
+    name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
     pose = pose @ _pose(model.body_pos[b], model.body_quat[b])
     first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
@@ -182,7 +212,11 @@ def _body(growing: _Growing, b: int) -> None:
         growing.joints.append(_fixed(name, link, pose))
         pose, link = np.eye(4), name
     for k in range(first, first + count):
-        child = name if k == first + count - 1 else _new(growing, f"{name} before {growing.names[k + 1]}")
+        child = (
+            name
+            if k == first + count - 1
+            else _new(growing, f"{name} before {growing.names[k + 1]}")
+        )
         joint, pose = _joint(growing, k, link, child, pose)
         growing.joints.append(joint)
         growing.links[child] = None
@@ -190,26 +224,35 @@ def _body(growing: _Growing, b: int) -> None:
         link = child
     M, inertia = float(model.body_mass[b]), np.diag(model.body_inertia[b])
     has = M > 0 or inertia.any()
-    growing.links[name] = Inertial(M, pose @ _pose(model.body_ipos[b], model.body_iquat[b]), inertia) if has else None
+    growing.links[name] = (
+        Inertial(M, pose @ _pose(model.body_ipos[b], model.body_iquat[b]), inertia) if has else None
+    )
     growing.place[b] = (link, pose)
 
 
 def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> tuple[Joint, Array]:
-    """Joint k on `parent`, where the body has `pose` at q = ref; the pose of the body in the frame of the joint."""
+    """Joint k on `parent`, where the body has `pose` at q = ref; the pose of the body in the frame
+    of the joint.
+    """
     model, line = growing.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
-    if kind in (FREE, BALL):
-        what = "free joint" if kind == FREE else "ball joint"
-        hint = "the base rests here: remove it" if kind == FREE else "write three hinges"
-        raise DescriptionError(f"{what} {name!r}: hinge and slide joints are read; {hint}", line=line)
+    if kind in (FREE_JOINT, BALL):
+        what = "free joint" if kind == FREE_JOINT else "ball joint"
+        hint = "the base rests here: remove it" if kind == FREE_JOINT else "write three hinges"
+        raise DescriptionError(
+            f"{what} {name!r}: hinge and slide joints are read; {hint}", line=line
+        )
     dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k])
     if not 0 < np.linalg.norm(axis) < np.inf:
-        raise DescriptionError(f"joint {name!r}: its axis has no direction; expected three numbers of like size", line=line)
+        raise DescriptionError(
+            f"joint {name!r}: its axis has no direction; expected three numbers of like size",
+            line=line,
+        )
     axis /= np.linalg.norm(axis)
     anchor = _pose(model.jnt_pos[k], np.array([1.0, 0.0, 0.0, 0.0]))
     ref = float(model.qpos0[int(model.jnt_qposadr[k])])
     back = np.eye(4)  # from q = ref to q = 0
-    if kind == SLIDE:
+    if kind == SLIDE_JOINT:
         back[:3, 3] = -ref * axis
     else:
         back = _pose(np.zeros(3), np.array([np.cos(ref / 2), *(-np.sin(ref / 2) * axis)]))
@@ -220,7 +263,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
         limits["effort"] = float(np.abs(model.jnt_actfrcrange[k]).min())
     joint = Joint(
         name,
-        "prismatic" if kind == SLIDE else "revolute",
+        "prismatic" if kind == SLIDE_JOINT else "revolute",
         parent,
         child,
         pose @ anchor @ back,
@@ -245,21 +288,33 @@ def _left_out(model: Any) -> list[str]:
         ("damping that grows with speed", "dof_dampingpoly"),
         ("stiffness that grows with deflection", "jnt_stiffnesspoly"),
     ):
-        rows = getattr(model, polynomial, ())  # since MuJoCo 4; every joint has one degree of freedom
+        rows = getattr(
+            model, polynomial, ()
+        )  # since MuJoCo 4; every joint has one degree of freedom
         if names := [model.joint(k).name for k, row in enumerate(rows) if np.any(row)]:
             notes.append(f"{what} not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
-    forces = [model.tendon_stiffness, model.tendon_damping, model.tendon_frictionloss, *(getattr(model, "tendon_armature", ()),)]
+    forces = [
+        model.tendon_stiffness,
+        model.tendon_damping,
+        model.tendon_frictionloss,
+        *(getattr(model, "tendon_armature", ()),),
+    ]
     acting = sorted({int(t) for force in forces for t in np.flatnonzero(force)})
     if acting:
-        notes.append(f"forces of tendons not read: {', '.join(ascii(model.tendon(t).name) for t in acting[:20])}")
+        notes.append(
+            "forces of tendons not read: "
+            f"{', '.join(ascii(model.tendon(t).name) for t in acting[:20])}"
+        )
     return notes
 
 
-# --- relations --------------------------------------------------------------------------------------------------------
+# --- relations ---
 
 
 def _relations(growing: _Growing) -> dict[str, Relation]:
-    """The joints that linear relations determine, by the others: exact elimination of joints that no actuator drives."""
+    """The joints that linear relations determine, by the others: exact elimination of joints that
+    no actuator drives.
+    """
     model, names, driven = growing.model, growing.names, growing.mjcf.driven
     relations: dict[int, _Solved] = {}
     for e in range(model.neq):
@@ -268,7 +323,10 @@ def _relations(growing: _Growing) -> dict[str, Relation]:
             row, right = _without(row, right, k, relations[k])
         free = [k for k in sorted(row) if names[k] not in driven]
         if not free:
-            raise DescriptionError(f"equality {model.equality(e).name!r}: it ties driven joints, or says what others say already")
+            raise DescriptionError(
+                f"equality {model.equality(e).name!r}: it ties driven joints, or says what others "
+                "say already"
+            )
         first = int(model.eq_obj1id[e])
         pivot = first if int(model.eq_type[e]) == JOINT_RELATION and first in free else free[-1]
         own = row.pop(pivot)
@@ -278,7 +336,10 @@ def _relations(growing: _Growing) -> dict[str, Relation]:
             for k, (leaders, offset) in relations.items()
         }
         relations[pivot] = solved
-    return {names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset) for k, (leaders, offset) in sorted(relations.items())}
+    return {
+        names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset)
+        for k, (leaders, offset) in sorted(relations.items())
+    }
 
 
 def _with(row: _Row, offset: Fraction, k: int, solved: _Solved) -> _Solved:
@@ -296,27 +357,41 @@ def _without(row: _Row, right: Fraction, k: int, solved: _Solved) -> _Solved:
 
 
 def _equation(model: Any, e: int) -> _Solved:
-    """Relation e as sum of c_k q_k = c:  y1 - y1_0 = a0 + a1 (y2 - y2_0), y a joint position or the length of a fixed tendon."""
+    """Relation e as sum of c_k q_k = c:  y1 - y1_0 = a0 + a1 (y2 - y2_0), y a joint position or the
+    length of a fixed tendon.
+    """
     kind, name = int(model.eq_type[e]), model.equality(e).name
     a0, a1, *higher = (Fraction(repr(float(x))) for x in model.eq_data[e][:5])
     if any(higher):
         raise DescriptionError(
-            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear relations are read: a0 + a1 y"
+            f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear "
+            "relations are read: a0 + a1 y"
         )
     row, right = _length(model, kind, int(model.eq_obj1id[e]))
     right += a0
     if int(model.eq_obj2id[e]) >= 0:
         other, reference = _length(model, kind, int(model.eq_obj2id[e]))
-        row = {k: c for k in sorted(row.keys() | other.keys()) if (c := row.get(k, Fraction(0)) - a1 * other.get(k, Fraction(0)))}
+        row = {
+            k: c
+            for k in sorted(row.keys() | other.keys())
+            if (c := row.get(k, Fraction(0)) - a1 * other.get(k, Fraction(0)))
+        }
         right -= a1 * reference
     return row, right
 
 
 def _length(model: Any, kind: int, k: int) -> _Solved:
-    """A joint position, or the length of a fixed tendon, as {joint: coefficient}, and its value at ref."""
+    """A joint position, or the length of a fixed tendon, as {joint: coefficient}, and its value at
+    ref.
+    """
     reference = [Fraction(repr(float(model.qpos0[int(i)]))) for i in model.jnt_qposadr]
     if kind == JOINT_RELATION:
         return {k: Fraction(1)}, reference[k]
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
-    row = {int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w]))) for w in range(first, first + count)}
-    return {i: c for i, c in row.items() if c}, sum((c * reference[i] for i, c in row.items()), start=Fraction(0))
+    row = {
+        int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w])))
+        for w in range(first, first + count)
+    }
+    return {i: c for i, c in row.items() if c}, sum(
+        (c * reference[i] for i, c in row.items()), start=Fraction(0)
+    )

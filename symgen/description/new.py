@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 from urllib.parse import quote
 
-from symgen.description.robot import check_identifier
+from symgen.description.naming import check_identifier
 from symgen.description.schema import SCHEMA, schema_file
 from symgen.errors import DescriptionError
 
 _SKELETON = """\
-# {name}: a robot file. Replace the two joints below by yours; everything after `frames` may be left out.
+# {name}: a robot file. Replace the two joints below by yours; what follows `frames` may go.
 symgen: {schema}                          # version of this format
 name: {name}
 title: Two revolute joints in a vertical plane
@@ -19,25 +19,28 @@ source: where the table below comes from
 gravity: [0, -g, 0]                # acceleration of gravity in frame 0, m/s^2: here y0 is up
 constants: {{D2: 0.5, g: 9.81}}      # SI and rad; they stay symbols in all formulas
 
-# One row per frame, modified Denavit-Hartenberg (Khalil and Kleinfinger 1986), from frame `ant` to frame j:
-#     Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) ;  gamma and b are 0 if left out.
+# One row per frame, modified Denavit-Hartenberg (Khalil and Kleinfinger 1986), from `ant` to j:
+#     Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
+# gamma and b are 0 if left out.
 # sigma: 0 revolute (theta: q1, or q1 + constant), 1 prismatic (r: q1), 2 fixed.
 frames:
   1: {{ant: 0, sigma: 0, alpha: 0, d: 0,  theta: q1, r: 0}}
   2: {{ant: 1, sigma: 0, alpha: 0, d: D2, theta: q2, r: 0}}
 
 # What acts on the joints besides the links. kind: inertia, viscous, coulomb, offset or stiffness.
-# along: all, or {{2: q1 + q2}} for a motor that turns with two joints; viscous and coulomb also take `when: positive` or `negative`.
+# along: all, or {{2: q1 + q2}} for a motor that turns with two joints; viscous and coulomb also
+# take `when: positive` or `negative`.
 elements:
   Ia:     {{kind: inertia, along: all}}
   FV:     {{kind: viscous, along: all}}
   FS:     {{kind: coulomb, along: all}}
   OFFSET: {{kind: offset,  along: all}}
 
-# Motors to joints, for measured records: qm = ratio (q - offset), tau = ratio' (torque_constant * u).
+# Motors to joints, for measured records:
+# qm = ratio (q - offset), tau = ratio' (torque_constant * u).
 # drives: {{ratio: [[100, 0], [0, 100]], offset: [0, 0], torque_constant: [1, 1]}}
 
-# For exciting trajectories: q as [lower, upper] or one number for +-; qd, qdd, tau as largest values.
+# For exciting trajectories: q as [lower, upper] or one number for +-; qd, qdd, tau: largest values.
 # SI, of the joint: a motor of 3000 rpm behind a ratio of 100 allows 3000*2*pi/60/100 rad/s.
 # limits: {{q: [pi, [-pi/2, pi/2]], qd: [3, 3], qdd: [10, 10], tau: [50, 20]}}
 
@@ -47,9 +50,11 @@ elements:
 
 
 def skeleton(name: str, schema: str | None = None) -> str:
-    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no identifier.
+    """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no
+    identifier.
 
-    schema : address of the JSON Schema, for the first line, by which editors complete and check the file; None: no such line.
+    schema : address of the JSON Schema, for the first line, by which editors complete and check the
+    file; None: no such line.
     """
     check_identifier(name, ("name",))
     first = "" if schema is None else f"# yaml-language-server: $schema={schema}\n"
@@ -57,7 +62,8 @@ def skeleton(name: str, schema: str | None = None) -> str:
 
 
 def skeleton_for(file: Path) -> str:
-    """Text of a skeleton for the robot file `file`, with the address of the installed JSON Schema as seen from its folder.
+    """Text of a skeleton for the robot file `file`, with the address of the installed JSON Schema
+    as seen from its folder.
 
     Raises DescriptionError where the name of the file is none of a robot file.
     """
@@ -67,7 +73,9 @@ def skeleton_for(file: Path) -> str:
 
 
 def schema_address(file: Path) -> str:
-    """The installed JSON Schema as seen from the folder of `file`, percent-encoded: editors resolve it without network."""
+    """The installed JSON Schema as seen from the folder of `file`, percent-encoded: editors resolve
+    it without network.
+    """
     try:
         return quote(Path(os.path.relpath(schema_file(), file.resolve().parent)).as_posix())
     except ValueError:  # on another drive

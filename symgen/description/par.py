@@ -1,12 +1,18 @@
 """`.par` files of SYMORO, read into a Robot and what it cannot hold as notes.
 
-    (* Robotname = 'arm' *)   NL = 2   NJ = 2   NF = 2   Type = 0 serial | 1 tree | 2 closed loops
-    ant = {0,1}   sigma = {0,0}   b, d, r, gamma, alpha, mu, theta : NF entries;  theta_j of a revolute joint is th1, t1 or q1 (+ constant)
-    XX ... M, IA, FV, FS : NL entries, a symbol, a number or 0;  G : acceleration of gravity in frame 0, as here
+    (* Robotname = 'arm' *)   NL = 2   NJ = 2   NF = 2
+    Type = 0 serial | 1 tree | 2 closed loops
+    ant = {0,1}   sigma = {0,0}   b, d, r, gamma, alpha, mu, theta : NF entries;
+    theta_j of a revolute joint is th1, t1 or q1 (+ constant)
+    XX ... M, IA, FV, FS : NL entries, a symbol, a number or 0;  G : acceleration of gravity in
+    frame 0, as here
 
-Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that NF = 2 NJ - NL. Comments may stand
-anywhere, lists may break over lines, keys are read in any case, Pi and ^ as in Mathematica. The format has no place for the value of a
-symbol; comments that SYMORO skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise `values` and `start 1`.
+Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that
+NF = 2 NJ - NL. Comments may stand
+anywhere, lists may break over lines, keys are read in any case, Pi and ^ as in Mathematica. The
+format has no place for the value of a
+symbol; comments that SYMORO skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise
+`values` and `start 1`.
 
 W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, Robotica 15, 1997.
 """
@@ -14,26 +20,63 @@ W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, R
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from symgen.description.angles import SNAP, Rounding, reaches, report_angles
 from symgen.description.expression import ONE, PI, Expression, twelfths
+from symgen.description.fields import located
 from symgen.description.grammar import parse
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Loop, Path, Robot, parameter
+from symgen.description.robot import (
+    FIXED,
+    INERTIAL,
+    PRISMATIC,
+    REVOLUTE,
+    Element,
+    Frame,
+    Loop,
+    Path,
+    Robot,
+    parameter,
+)
 from symgen.errors import DescriptionError, ExpressionError
 
 MAX_BYTES, MAX_FRAMES = 200_000, 200
-NEARLY = 1e-5  # rad: a decimal angle this close to a multiple of pi/12 is read as that multiple, and noted
+ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
 
 GEOMETRIC = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
 COUNTS = ("NF", "NL", "NJ", "Type", "is_mobile")
-FAMILIES = {**{name: name for name in INERTIAL}, "IA": "Ia", "FV": "FV", "FS": "FS"}  # name in the file: family
+LISTS = {
+    **{name: name for name in INERTIAL},
+    "IA": "Ia",
+    "FV": "FV",
+    "FS": "FS",
+}  # name in the file: family
 WRENCH = ("FX", "FY", "FZ", "CX", "CY", "CZ")
 BASE_MOTION = ("W0", "WP0", "V0", "VP0")
-NAMES_ONLY = ("QP", "QDP", "GAM")  # names of rates, accelerations and torques: nothing of the mechanism
-KNOWN = {key.lower(): key for key in (*GEOMETRIC, *COUNTS, *FAMILIES, *WRENCH, *BASE_MOTION, *NAMES_ONLY, "G", "Z", "eta", "k")}
+NAMES_ONLY = (
+    "QP",
+    "QDP",
+    "GAM",
+)  # names of rates, accelerations and torques: nothing of the mechanism
+KEYS = {
+    key.lower(): key
+    for key in (
+        *GEOMETRIC,
+        *COUNTS,
+        *LISTS,
+        *WRENCH,
+        *BASE_MOTION,
+        *NAMES_ONLY,
+        "G",
+        "Z",
+        "eta",
+        "k",
+    )
+}
 
 _ENTRY = re.compile(r"\s*([A-Za-z_]\w{0,39})\s*=\s*(\{[^{}=]*\}|[^\s{};=]+)\s*;?", re.ASCII)
 _IDENTITY = "1000010000100001"
@@ -53,22 +96,30 @@ class _Par:
         Tables of the comments: constants, values, start 1, ...
     notes : list of str
         What was read otherwise than written.
+    roundings : list
+        Angles near multiples of pi/12.
+    exact : bool
+        Whether they stay as they are.
     """
 
     name: str = ""
     lists: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    roundings: list[Rounding] = field(default_factory=list)
+    exact: bool = False
 
     def line(self, path: Path) -> int:
         """Line of the entry nearest to the path of a field of the Robot."""
-        key = KNOWN.get(str(path[-1]).lower() if path else "", "ant")
+        key = KEYS.get(str(path[-1]).lower() if path else "", "ant")
         items = self.lists.get(key) or [("", 1)]
         j = path[1] if len(path) > 1 and isinstance(path[1], int) else 1
         return items[min(j, len(items)) - 1][1]
 
 
-def read_par(content: bytes, file: str, constants: Mapping[str, float] | None = None) -> tuple[Robot, tuple[str, ...]]:
+def read_par(
+    content: bytes, file: str, constants: Mapping[str, float] | None = None, *, exact: bool = False
+) -> tuple[Robot, tuple[str, ...]]:
     """The robot of a `.par` file, and notes on what was read otherwise than written.
 
     Parameters
@@ -78,25 +129,33 @@ def read_par(content: bytes, file: str, constants: Mapping[str, float] | None = 
     file : str
         Its name.
     constants : mapping, SI and rad
-        Values of the geometric symbols and of gravity; they stand before those of a comment in the file.
+        Values of the geometric symbols and of gravity; they stand before those of a comment in the
+        file.
+    exact : bool
+        As of `symgen.load_robot`.
 
     Raises
     ------
     DescriptionError
         No `.par` file, no robot, or a symbol without value; the message names file and line.
     """
-    par = _Par()
-    try:
+    par = _Par(exact=exact)
+    with located(file, par.line):
         _scan(_text(content), par)
         robot = _robot(par, dict(constants or {}), file, hashlib.sha256(content).hexdigest())
-    except DescriptionError as error:
-        raise DescriptionError(error.message, path=error.path, file=file, line=error.line or par.line(error.path)) from error.__cause__
-    return robot, tuple(par.notes)
+    edges = [
+        (str(f.ant), str(f.j), sum(abs(x.value(robot.constants)) for x in (f.b, f.d, f.r0)))
+        for f in robot.frames
+    ]
+    angles, notes = report_angles(file, par.roundings, reaches(edges, "0"), exact=exact)
+    return replace(robot, angles=angles), (*par.notes, *notes)
 
 
 def _text(content: bytes) -> str:
     if len(content) > MAX_BYTES:
-        raise DescriptionError(f"more than {MAX_BYTES} bytes; a .par file has a few thousand", line=1)
+        raise DescriptionError(
+            f"more than {MAX_BYTES} bytes; a .par file has a few thousand", line=1
+        )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -113,23 +172,37 @@ def _scan(text: str, par: _Par) -> None:
             start = position + len(text[position:]) - len(text[position:].lstrip())
             line = text.count("\n", 0, start) + 1
             raise DescriptionError(
-                f"found {text[start : start + 30].splitlines()[0]!r}; expected `name = value` or `name = {{a,b}}`", line=line
+                (
+                    f"found {text[start : start + 30].splitlines()[0]!r}; expected `name = value` "
+                    "or "
+                    f"`name = {{a,b}}`"
+                ),
+                line=line,
             )
-        key, first = KNOWN.get(entry.group(1).lower(), entry.group(1)), text.count("\n", 0, entry.start(2)) + 1
+        key, first = (
+            KEYS.get(entry.group(1).lower(), entry.group(1)),
+            text.count("\n", 0, entry.start(2)) + 1,
+        )
         if key in par.lists:
-            raise DescriptionError(f"{key} is given twice (first on line {par.lists[key][0][1]}); keep one", line=first)
-        if key not in KNOWN.values():
+            raise DescriptionError(
+                f"{key} is given twice (first on line {par.lists[key][0][1]}); keep one", line=first
+            )
+        if key not in KEYS.values():
             par.notes.append(f"line {first}: key {key} is not read")
         items, line = [], first
         for item in entry.group(2).strip("{}").split(","):
-            items.append((item.strip(), line + len(item[: len(item) - len(item.lstrip())].splitlines()[1:])))
+            items.append(
+                (item.strip(), line + len(item[: len(item) - len(item.lstrip())].splitlines()[1:]))
+            )
             line += item.count("\n")
         par.lists[key] = items
         position = entry.end()
 
 
 def _without_comments(text: str, par: _Par) -> str:
-    """`text` with blanks for its comments, which go into `par`; one pass, however many a file opens."""
+    """`text` with blanks for its comments, which go into `par`; one pass, however many a file
+    opens.
+    """
     parts, position = [], 0
     while (start := text.find("(*", position)) >= 0:
         end, line = text.find("*)", start + 2) + 2, text.count("\n", 0, start) + 1
@@ -151,11 +224,15 @@ def _comment(text: str, line: int, par: _Par) -> None:
             try:
                 table[name] = float(_expression(value, line))
             except (KeyError, ValueError, OverflowError, ZeroDivisionError) as error:
-                raise DescriptionError(f"{numbers.group(1)}: {item.strip()[:60]!r}; expected name = number", line=line) from error
+                raise DescriptionError(
+                    f"{numbers.group(1)}: {item.strip()[:60]!r}; expected name = number", line=line
+                ) from error
 
 
 def _expression(text: str, line: int) -> Expression:
-    """An expression of the file, in the grammar of robot files but for Pi, ^, [ ] and capital functions."""
+    """An expression of the file, in the grammar of robot files but for Pi, ^, [ ] and capital
+    functions.
+    """
     text = re.sub(r"\b(Pi|PI|Sin|Cos|Tan|Sqrt)\b", lambda word: word.group().lower(), text)
     try:
         return parse(text.replace("^", "**").replace("[", "(").replace("]", ")"))
@@ -164,11 +241,7 @@ def _expression(text: str, line: int) -> Expression:
 
 
 def _count(par: _Par, key: str, default: int | None = None) -> int:
-    if key not in par.lists:
-        if default is None:
-            raise DescriptionError(f"{key} is missing; add `{key} = ` and a whole number", line=1)
-        return default
-    return _whole(par.lists[key][0], key)
+    return _whole(_list(par, key, 1, None if default is None else str(default))[0], key)
 
 
 def _whole(item: tuple[str, int], key: str) -> int:
@@ -181,7 +254,9 @@ def _whole(item: tuple[str, int], key: str) -> int:
 def _list(par: _Par, key: str, n: int, default: str | None = None) -> list[tuple[str, int]]:
     if key not in par.lists:
         if default is None:
-            raise DescriptionError(f"{key} is missing; add `{key} = {{...}}` with {n} entries", line=1)
+            raise DescriptionError(
+                f"{key} is missing; add `{key} = {{...}}` with {n} entries", line=1
+            )
         return [(default.format(j), 1) for j in range(1, n + 1)]
     items = par.lists[key]
     if len(items) != n:
@@ -194,23 +269,42 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
     NF, kind = _count(par, "NF", 2 * NJ - NL), _count(par, "Type", 0)
     if not (0 < NL <= NJ and NF == 2 * NJ - NL and NF <= MAX_FRAMES):
         raise DescriptionError(
-            f"NL = {NL}, NJ = {NJ}, NF = {NF}; expected NL <= NJ and NF = 2 NJ - NL, at most {MAX_FRAMES}", line=par.lists["NL"][0][1]
+            (
+                f"NL = {NL}, NJ = {NJ}, NF = {NF}; expected NL <= NJ and NF = 2 NJ - NL, at most "
+                f"{MAX_FRAMES}"
+            ),
+            line=par.lists["NL"][0][1],
         )
     if kind not in (0, 1, 2) or (kind == 2) != (NJ > NL):
         raise DescriptionError(
-            f"Type = {kind} with NL = {NL}, NJ = {NJ}; expected 0 serial or 1 tree with NJ = NL, 2 closed loops with NJ > NL",
+            (
+                f"Type = {kind} with NL = {NL}, NJ = {NJ}; expected 0 serial or 1 tree with NJ = "
+                "NL, "
+                "2 "
+                "closed loops with NJ > NL"
+            ),
             line=par.lists["NL"][0][1],
         )
     if par.lists.get("is_mobile", [("0", 1)])[0][0] not in ("0", "False", "false"):
-        raise DescriptionError("is_mobile: a base that moves is not read; expected 0", line=par.lists["is_mobile"][0][1])
+        raise DescriptionError(
+            "is_mobile: a base that moves is not read; expected 0",
+            line=par.lists["is_mobile"][0][1],
+        )
     frames = _frames(par, NF, loops=kind == 2)
     gravity = [_expression(*item) for item in _list(par, "G", 3, "0")]
-    used = {s for f in frames for e in (f.gamma, f.b, f.alpha, f.d, f.theta, f.r) for s in e.symbols}.union(*(e.symbols for e in gravity))
-    known = {**par.numbers.get("constants", {}), **constants}
-    if missing := sorted(s for s in used - set(known) if not re.fullmatch(r"q\d+", s)):
+    used = {
+        s for f in frames for e in (f.gamma, f.b, f.alpha, f.d, f.theta, f.r) for s in e.symbols
+    }.union(*(e.symbols for e in gravity))
+    numbers = {**par.numbers.get("constants", {}), **constants}
+    if missing := sorted(s for s in used - set(numbers) if not re.fullmatch(r"q\d+", s)):
         example = ", ".join(f"{s} = ..." for s in missing)
         raise DescriptionError(
-            f"no value of {', '.join(missing)}; add a line (* constants: {example} *), or convert with --constant {missing[0]}=...", line=1
+            (
+                f"no value of {', '.join(missing)}; add a line (* constants: {example} *), or "
+                "convert "
+                f"with --constant {missing[0]}=..."
+            ),
+            line=1,
         )
     values, massless, keys = _parameters(par, NL, {f.j for f in frames if f.sigma == FIXED})
     _note_rest(par)
@@ -218,7 +312,7 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
         name=re.sub(r"\W", "_", par.name or file.rpartition(".")[0], flags=re.ASCII),
         frames=frames,
         gravity=(gravity[0], gravity[1], gravity[2]),
-        constants={name: value for name, value in known.items() if name in used},
+        constants={name: value for name, value in numbers.items() if name in used},
         elements=tuple(
             Element(family, kind, {j: {j: ONE} for j in keys[family]}, {})
             for family, kind in (("Ia", "inertia"), ("FV", "viscous"), ("FS", "coulomb"))
@@ -235,7 +329,9 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
 def _start(par: _Par, k: int) -> dict[int, float]:
     table = par.numbers.get(f"start {k}", {})
     if wrong := [name for name in table if not re.fullmatch(r"q[0-9]{1,4}", name)]:
-        raise DescriptionError(f"start {k}: {wrong[0][:30]!r} is no joint; expected q1, q2, ...", line=1)
+        raise DescriptionError(
+            f"start {k}: {wrong[0][:30]!r} is no joint; expected q1, q2, ...", line=1
+        )
     return {int(name[1:]): value for name, value in table.items()}
 
 
@@ -248,10 +344,13 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
     for k in range(NF):
         j, ant, sigma, mu = k + 1, *(_whole(rows[key][k], key) for key in ("ant", "sigma", "mu"))
         if sigma not in (REVOLUTE, PRISMATIC, FIXED):
-            raise DescriptionError(f"joint {j}: sigma = {sigma}; expected 0 revolute, 1 prismatic or 2 fixed", line=rows["sigma"][k][1])
+            raise DescriptionError(
+                f"joint {j}: sigma = {sigma}; expected 0 revolute, 1 prismatic or 2 fixed",
+                line=rows["sigma"][k][1],
+            )
         e = {key: _expression(*rows[key][k]) for key in ("gamma", "b", "alpha", "d", "theta", "r")}
         for key in ("gamma", "alpha", "theta"):
-            e[key] = _near_quarter(e[key], f"{key}{j}", par)
+            e[key] = _rounded(e[key], f"{key} of frame {j} (line {rows[key][k][1]})", str(j), par)
         moved = {REVOLUTE: "theta", PRISMATIC: "r"}.get(sigma)
         if moved is not None:
             variable = _variable(e[moved], j, moved, rows[moved][k][1])
@@ -262,45 +361,64 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
                 free.append(j)
         frames.append(Frame(j, ant, sigma, mu if moved else 0, **e))
     if free:
-        par.notes.append(f"mu = 0 of joints {', '.join(map(str, free))} read as actuated: there is no loop that could move them")
+        par.notes.append(
+            f"mu = 0 of joints {', '.join(map(str, free))} read as actuated: there is no loop that "
+            "could move them"
+        )
     for f in frames:
         for key in ("gamma", "b", "alpha", "d", "theta", "r"):
             if shared := (getattr(f, key).symbols - {f.q}) & set(variables):
                 raise DescriptionError(
-                    f"{key}{f.j}: {', '.join(sorted(shared))} is the variable of a joint; expected constants", line=rows[key][f.j - 1][1]
+                    (
+                        f"{key}{f.j}: {', '.join(sorted(shared))} is the variable of a joint; "
+                        "expected "
+                        "constants"
+                    ),
+                    line=rows[key][f.j - 1][1],
                 )
     return tuple(frames)
 
 
 def _variable(e: Expression, j: int, key: str, line: int) -> str:
-    """Name of the joint variable in theta_j or r_j: th1, t1, theta1, q1 or r1, else the one symbol that stands alone."""
+    """Name of the joint variable in theta_j or r_j: th1, t1, theta1, q1 or r1, else the one symbol
+    that stands alone.
+    """
     names = {"theta": (f"th{j}", f"t{j}", f"theta{j}", f"q{j}"), "r": (f"r{j}", f"q{j}")}[key]
     usual = sorted((s for s in e.symbols if s.lower() in names), key=lambda s: s not in names)
     alone = [s for s in e.symbols if e == Expression.symbol(s)]
     if not (usual or alone):
-        raise DescriptionError(f"{key}{j} = {e}; expected the joint variable {', '.join(names)}, alone or plus a constant", line=line)
+        raise DescriptionError(
+            (
+                f"{key}{j} = {e}; expected the joint variable {', '.join(names)}, alone or plus a "
+                "constant"
+            ),
+            line=line,
+        )
     return (usual or alone)[0]
 
 
-def _near_quarter(e: Expression, what: str, par: _Par) -> Expression:
+def _rounded(e: Expression, name: str, frame: str, par: _Par) -> Expression:
     """Decimal approximations of multiples of pi/12, as programs write them, become exact."""
     c = e.terms.get(())
-    if c is None or len(e.terms) > 2:
+    k = None if c is None or len(e.terms) > 2 else twelfths(float(c), SNAP)
+    if not k or c is None:
         return e
-    k = twelfths(float(c), NEARLY)
-    if not k:
-        return e
-    exact = PI * Fraction(k, 12)
-    par.notes.append(f"{what}: {float(c)!r} read as {exact}")
-    return e - c + exact
+    written = abs(k * (math.pi / 12) - float(c)) > ALL_DIGITS
+    if written:
+        par.roundings.append((name, float(c), frame))
+    return e if par.exact and written else e - c + PI * Fraction(k, 12)
 
 
-def _parameters(par: _Par, NL: int, fixed: set[int]) -> tuple[dict[str, float], set[int], dict[str, list[int]]]:
-    """Values by name, links whose ten inertial parameters are 0, and the joints that have Ia, FV, FS."""
+def _parameters(
+    par: _Par, NL: int, fixed: set[int]
+) -> tuple[dict[str, float], set[int], dict[str, list[int]]]:
+    """Values by name, links whose ten inertial parameters are 0, and the joints that have Ia, FV,
+    FS.
+    """
     values: dict[str, float] = {}
     zero: dict[str, set[int]] = {}
     renamed: list[str] = []
-    for key, family in FAMILIES.items():
+    for key, family in LISTS.items():
         default = key + "{}" if key in INERTIAL else "0"
         zero[family] = set()
         for j, item in enumerate(_list(par, key, NL, default), start=1):
@@ -319,7 +437,9 @@ def _parameters(par: _Par, NL: int, fixed: set[int]) -> tuple[dict[str, float], 
     if part:
         par.notes.append(f"0 in the file, here parameters of value 0: {', '.join(part)}")
         values |= dict.fromkeys(part, 0.0)
-    keys = {p: [j for j in range(1, NL + 1) if j not in zero[p] | fixed] for p in ("Ia", "FV", "FS")}
+    keys = {
+        p: [j for j in range(1, NL + 1) if j not in zero[p] | fixed] for p in ("Ia", "FV", "FS")
+    }
     present = {parameter(p, j) for p in INERTIAL for j in range(1, NL + 1) if j not in massless}
     present |= {parameter(p, j) for p, joints in keys.items() for j in joints}
     values |= par.numbers.get("values", {})
@@ -330,13 +450,17 @@ def _value(e: Expression, name: str, line: int) -> float:
     try:
         return float(e)
     except (ValueError, OverflowError, ZeroDivisionError) as error:
-        raise DescriptionError(f"{name}: {e} has no finite real value; expected a number or a symbol", line=line) from error
+        raise DescriptionError(
+            f"{name}: {e} has no finite real value; expected a number or a symbol", line=line
+        ) from error
 
 
 def _note_rest(par: _Par) -> None:
     """Notes on what a Robot has no place for."""
     if any(text != "0" for key in WRENCH for text, _ in par.lists.get(key, ())):
-        par.notes.append("forces of the environment (FX ... CZ) are not read; a robot here moves freely")
+        par.notes.append(
+            "forces of the environment (FX ... CZ) are not read; a robot here moves freely"
+        )
     for key in (*BASE_MOTION, "eta", "k"):
         if any(text not in ("0", "") for text, _ in par.lists.get(key, ())):
             par.notes.append(f"{key} is not read: the base rests and joints are rigid")

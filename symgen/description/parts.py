@@ -1,55 +1,131 @@
-"""The parts of a robot: rows of the frame table, elements on the joints, loops, drives; `robot` says what they mean together."""
+"""The tables of a robot: rows of the frame table, elements on the joints, loops, drives, limits.
+
+An element acts with one parameter for each key, called family + key:
+
+    along {j: G}:  s = G q,  Gamma += G' (c sdd | c sd | c sign(sd) | c | c s)
+    form  {j: B}:  Gamma += c B qdd | c B qd | c B q
+
+for inertia, viscous, coulomb, offset, stiffness; forms for inertia, viscous, stiffness. With
+`when`, viscous and coulomb elements act in motion along s in this direction only.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import partial
+from typing import Annotated, Any, Literal, NamedTuple
 
-from symgen.description.expression import Expression
+from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic.dataclasses import dataclass
+
+from symgen.description.expression import ONE, Expression
+from symgen.description.fields import (
+    CONFIG,
+    UNWRITTEN,
+    Constant,
+    Declared,
+    Interval,
+    Numeric,
+    Position,
+    Text,
+    Whole,
+    Written,
+)
+from symgen.description.grammar import parse
+from symgen.errors import DescriptionError, ExpressionError
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # the rest of eq. (4), link by link
-USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), ("inertia", "viscous", "coulomb", "offset", "stiffness"), strict=True))
-KINDS = ("inertia", "viscous", "coulomb", "offset", "stiffness")
+
+
+class Kind(NamedTuple):
+    """A kind of element: units of its parameter (revolute, prismatic), what it is, whether it takes
+    `form` and `when`.
+    """
+
+    units: tuple[str, str]
+    meaning: str
+    form: bool = False
+    when: bool = False
+
+
+KINDS = {
+    "inertia": Kind(("kg*m**2", "kg"), "inertia of the actuator", form=True),
+    "viscous": Kind(("N*m*s/rad", "N*s/m"), "viscous friction", form=True, when=True),
+    "coulomb": Kind(("N*m", "N"), "Coulomb friction", when=True),
+    "offset": Kind(("N*m", "N"), "constant torque or force"),
+    "stiffness": Kind(("N*m/rad", "N/m"), "stiffness", form=True),
+}
+USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), KINDS, strict=False))
 DIRECTIONS = ("positive", "negative")
-GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")  # of a row, in the order in which they are applied
+GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")  # of a row, in the order of application
 ANGLES = ("gamma", "alpha", "theta")
 
-Path = tuple[str | int, ...]  # keys that lead to a field of a robot file
 Row = Mapping[int, Expression]  # {j: G_j}: s = sum_j G_j q_j, the G_j constant
 Form = Mapping[tuple[int, int], Expression]  # {(i, j): B_ij}, symmetric, the B_ij constant
 Limits = Mapping[str, tuple[float, ...] | tuple[tuple[float, float], ...]]
 
 
-@dataclass(frozen=True)
+def _moved(value: int | None, info: ValidationInfo) -> int:
+    return int(info.data.get("sigma") != FIXED) if value is None else value
+
+
+@dataclass(frozen=True, config=CONFIG)
 class Frame:
-    """One row of the table: frame j on link j, moved by joint j against its antecedent.
+    """One row of the table of Khalil and Kleinfinger."""
 
-    Attributes
-    ----------
-    j, ant : int
-        Number of the frame, and of its antecedent (0: the base).
-    sigma : int
-        REVOLUTE, PRISMATIC or FIXED.
-    mu : int
-        1 actuated, 0 passive or fixed.
-    gamma, alpha, theta : Expression, rad
-        Angles; theta holds q_j where sigma is REVOLUTE.
-    b, d, r : Expression, m
-        Lengths; r holds q_j where sigma is PRISMATIC.
-    """
-
-    j: int
-    ant: int
-    sigma: int
-    mu: int
-    gamma: Expression
-    b: Expression
-    alpha: Expression
-    d: Expression
-    theta: Expression
-    r: Expression
+    j: Annotated[int, *UNWRITTEN]
+    ant: Annotated[Whole, Field(description="antecedent frame, 0 for the base")]
+    sigma: Annotated[Whole, Field(description="0 revolute, 1 prismatic, 2 fixed")]
+    mu: Annotated[
+        int,
+        Written(Whole | None),
+        AfterValidator(_moved),
+        Field(
+            default=None,
+            validate_default=True,
+            description="1 actuated, 0 passive; default 1, for a fixed frame 0",
+        ),
+    ]
+    gamma: Annotated[
+        Constant,
+        Field(
+            default="0",
+            validate_default=True,
+            description=(
+                "rotation about z of the antecedent frame first, rad; of trees and loops only"
+            ),
+        ),
+    ]
+    b: Annotated[
+        Constant,
+        Field(
+            default="0",
+            validate_default=True,
+            description="distance along that z, m; of trees and loops only",
+        ),
+    ]
+    alpha: Annotated[Constant, Field(description="angle between the z axes, about x, rad: pi/2")]
+    d: Annotated[Constant, Field(description="distance between the z axes, along x, m: D2")]
+    theta: Annotated[
+        Position,
+        Field(
+            description=(
+                "angle between the x axes, about z_j, rad; q1 or q1 + pi/2 where sigma is 0"
+            )
+        ),
+    ]
+    r: Annotated[
+        Position,
+        Field(
+            description=(
+                "distance between the x axes, along z_j, m; q1 or q1 + R1 where sigma is 1"
+            )
+        ),
+    ]
 
     @property
     def q(self) -> str:
@@ -67,30 +143,58 @@ class Frame:
         return self.r - Expression.symbol(self.q) if self.sigma == PRISMATIC else self.r
 
 
-@dataclass(frozen=True)
+def _rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
+    """{j: text}, or all, to {j: row}."""
+    if texts == "all":
+        return {f.j: {f.j: ONE} for f in declared.frames if f.mu}
+    return _reduced(row_of, texts, declared)
+
+
+def _reduced(
+    reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
+) -> dict[int, Any]:
+    """{j: text} to {j: row or form}."""
+    joints = tuple(f.j for f in declared.frames if f.sigma != FIXED)
+    result: dict[int, Any] = {}
+    for j, text in texts.items() if joints else ():
+        try:
+            result[j] = reduce(parse(text, declared.variables), joints)
+        except (ValueError, ExpressionError) as error:
+            raise DescriptionError(str(error), path=(j,)) from error
+    return result
+
+
+@dataclass(frozen=True, config=CONFIG)
 class Element:
-    """Inertia, friction, offset or spring on the joint coordinates; one parameter per key, called family + key.
+    """Inertia, friction, offset or spring on the joint coordinates."""
 
-    along {j: G}:  s = G q,  Gamma += G' (c sdd | c sd | c sign(sd) | c | c s)   for inertia, viscous, coulomb, offset, stiffness
-    form  {j: B}:  Gamma += c B qdd | c B qd | c B q                             for inertia, viscous, stiffness
-
-    Attributes
-    ----------
-    family : str
-        Name of the parameters without their key.
-    kind : str
-        One of KINDS.
-    along, form : mapping
-        Row G or form B by key.
-    when : str or None
-        One of DIRECTIONS: viscous and coulomb elements act in motion along s in this direction only.
-    """
-
-    family: str
-    kind: str
-    along: Mapping[int, Row]
-    form: Mapping[int, Form]
-    when: str | None = None
+    family: Annotated[str, *UNWRITTEN]
+    kind: Annotated[
+        str,
+        Field(description=f"one of {', '.join(KINDS)}", json_schema_extra={"enum": list(KINDS)}),
+    ]
+    along: Annotated[
+        Mapping[int, Row],
+        Written(Literal["all"] | dict[Whole, Text], _rows),
+        Field(
+            default={},
+            description=(
+                "{6: q5 + q6} (6 numbers the parameter, FSM6), or all: every actuated joint"
+            ),
+        ),
+    ]
+    form: Annotated[
+        Mapping[int, Form],
+        Written(dict[Whole, Text], partial(_reduced, form_of)),
+        Field(default={}, description="quadratic forms: {6: q6**2 + 2*q5*q6}"),
+    ]
+    when: Annotated[
+        str | None,
+        Field(
+            description="direction of motion: positive or negative",
+            json_schema_extra={"enum": [*DIRECTIONS, None]},
+        ),
+    ] = None
 
     @property
     def keys(self) -> tuple[int, ...]:
@@ -98,24 +202,142 @@ class Element:
         return tuple(sorted({*self.along, *self.form}))
 
 
-@dataclass(frozen=True)
+def by_joint(texts: Mapping[str, Any], declared: Declared) -> dict[int, Any]:
+    """{q3: x} to {3: x}."""
+    for q in texts:
+        if not re.fullmatch(r"q[1-9][0-9]{0,8}", q):
+            raise DescriptionError(f"{q!r} is no joint; expected q1, q2, ...", path=(q,))
+    return {int(q[1:]): x for q, x in texts.items()}
+
+
+@dataclass(frozen=True, config=CONFIG)
 class Loop:
-    """Frame `twin` (FIXED) coincides with the frame of the joint `cut`; `start` (rad, m) picks the assembly mode of a general loop."""
+    """A closed loop: frame `twin`, fixed, coincides with the frame of the cut joint."""
 
-    cut: int
-    twin: int
-    start: Mapping[int, float] = field(default_factory=dict)
+    cut: Annotated[Whole, Field(description="number of the cut joint: passive, without a link")]
+    twin: Annotated[
+        Whole,
+        Field(
+            description="number of the fixed frame (sigma 2) at the same place on the other branch"
+        ),
+    ]
+    start: Annotated[
+        Mapping[int, float],
+        Written(dict[str, Numeric], by_joint),
+        Field(description="picks the assembly mode: {q3: 1.2}"),
+    ] = Field(default={})
 
 
-@dataclass(frozen=True)
+def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[float, ...]:
+    """One number for each actuated joint."""
+    if isinstance(value, list):
+        return tuple(value)
+    return tuple(value or 0.0 for f in declared.frames if f.mu)
+
+
+@dataclass(frozen=True, config=CONFIG)
 class Drives:
-    """qm = ratio (q - offset), tau = ratio' (torque_constant * u); for the runtime only. Offsets in rad or m."""
+    """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
 
-    ratio: tuple[tuple[float, ...], ...]
-    offset: tuple[float, ...]
-    torque_constant: tuple[float, ...]
+    ratio: Annotated[
+        tuple[tuple[float, ...], ...],
+        Written(list[list[Numeric]], lambda rows, _: tuple(map(tuple, rows))),
+        Field(
+            description="one row per motor: [[100, 0], [0, 80]]; rad per m for a prismatic joint"
+        ),
+    ]
+    offset: Annotated[
+        tuple[float, ...],
+        Written(list[Numeric] | None, _of_motors),
+        Field(
+            default=None,
+            validate_default=True,
+            description="joint positions where the motors read 0; default 0",
+        ),
+    ]
+    torque_constant: Annotated[
+        tuple[float, ...],
+        Written(list[Numeric] | Numeric, _of_motors),
+        Field(
+            default=1.0,
+            validate_default=True,
+            description="N m/A; a number, or one per motor",
+        ),
+    ]
+
+
+@dataclass(frozen=True, config=CONFIG)
+class LimitsTable:
+    """For exciting trajectories, one entry per actuated joint."""
+
+    q: Annotated[
+        list[Interval] | None,
+        Field(description="[lower, upper], or one number for +- that number"),
+    ] = None
+    qd: Annotated[list[Numeric] | None, Field(description="largest speeds, rad/s or m/s")] = None
+    qdd: Annotated[
+        list[Numeric] | None, Field(description="largest accelerations, rad/s^2 or m/s^2")
+    ] = None
+    tau: Annotated[list[Numeric] | None, Field(description="largest torques, N m or N")] = None
 
 
 def parameter(family: str, j: int) -> str:
     """Name of a standard parameter: family + link, e.g. XX2."""
     return f"{family}{j}"
+
+
+def row_of(e: Expression, joints: tuple[int, ...]) -> dict[int, Expression]:
+    """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in
+    the q's.
+    """
+    row = {j: e.coefficient(f"q{j}") for j in joints}
+    rest = e
+    for j, c in row.items():
+        rest = rest - c * Expression.symbol(f"q{j}")
+    if rest or any(moves(c) for c in row.values()):
+        raise ValueError(f"{e} is not a combination of joint positions such as q5 + q6 or 2*q3")
+    return {j: c for j, c in row.items() if c}
+
+
+def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Expression]:
+    """The symmetric matrix B of the quadratic form q' B q; raises ValueError if the expression is
+    not one.
+    """
+    form: dict[tuple[int, int], Expression] = {}
+    rest = e
+    for i in joints:
+        for j in joints:
+            if i > j:
+                continue
+            c = e.coefficient(f"q{i}", f"q{j}")
+            rest = rest - c * Expression.symbol(f"q{i}") * Expression.symbol(f"q{j}")
+            if c:
+                half = c if i == j else c * Fraction(1, 2)
+                form[i, j] = form[j, i] = half
+    if rest or any(moves(c) for c in form.values()):
+        raise ValueError(
+            f"{e} is not a quadratic form in the joint positions such as q6**2 + 2*q5*q6"
+        )
+    return form
+
+
+def moves(c: Expression) -> bool:
+    """Whether a joint position occurs in `c`."""
+    return any(re.fullmatch(r"q\d+", name) for name in c.symbols)
+
+
+def determinant(matrix: tuple[tuple[float, ...], ...]) -> Fraction:
+    """Exact determinant of a square matrix of floats."""
+    a = [[Fraction(x) for x in row] for row in matrix]
+    det = Fraction(1)
+    for k in range(len(a)):
+        pivot = next((i for i in range(k, len(a)) if a[i][k]), None)
+        if pivot is None:
+            return Fraction(0)
+        if pivot != k:
+            a[k], a[pivot], det = a[pivot], a[k], -det
+        det *= a[k][k]
+        for i in range(k + 1, len(a)):
+            if factor := a[i][k] / a[k][k]:
+                a[i] = [x - factor * y for x, y in zip(a[i], a[k], strict=True)]
+    return det

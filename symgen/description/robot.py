@@ -1,27 +1,49 @@
-"""What a robot is: frames of Khalil and Kleinfinger, elements on its joints, loops, and nothing about how it is derived.
+"""What a robot is: frames of Khalil and Kleinfinger, elements on its joints, loops, and nothing
+about how it is derived.
 
-Modified Denavit-Hartenberg [KK86]: frame j, antecedent i = ant(j), sigma_j = 0 revolute, 1 prismatic, 2 fixed,
+Modified Denavit-Hartenberg [KK86]: frame j, antecedent i = ant(j), sigma_j = 0 revolute, 1
+prismatic, 2 fixed,
 
     iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) .
 
-Signs, stated once. `gravity` is the acceleration of gravity in frame 0 (m/s^2); a body at rest with z0 up has
-gravity (0, 0, -g). Joint torque Gamma is what the actuator delivers, so friction enters with a plus:
-Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET. Inertia XX..ZZ are the tensor elements (XY = -integral x y dm) about the origin
+Signs, stated once. `gravity` is the acceleration of gravity in frame 0 (m/s^2); a body at rest with
+z0 up has
+gravity (0, 0, -g). Joint torque Gamma is what the actuator delivers, so friction enters with a
+plus:
+Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET. Inertia XX..ZZ are the tensor elements (XY =
+-integral x y dm) about the origin
 of the link frame, MX MY MZ = M (centre of mass). SI and rad.
 
-[KK86] W. Khalil, J.-F. Kleinfinger, A new geometric notation for open and closed-loop robots, ICRA 1986.
+[KK86] W. Khalil, J.-F. Kleinfinger, A new geometric notation for open and closed-loop robots, ICRA
+1986.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import fields
+from functools import cached_property, partial
 from types import MappingProxyType
+from typing import Annotated, Any
 
-from symgen.description import checks
-from symgen.description.checks import check_identifier
+from pydantic import BeforeValidator, Field
+from pydantic.dataclasses import dataclass
+
+from symgen.description.checks import check_robot
+from symgen.description.distal import khalil_frames
 from symgen.description.expression import ONE, Expression
+from symgen.description.fields import (
+    CONFIG,
+    UNWRITTEN,
+    Constant,
+    Declared,
+    Given,
+    Numeric,
+    Path,
+    Position,
+    Whole,
+    Written,
+)
 from symgen.description.parts import (
     DIRECTIONS,
     FIXED,
@@ -36,9 +58,10 @@ from symgen.description.parts import (
     Form,
     Frame,
     Limits,
+    LimitsTable,
     Loop,
-    Path,
     Row,
+    by_joint,
     parameter,
 )
 
@@ -58,83 +81,138 @@ __all__ = [
     "Path",
     "Robot",
     "Row",
-    "check_identifier",
     "one_joint_parameters",
     "parameter",
 ]
 
 
-@dataclass(frozen=True)
-class Robot:
-    """A mechanism, complete and checked; raises DescriptionError, with the path of the field, if it is none.
+def _frames(rows: Mapping[int, Frame], declared: Declared) -> tuple[Frame, ...]:
+    frames = tuple(rows[j] for j in sorted(rows))
+    declared.frames = khalil_frames(frames) if declared.distal else frames
+    return declared.frames
 
-    Attributes
-    ----------
-    name : str
-        Identifier; names the emitted module.
-    frames : tuple of Frame
-        Numbered 1, 2, 3 ... from the base outward.
-    gravity : tuple of Expression, m/s^2
-        Acceleration of gravity in frame 0.
-    title, source : str
-        One line each: what the robot is, where its table comes from.
-    constants : mapping, SI and rad
-        Numbers of the symbols of frames, gravity and elements.
-    elements : tuple of Element
-        What acts on the joints besides the links.
-    loops : tuple of Loop
-        Closed loops.
-    constraints : mapping
-        Positions of passive joints, by number, as expressions of other joints.
-    massless : frozenset of int
-        Links without inertial parameters.
-    drives : Drives or None
-        Motors to joints, for measured records.
-    limits : mapping, SI and rad
-        One entry per actuated joint: q as (lower, upper), qd, qdd and tau as largest absolute values.
-    values : mapping, SI
-        Known standard parameters; never used in the derivation.
-    labels : mapping
-        Names of joints and fixed frames elsewhere (URDF, messages, columns of records), by number; shown, never used in formulas.
-    file : str
-        Name of the robot file, without its folder.
-    sha256 : str
-        Hash of its bytes.
+
+def _massless(links: list[int], declared: Declared) -> frozenset[int]:
+    """These links, and the ends that a distal table gets."""
+    return frozenset((*links, *(f.j for f in declared.frames[declared.rows :])))
+
+
+def _keyed(name: str) -> BeforeValidator:
+    """Rows of a table with their keys as the field `name`."""
+
+    def row_of(key: Any, row: Any) -> Any:
+        return {name: Given(key), **row} if isinstance(row, dict) else row
+
+    return BeforeValidator(
+        lambda rows: (
+            {key: row_of(key, row) for key, row in rows.items()} if isinstance(rows, dict) else rows
+        )
+    )
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Robot:
+    """A mechanism, complete and checked; raises DescriptionError, with the path of the field, if it
+    is none. Numbers in SI and rad.
     """
 
-    name: str
-    frames: tuple[Frame, ...]
-    gravity: tuple[Expression, Expression, Expression]
-    title: str = ""
-    source: str = ""
-    constants: Mapping[str, float] = field(default_factory=dict)
-    elements: tuple[Element, ...] = ()
-    loops: tuple[Loop, ...] = ()
-    constraints: Mapping[int, Expression] = field(default_factory=dict)
-    massless: frozenset[int] = frozenset()
-    drives: Drives | None = None
-    limits: Limits = field(default_factory=dict)
-    values: Mapping[str, float] = field(default_factory=dict)
-    labels: Mapping[int, str] = field(default_factory=dict)
-    file: str = ""
-    sha256: str = ""
+    name: Annotated[str, Field(description="identifier; names the emitted module")]
+    frames: Annotated[
+        tuple[Frame, ...],
+        Written(dict[Whole, Frame], _frames),
+        _keyed("j"),
+        Field(description="1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}"),
+    ]
+    gravity: Annotated[
+        tuple[Expression, Expression, Expression],
+        Written(
+            Annotated[list[Constant], Field(min_length=3, max_length=3)],
+            lambda components, _: tuple(components),
+        ),
+        Field(description="acceleration of gravity in frame 0: [0, 0, -g]"),
+    ]
+    title: Annotated[str, Field(description="one line, printed above results")] = ""
+    source: Annotated[str, Field(description="where the table comes from")] = ""
+    constants: Annotated[
+        Mapping[str, float],
+        Written(dict[str, Numeric]),
+        Field(
+            description=(
+                "lengths and angles by name, numbers only: {D2: 0.5, g: 9.81}; names stay in "
+                "the formulas"
+            )
+        ),
+    ] = Field(default={})
+    elements: Annotated[
+        tuple[Element, ...],
+        Written(dict[str, Element], lambda rows, _: tuple(rows.values())),
+        _keyed("family"),
+        Field(description="FV: {kind: viscous, along: all} makes FV1, FV2 ..."),
+    ] = Field(default={})  # type: ignore[arg-type]  # of the form in a file
+    loops: Annotated[
+        tuple[Loop, ...],
+        Written(list[Loop], lambda rows, _: tuple(rows)),
+        Field(description="[{cut: 6, twin: 7}]"),
+    ] = Field(default=[])  # type: ignore[arg-type]
+    constraints: Annotated[
+        Mapping[int, Expression],
+        Written(dict[str, Position], by_joint),
+        Field(description="passive joints: {q3: q5 - q2 + pi}"),
+    ] = Field(default={})
+    massless: Annotated[
+        frozenset[int],
+        Written(list[Whole], _massless),
+        Field(description="links without inertial parameters"),
+    ] = Field(default=[], validate_default=True)
+    drives: Annotated[
+        Drives | None, Field(description="motors to joints, for measured records")
+    ] = None
+    limits: Annotated[
+        Limits,
+        Written(
+            LimitsTable,
+            lambda table, _: {k: tuple(row) for k, row in vars(table).items() if row is not None},
+        ),
+        Field(description="for exciting trajectories; the sliders of the page take those of q"),
+    ] = Field(default_factory=dict)
+    values: Annotated[
+        Mapping[str, float],
+        Written(dict[str, Numeric]),
+        Field(
+            description=(
+                "standard parameters you know, SI: {M1: 2.0, ZZ1: 0.17}; never used in the "
+                "derivation"
+            )
+        ),
+    ] = Field(default={})
+    labels: Annotated[
+        Mapping[int, str],
+        Written(dict[Whole, str]),
+        Field(
+            description=(
+                "{1: shoulder_pan, 2: elbow}: names of joints in other programs, shown in "
+                "tables; `q: names` of a study finds columns by them"
+            )
+        ),
+    ] = Field(default={})
+    angles: Annotated[str, *UNWRITTEN] = ""  # how those of a foreign file were read
+    file: Annotated[str, *UNWRITTEN] = ""
+    sha256: Annotated[str, *UNWRITTEN] = ""
 
     def __post_init__(self) -> None:
         for name in ("constants", "constraints", "limits", "values", "labels"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-        checks.check_texts(self.name, {"title": self.title, "source": self.source, "file": self.file})
-        checks.check_tree(self.frames)
-        checks.check_names(self.elements, self.constants, self.parameters)
-        checks.check_geometry(self.frames, self.gravity, self.constants)
-        for e in self.elements:
-            checks.check_element(e, self._by_number, self.moving, self.constants)
-        symbols = [*self.constants, *(f"q{i}" for i in self.moving)]
-        checks.check_loops(self._by_number, self.loops, self.constraints, self.passive, symbols)
-        if self.drives is not None:
-            checks.check_drives(self.drives, len(self.joints))
-        checks.check_limits(self.limits, self.joints)
-        checks.check_labels(self.labels, self._by_number)
-        checks.check_values(self.name, self.values, self.parameters, self._by_number, self.links)
+        for name, kind in (("elements", tuple), ("loops", tuple), ("massless", frozenset)):
+            object.__setattr__(self, name, kind(getattr(self, name)))
+        check_robot(self)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its fields, in memory: a table that cannot be written to has no copy of its own."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        plain: dict[str, Any] = {
+            k: dict(x) if isinstance(x, MappingProxyType) else x for k, x in values.items()
+        }
+        return partial(Robot, **plain), ()
 
     def __hash__(self) -> int:
         return hash((self.name, self.frames, self.gravity, self.sha256))
@@ -174,13 +252,19 @@ class Robot:
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the standard parameters in the order of eq. (4), link by link, then further families in file order."""
+        """Names of the standard parameters in the order of eq. (4), link by link, then further
+        families in file order.
+        """
         by_family = {e.family: e for e in self.elements}
         names: list[str] = []
         for f in self.frames:
             if f.j in self.links:
                 names += [parameter(p, f.j) for p in INERTIAL]
-            names += [parameter(p, f.j) for p in JOINT_FAMILIES if p in by_family and f.j in by_family[p].keys]
+            names += [
+                parameter(p, f.j)
+                for p in JOINT_FAMILIES
+                if p in by_family and f.j in by_family[p].keys
+            ]
         for e in self.elements:
             if e.family not in JOINT_FAMILIES:
                 names += [parameter(e.family, j) for j in e.keys]
@@ -196,7 +280,9 @@ class Robot:
 
 
 def one_joint_parameters(robot: Robot, families: Collection[str]) -> set[str]:
-    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both directions, as other formats mean them."""
+    """Names of the parameters of `families`, such as FV, that act on one joint alone, in both
+    directions, as other formats mean them.
+    """
     return {
         parameter(e.family, j)
         for e in robot.elements

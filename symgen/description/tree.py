@@ -1,4 +1,6 @@
-"""A tree of links and joints with any axes, as URDF and MJCF tell it: what both are read into, and what becomes a table of Khalil frames."""
+"""A tree of links and joints with any axes, as URDF and MJCF tell it: what both are read into, and
+what becomes a table of Khalil frames.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ import numpy as np
 
 Array = np.ndarray
 MAX_JOINTS = 200
-GRAVITY = 9.81  # m/s^2, along -z of the root link
+EARTH = 9.81  # m/s^2, along -z of the root link
 MOVING, FIXED_TYPE = ("revolute", "continuous", "prismatic"), "fixed"
 
 
@@ -36,7 +38,8 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) + stiffness (q - rest).
+    """A joint; along it, torque or force Gamma += armature qdd + damping qd + friction sign(qd) +
+    stiffness (q - rest).
 
     Attributes
     ----------
@@ -75,7 +78,9 @@ class Joint:
 
 @dataclass(frozen=True)
 class Relation:
-    """q = sum of factor times q of the leaders + offset, the leaders by name and independent of each other."""
+    """q = sum of factor times q of the leaders + offset, the leaders by name and independent of
+    each other.
+    """
 
     leaders: Mapping[str, Fraction]
     offset: Fraction
@@ -103,8 +108,11 @@ class Tree:
         Acceleration of gravity in the root link.
     notes : tuple of str
         What was not read.
+    angles : str
+        How angles near multiples of pi/12 were read.
     places : mapping
-        Of MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame of its link. A URDF has one frame for both.
+        Of MJCF, in the order of its bodies: pose (4, 4) of the frame of each body in the frame of
+        its link. A URDF has one frame for both.
     """
 
     name: str
@@ -113,9 +121,10 @@ class Tree:
     root: str
     relations: Mapping[str, Relation] = field(default_factory=dict)
     bare: frozenset[str] = frozenset()
-    gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -EARTH)
     notes: tuple[str, ...] = ()
     places: Mapping[str, Array] = field(default_factory=dict)
+    angles: str = ""
 
 
 def turn(axis: int, angle: float) -> Array:
@@ -129,7 +138,9 @@ def turn(axis: int, angle: float) -> Array:
 
 
 def transform(row: Sequence[float]) -> Array:
-    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row gamma, b, alpha, d, theta, r; (4, 4)."""
+    """iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) of a row
+    gamma, b, alpha, d, theta, r; (4, 4).
+    """
     gamma, b, alpha, d, theta, r = row
     T = np.eye(4)
     for axis, angle, shift in ((2, gamma, b), (0, alpha, d), (2, theta, r)):

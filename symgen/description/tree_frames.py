@@ -1,12 +1,18 @@
 """A tree of joints with any axes becomes a table of Khalil and Kleinfinger.
 
-Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint; x_i lies on the common normal of z_i and of the
-axis of the first joint that body i carries, so that this joint has gamma = b = 0; further branches have them. Parallel axes: the
-normal through the origin. Axes that are nearly parallel have no usable normal: a fixed frame without link turns in between. A joint position
-is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are kept, each link that one holds is a fixed frame too, its
-link frame that of the file, after all that move; its inertia stays with the body, so that formulas and numbers of joints are the same either way.
+Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint;
+x_i lies on the common normal of z_i and of the
+axis of the first joint that body i carries, so that this joint has gamma = b = 0; further branches
+have them. Parallel axes: the
+normal through the origin. Axes that are nearly parallel have no usable normal: a fixed frame
+without link turns in between. A joint position
+is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are
+kept, each link that one holds is a fixed frame too, its
+link frame that of the file, after all that move; its inertia stays with the body, so that formulas
+and numbers of joints are the same either way.
 
-Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know what is special about the robot.
+Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know
+what is special about the robot.
 """
 
 from __future__ import annotations
@@ -24,7 +30,8 @@ from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, transform
 
 DIGITS = 13  # decimals kept of lengths (m) and angles (rad)
 SAME = 1e-12  # m, rad: closer is equal
-STEEP = 0.02  # sine of the angle of two axes below which their common normal is too far away to compute with
+# sine of the angle of two axes below which their common normal is too far away to compute with
+STEEP = 0.02
 
 
 @dataclass
@@ -55,8 +62,8 @@ class Table:
         Rows so far.
     constants : mapping, m
         Lengths by name.
-    joint, bodies, kept : mapping
-        Joint, body and kept link by frame number.
+    joint, bodies, fixed_links : mapping
+        Joint, body and link on a fixed joint by frame number.
     notes : list of str
         What a reader should know of the table.
     """
@@ -66,12 +73,14 @@ class Table:
     constants: dict[str, float] = field(default_factory=dict)
     joint: dict[int, Joint] = field(default_factory=dict)
     bodies: dict[int, Body] = field(default_factory=dict)
-    kept: dict[int, str] = field(default_factory=dict)
+    fixed_links: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
 def placed(tree: Tree, *, keep_fixed: bool = False) -> Table:
-    """Frames of all bodies, a body before what it carries, branch by branch; then those of the links that fixed joints hold, if kept."""
+    """Frames of all bodies, a body before what it carries, branch by branch; then those of the
+    links that fixed joints hold, if kept.
+    """
     table = Table(tree)
     table.bodies[0] = _body(tree, tree.root, np.eye(4))
     waiting = [(0, joint, parent) for joint, parent in reversed(table.bodies[0].joints)]
@@ -95,11 +104,11 @@ def _keep(table: Table, ant: int, name: str, pose: Array) -> None:
     rest = np.linalg.inv(transform((*before, 0.0, 0.0))) @ pose
     theta, r = _numbered((math.atan2(rest[1, 0], rest[0, 0]), rest[2, 3]))
     _, j = _row(table, ant, FIXED, before, theta, r)
-    table.kept[j] = name
+    table.fixed_links[j] = name
 
 
 def _body(tree: Tree, link: str, pose: Array) -> Body:
-    """The links that fixed joints hold on `link`, whose pose is given, and the joints they carry."""
+    """The links that fixed joints hold on `link`, which has `pose`, and the joints they carry."""
     body, waiting = Body({link: pose}, []), [link]
     while waiting:
         link = waiting.pop(0)
@@ -115,13 +124,14 @@ def _body(tree: Tree, link: str, pose: Array) -> Body:
 
 
 def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
-    """Frame of `joint` on body `ant`, where its parent link has pose `parent`; returns its number."""
+    """Number of the frame of `joint` on body `ant`, where its parent link has pose `parent`."""
     pose = parent @ joint.pose
     axis, point = pose[:3, :3] @ joint.axis, pose[:3, 3]
     if _nearly_parallel(axis):
         angle = math.hypot(axis[0], axis[1])
         table.notes.append(
-            f"axis of {joint.name!a:.60} is parallel to its antecedent's within {angle:.2g} rad; where parallel is meant, --snap 1e-4 rounds angles"
+            f"axis of {joint.name!a:.60} is parallel to its antecedent's within {angle:.2g} rad; "
+            "where parallel is meant, correct the file, or leave out --exact"
         )
         to_aside, aside = _row(table, ant, FIXED, _normal(np.array([1.0, 0.0, 0.0]), point))
         pose = np.linalg.inv(to_aside) @ pose
@@ -139,7 +149,10 @@ def _add(table: Table, ant: int, joint: Joint, parent: Array) -> int:
     sigma = PRISMATIC if joint.kind == "prismatic" else REVOLUTE
     _, j = _row(table, ant, sigma, before, theta, r)
     own = np.linalg.inv(transform((0.0, 0.0, 0.0, 0.0, theta, r)))
-    table.bodies[j] = Body({name: own @ X for name, X in body.links.items()}, [(held, own @ X) for held, X in body.joints])
+    table.bodies[j] = Body(
+        {name: own @ X for name, X in body.links.items()},
+        [(held, own @ X) for held, X in body.joints],
+    )
     table.joint[j] = joint
     return j
 
@@ -150,12 +163,18 @@ def _nearly_parallel(axis: Array) -> bool:
 
 
 def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
-    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it; |gamma| <= pi/2."""
+    """gamma, b, alpha, d to the line through `point` along `axis`, both in the frame before it;
+    |gamma| <= pi/2.
+    """
     x, y, z = axis
     s = math.hypot(x, y)
     if s <= SAME:  # parallel
         d = math.hypot(point[0], point[1])
-        gamma, b, alpha = (math.atan2(point[1], point[0]) if d > SAME else 0.0), 0.0, (0.0 if z > 0 else math.pi)
+        gamma, b, alpha = (
+            (math.atan2(point[1], point[0]) if d > SAME else 0.0),
+            0.0,
+            (0.0 if z > 0 else math.pi),
+        )
     else:  # normal z_i x z_j
         gamma, alpha = math.atan2(x, -y), math.atan2(s, z)
         d = (-y * point[0] + x * point[1]) / s
@@ -166,20 +185,28 @@ def _normal(axis: Array, point: Array) -> tuple[float, float, float, float]:
 
 
 def _numbered(row: Sequence[float]) -> tuple[float, ...]:
-    """The numbers as the table holds them: multiples of pi/12 exact, DIGITS decimals. Angles first, lengths second, in turn."""
+    """The numbers as the table holds them: multiples of pi/12 exact, DIGITS decimals. Angles first,
+    lengths second, in turn.
+    """
     return tuple(_angle(x)[0] if k % 2 == 0 else round(x, DIGITS) + 0.0 for k, x in enumerate(row))
 
 
 def _angle(x: float) -> tuple[float, Expression]:
     k = twelfths(x, SAME)
-    return (round(x, DIGITS), _exact(round(x, DIGITS))) if k is None else (k * math.pi / 12, PI * Fraction(k, 12))
+    return (
+        (round(x, DIGITS), _exact(round(x, DIGITS)))
+        if k is None
+        else (k * math.pi / 12, PI * Fraction(k, 12))
+    )
 
 
 def _exact(x: float) -> Expression:
     return Expression.number(Fraction(repr(x)))
 
 
-def _row(table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0) -> tuple[Array, int]:
+def _row(
+    table: Table, ant: int, sigma: int, before: Sequence[float], theta: float = 0.0, r: float = 0.0
+) -> tuple[Array, int]:
     """Append a frame; returns its pose at q = 0 in its antecedent and its number."""
     j = len(table.frames) + 1
     gamma, b, alpha, d = before = _numbered(before)
@@ -206,8 +233,10 @@ def _length(table: Table, name: str, x: float) -> Expression:
     """0, or a constant of this value: an earlier one if it is equal."""
     if abs(x) <= SAME:
         return ZERO
-    known = next((k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None)
-    if known is None:
+    equal = next(
+        (k for k, value in table.constants.items() if abs(abs(value) - abs(x)) <= SAME), None
+    )
+    if equal is None:
         table.constants[name] = abs(float(x))
-        known = name
-    return Expression.symbol(known) * (1 if x > 0 else -1)
+        equal = name
+    return Expression.symbol(equal) * (1 if x > 0 else -1)

@@ -1,10 +1,13 @@
-"""Part of a tree: joints held where they are told to stand, and the chain between two links alone.
+"""Part of a tree: joints held at positions, and the chain between two links alone.
 
-A joint that is held is a fixed joint with the pose of that position; what follows it stands where its relation says. The inertia of a link that no
+A joint that is held is a fixed joint with the pose of that position; what follows it stands where
+its relation says. The inertia of a link that no
 longer moves belongs to the body that holds it, as with any fixed joint.
 
-Of a chain from `base` to `tip`, the joints between these two links move. The others outward of `base` are held at zero, so that a gripper and the
-branches stay as masses; `base` is the ground, the acceleration of gravity that of the tree with the joints before `base` at zero, and
+Of a chain from `base` to `tip`, the joints between these two links move. The others outward of
+`base` are held at zero, so that a gripper and the
+branches stay as masses; `base` is the ground, the acceleration of gravity that of the tree with the
+joints before `base` at zero, and
 what stands before `base` is left out.
 """
 
@@ -16,14 +19,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from symgen.description.angles import SHOWN
 from symgen.description.tree import FIXED_TYPE, Array, Joint, Relation, Tree, turn
 from symgen.errors import DescriptionError
 
-SHOWN = 20  # names in a message
-
 
 @dataclass(frozen=True)
-class Part:
+class TreePart:
     """What of a tree is kept.
 
     Attributes
@@ -38,16 +40,18 @@ class Part:
     chain: tuple[str, str] | None = None
 
 
-NO_PART = Part()
+WHOLE_TREE = TreePart()
 
 
-def part_of(tree: Tree, part: Part) -> Tree:
-    """The tree with the joints of `part.lock` held, cut down to `part.chain`; notes tell what was held and left out.
+def part_of(tree: Tree, part: TreePart) -> Tree:
+    """The tree with the joints of `part.lock` held, cut down to `part.chain`; notes tell what was
+    held and left out.
 
     Raises
     ------
     DescriptionError
-        No such joint or link, a joint that does not move or follows another, a tip that does not hang on the base by a joint that moves.
+        No such joint or link, a joint that does not move or follows another, a tip that does not
+        hang on the base by a joint that moves.
     """
     for name in part.lock:
         _require_independent(tree, name)
@@ -61,9 +65,15 @@ def _require_independent(tree: Tree, name: str) -> None:
     kinds = {joint.name: joint.kind for joint in tree.joints}
     if kinds.get(name, FIXED_TYPE) == FIXED_TYPE:
         moving = [joint for joint, kind in kinds.items() if kind != FIXED_TYPE]
-        raise DescriptionError(f"joint {name!a:.60} to lock: no moving joint of that name; the file has {_names(moving)}")
+        raise DescriptionError(
+            f"joint {name!a:.60} to lock: no moving joint of that name; the file has "
+            f"{_names(moving)}"
+        )
     if name in tree.relations:
-        raise DescriptionError(f"joint {name!a:.60} to lock follows others; lock {_names(list(tree.relations[name].leaders))}")
+        raise DescriptionError(
+            f"joint {name!a:.60} to lock follows others; lock "
+            f"{_names(list(tree.relations[name].leaders))}"
+        )
 
 
 def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
@@ -71,7 +81,11 @@ def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
     relations: dict[str, Relation] = {}
     fixed = dict(positions)
     for name, relation in tree.relations.items():
-        offset = relation.offset + sum(c * Fraction(repr(fixed[leader])) for leader, c in relation.leaders.items() if leader in positions)
+        offset = relation.offset + sum(
+            c * Fraction(repr(fixed[leader]))
+            for leader, c in relation.leaders.items()
+            if leader in positions
+        )
         leaders = {leader: c for leader, c in relation.leaders.items() if leader not in positions}
         if name in positions:
             continue
@@ -79,17 +93,19 @@ def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
             relations[name] = Relation(leaders, offset)
         else:
             fixed[name] = float(offset)
-    joints = tuple(_standing(joint, fixed[joint.name]) if joint.name in fixed else joint for joint in tree.joints)
+    joints = tuple(
+        replace(j, kind=FIXED_TYPE, pose=j.pose @ _motion(j, fixed[j.name]), limits={})
+        if j.name in fixed
+        else j
+        for j in tree.joints
+    )
     return replace(tree, joints=joints, relations=relations)
 
 
-def _standing(joint: Joint, position: float) -> Joint:
-    """A fixed joint with the pose that `joint` has at `position`."""
-    return replace(joint, kind=FIXED_TYPE, pose=joint.pose @ _motion(joint, position), limits={})
-
-
 def _motion(joint: Joint, q: float) -> Array:
-    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q) [a]^2."""
+    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q)
+    [a]^2.
+    """
     T = np.eye(4)
     if joint.kind == "prismatic":
         T[:3, 3] = q * joint.axis
@@ -104,26 +120,43 @@ def _motion(joint: Joint, q: float) -> Array:
 def _chain(tree: Tree, base: str, tip: str) -> Tree:
     for link in (base, tip):
         if link not in tree.links:
-            raise DescriptionError(f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}")
+            raise DescriptionError(
+                f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}"
+            )
     holding = {joint.child: joint for joint in tree.joints}
     between = _path(holding, tip, base)
     before = _path(holding, base, tree.root)
     if between is None or all(joint.kind == FIXED_TYPE for joint in between):
         raise DescriptionError(
-            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes from base to tip, outward"
+            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes "
+            "from base to tip, outward"
         )
     outward = {base}
     while new := {joint.child for joint in tree.joints if joint.parent in outward} - outward:
         outward |= new
     between_names = {joint.name for joint in between}
-    held = {joint.name: _zero(tree, joint.name) for joint in tree.joints if joint.kind != FIXED_TYPE and joint.name not in between_names}
-    hanging = [joint.name for joint in tree.joints if joint.name in held and joint.parent in outward]
+    held = {
+        joint.name: _zero(tree, joint.name)
+        for joint in tree.joints
+        if joint.kind != FIXED_TYPE and joint.name not in between_names
+    }
+    hanging = [
+        joint.name for joint in tree.joints if joint.name in held and joint.parent in outward
+    ]
     dropped = [link for link in tree.links if link not in outward]
     tree = _held(tree, held)
     moving = [joint.name for joint in tree.joints if joint.kind != FIXED_TYPE]
     notes = [f"chain from {base!a:.60} to {tip!a:.60}: {_names(moving)} move"]
-    notes += [f"held at zero, their links parts of the bodies that carry them: {_names(hanging)}"] if hanging else []
-    notes += [f"links left out, since the base of the chain is the ground: {_names(dropped)}"] if dropped else []
+    notes += (
+        [f"held at zero, their links parts of the bodies that carry them: {_names(hanging)}"]
+        if hanging
+        else []
+    )
+    notes += (
+        [f"links left out, since the base of the chain is the ground: {_names(dropped)}"]
+        if dropped
+        else []
+    )
     R = np.eye(3)
     standing = {joint.name: joint for joint in tree.joints}
     for joint in before or ():
@@ -141,7 +174,9 @@ def _chain(tree: Tree, base: str, tip: str) -> Tree:
 
 
 def _zero(tree: Tree, name: str) -> float:
-    """Position of a joint that is held at zero, or of one that follows where its leaders are at zero."""
+    """Position of a joint that is held at zero, or of one that follows where its leaders are at
+    zero.
+    """
     return float(tree.relations[name].offset) if name in tree.relations else 0.0
 
 

@@ -1,8 +1,12 @@
-"""The Robot of a tree: its Khalil frames, its joints as elements and limits, its inertials as standard parameters.
+"""The Robot of a tree: its Khalil frames, its joints as elements and limits, its inertials as
+standard parameters.
 
-With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the file:
+With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the
+file:
 
-    M,    MS = M c,    J = R I R' + M (c'c 1 - c c')        tensor elements about the origin of frame j, summed over the links of a body
+    M,    MS = M c,    J = R I R' + M (c'c 1 - c c')
+
+are tensor elements about the origin of frame j, summed over the links of a body.
 """
 
 from __future__ import annotations
@@ -14,14 +18,16 @@ from fractions import Fraction
 
 import numpy as np
 
-from symgen.description.checks import is_label
 from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.naming import is_label
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
 from symgen.description.tree import Array, Inertial, Joint, Tree
 from symgen.description.tree_frames import Body, Table, placed
 from symgen.errors import DescriptionError
 
-FAMILIES: tuple[tuple[str, str, Callable[[Joint], float]], ...] = (  # family, kind, value of a joint
+JOINT_TERMS: tuple[
+    tuple[str, str, Callable[[Joint], float]], ...
+] = (  # family, kind, value of a joint
     ("Ia", "inertia", lambda joint: joint.armature),
     ("FV", "viscous", lambda joint: joint.damping),
     ("FS", "coulomb", lambda joint: joint.friction),
@@ -30,8 +36,11 @@ FAMILIES: tuple[tuple[str, str, Callable[[Joint], float]], ...] = (  # family, k
 )
 
 
-def robot_of_tree(tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False) -> tuple[Robot, tuple[str, ...]]:
-    """The robot, and notes: which joint is which q, which link is which kept frame, and what was not read.
+def robot_of_tree(
+    tree: Tree, file: str, sha256: str, *, keep_fixed: bool = False
+) -> tuple[Robot, tuple[str, ...]]:
+    """The robot, and notes: which joint is which q, which link is which kept frame, and what was
+    not read.
 
     Raises DescriptionError, with the line of the joint at fault, where the tree is no robot.
     """
@@ -39,11 +48,19 @@ def robot_of_tree(tree: Tree, file: str, sha256: str, *, keep_fixed: bool = Fals
     try:
         robot = _robot(table, file, sha256)
     except DescriptionError as error:
-        joint = table.joint.get(int(str(error.path[1]))) if len(error.path) > 1 and error.line is None else None
-        raise DescriptionError(error.message, path=error.path, line=error.line or (joint.line if joint else 1)) from error.__cause__
+        joint = (
+            table.joint.get(int(str(error.path[1])))
+            if len(error.path) > 1 and error.line is None
+            else None
+        )
+        raise DescriptionError(
+            error.message, path=error.path, line=error.line or (joint.line if joint else 1)
+        ) from error.__cause__
     legends = [_legend("joints", {f"q{j}": joint.name for j, joint in table.joint.items()})]
-    if table.kept:
-        legends.append(_legend("fixed frames", {f"frame {j}": name for j, name in table.kept.items()}))
+    if table.fixed_links:
+        legends.append(
+            _legend("fixed frames", {f"frame {j}": name for j, name in table.fixed_links.items()})
+        )
     return robot, (*legends, *tree.notes, *table.notes)
 
 
@@ -66,7 +83,7 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         constants={**table.constants, **constants},
         elements=tuple(
             Element(family, kind, {j: {j: ONE} for j in keys}, {})
-            for family, kind, _ in FAMILIES
+            for family, kind, _ in JOINT_TERMS
             if (keys := _keys(table, family, actuated))
         ),
         constraints=constraints,
@@ -74,17 +91,22 @@ def _robot(table: Table, file: str, sha256: str) -> Robot:
         limits=_limits(table, actuated),
         values=values,
         labels=_labels(table),
+        angles=table.tree.angles,
         file=file,
         sha256=sha256,
     )
 
 
 def _labels(table: Table) -> dict[int, str]:
-    """Names of the joints of the file, and of the links that are kept frames, where no joint has the same."""
-    names = {j: joint.name for j, joint in table.joint.items()} | table.kept
+    """Names of the joints of the file, and of the links that are kept frames, where no joint has
+    the same.
+    """
+    names = {j: joint.name for j, joint in table.joint.items()} | table.fixed_links
     strange = sorted(name for name in names.values() if not is_label(name))
     if strange:
-        table.notes.append(f"no label of a robot file, left out: {', '.join(f'{name!a:.60}' for name in strange)}")
+        table.notes.append(
+            f"no label of a robot file, left out: {', '.join(f'{name!a:.60}' for name in strange)}"
+        )
     labels: dict[int, str] = {}
     for j, name in sorted(names.items()):
         if is_label(name) and name not in labels.values():
@@ -97,8 +119,12 @@ def _identifier(name: str) -> str:
     return f"robot_{name}" if not name[0].isalpha() or keyword.iskeyword(name) else name
 
 
-def _gravity(g: tuple[float, float, float]) -> tuple[tuple[Expression, Expression, Expression], dict[str, float]]:
-    """Gravity by constants: g where it points along -z, else one for each component that is not zero."""
+def _gravity(
+    g: tuple[float, float, float],
+) -> tuple[tuple[Expression, Expression, Expression], dict[str, float]]:
+    """Gravity by constants: g where it points along -z, else one for each component that is not
+    zero.
+    """
     if g[:2] == (0.0, 0.0) and g[2] < 0:
         return (ZERO, ZERO, -Expression.symbol("g")), {"g": -g[2]}
     names = [f"g{axis}" if x else "" for axis, x in zip("xyz", g, strict=True)]
@@ -112,36 +138,53 @@ def _constraints(table: Table) -> dict[int, Expression]:
     constraints: dict[int, Expression] = {}
     for name, relation in table.tree.relations.items():
         constraints[number[name]] = sum(
-            (Expression.symbol(f"q{number[leader]}") * factor for leader, factor in relation.leaders.items()),
+            (
+                Expression.symbol(f"q{number[leader]}") * factor
+                for leader, factor in relation.leaders.items()
+            ),
             start=Expression.number(Fraction(relation.offset)),
         )
     return dict(sorted(constraints.items()))
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:
-    """Joints with a parameter of the family: the actuated ones, and those that follow where the file gives a value; springs only so."""
-    value = next(value for name, _, value in FAMILIES if name == family)
-    return [j for j, joint in table.joint.items() if value(joint) or (j in actuated and family != "K")]
+    """Joints with a parameter of the family: the actuated ones, and those that follow where the
+    file gives a value; springs only so.
+    """
+    value = next(value for name, _, value in JOINT_TERMS if name == family)
+    return [
+        j for j, joint in table.joint.items() if value(joint) or (j in actuated and family != "K")
+    ]
 
 
-def _limits(table: Table, actuated: list[int]) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
+def _limits(
+    table: Table, actuated: list[int]
+) -> dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]]:
     """Limits that every actuated joint has; a kind that one joint lacks is left out and noted."""
     rows = [table.joint[j] for j in actuated]
     limits: dict[str, tuple[float, ...] | tuple[tuple[float, float], ...]] = {}
-    bounds = tuple((joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)) for joint in rows)
-    if all(low < high for low, high in bounds) and all(joint.kind != "continuous" for joint in rows):
+    bounds = tuple(
+        (joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)) for joint in rows
+    )
+    if all(low < high for low, high in bounds) and all(
+        joint.kind != "continuous" for joint in rows
+    ):
         limits["q"] = bounds
     for key, of_file in (("qd", "velocity"), ("tau", "effort")):
         largest = tuple(joint.limits.get(of_file, 0.0) for joint in rows)
         if all(x > 0 for x in largest):
             limits[key] = largest
     if missing := [key for key in ("q", "qd", "tau") if key not in limits]:
-        table.notes.append(f"limits of {', '.join(missing)} left out: not every actuated joint has them")
+        table.notes.append(
+            f"limits of {', '.join(missing)} left out: not every actuated joint has them"
+        )
     return limits
 
 
 def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozenset[int]]:
-    """Standard parameters by name, empty where no link has inertia, and the frames without a link of their own."""
+    """Standard parameters by name, empty where no link has inertia, and the frames without a link
+    of their own.
+    """
     links = table.tree.links
     bodies = {j: body for j, body in table.bodies.items() if j in table.joint}
     bare = {j for j, body in bodies.items() if set(body.links) <= table.tree.bare}
@@ -154,25 +197,30 @@ def _values(table: Table, actuated: list[int]) -> tuple[dict[str, float], frozen
         if j in bare:
             continue
         if all(links[name] is None for name in body.links):
-            table.notes.append(f"no <inertial> on {', '.join(f'{name!a:.60}' for name in body.links)}: values of link {j} are 0")
-        values |= {parameter(p, j): x for p, x in zip(INERTIAL, _standard(table, body), strict=True)}
-    for family, _, value in FAMILIES:
-        values |= {parameter(family, j): value(table.joint[j]) for j in _keys(table, family, actuated)}
+            table.notes.append(
+                f"no <inertial> on {', '.join(f'{name!a:.60}' for name in body.links)}: values of "
+                f"link {j} are 0"
+            )
+        values |= {
+            parameter(p, j): x for p, x in zip(INERTIAL, _standard(table, body), strict=True)
+        }
+    for family, _, value in JOINT_TERMS:
+        values |= {
+            parameter(family, j): value(table.joint[j]) for j in _keys(table, family, actuated)
+        }
     return values, massless
 
 
-def _standard(table: Table, body: Body) -> tuple[float, ...]:
-    """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame."""
-    ten = np.zeros(10)
-    for name, X in body.links.items():
-        inertial = table.tree.links[name]
-        if inertial is not None:
-            ten += ten_of(inertial, X)
-    return tuple(float(x) for x in ten)
+def _standard(table: Table, body: Body) -> Array:
+    """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame, shape (10,)."""
+    links = [(table.tree.links[name], X) for name, X in body.links.items()]
+    return sum((ten_of(own, X) for own, X in links if own is not None), start=np.zeros(10))
 
 
 def ten_of(inertial: Inertial, X: Array) -> Array:
-    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its body."""
+    """XX XY XZ YY YZ ZZ MX MY MZ M, shape (10,), of a link with pose X, (4, 4), in the frame of its
+    body.
+    """
     own = X @ inertial.pose
     R, c, M = own[:3, :3], own[:3, 3], inertial.M
     J = R @ inertial.I @ R.T + M * (c @ c * np.eye(3) - np.outer(c, c))

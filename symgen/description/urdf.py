@@ -1,6 +1,8 @@
-"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames (`tree_frames`) with values (`tree_robot`).
+"""URDF to a Robot: the text becomes a tree of links and joints, the tree a table of Khalil frames
+(`tree_frames`) with values (`tree_robot`).
 
-Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would load them, and its XML parser expands
+Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would
+load them, and its XML parser expands
 entities (`xml_text` reads neither). Every error names its line.
 """
 
@@ -15,19 +17,30 @@ from fractions import Fraction
 
 import numpy as np
 
-from symgen.description.expression import PI, twelfths
+from symgen.description.angles import SNAP, Rounding, reaches, report_angles
+from symgen.description.expression import twelfths
+from symgen.description.fields import located
 from symgen.description.robot import Robot
-from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, MOVING, Inertial, Joint, Relation, Tree, turn
+from symgen.description.tree import (
+    FIXED_TYPE,
+    MAX_JOINTS,
+    MOVING,
+    Inertial,
+    Joint,
+    Relation,
+    Tree,
+    turn,
+)
 from symgen.description.tree_frames import SAME
-from symgen.description.tree_parts import NO_PART, Part, part_of
+from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
 from symgen.description.tree_robot import robot_of_tree
-from symgen.description.xml_text import LARGEST, Array, Element, read_elements
+from symgen.description.xml_text import LARGEST, Array, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
 Mimic = tuple[str, float, float]  # joint, multiplier, offset
-SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start that tell of a changed angle, of elements left out
-REMARKS = (SNAPPED, DROPPED)
-READ = {  # children of an element that are read, and <material>, which says nothing that is left out
+SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
+# children of an element that are read, and <material>, which says nothing that is left out
+READ = {
     "robot": {"link", "joint", "material"},
     "link": {"inertial"},
     "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic"},
@@ -35,9 +48,15 @@ READ = {  # children of an element that are read, and <material>, which says not
 
 
 def read_urdf(
-    content: bytes, file: str, *, nearly: float = 0.0, keep_fixed: bool = False, part: Part = NO_PART
+    content: bytes,
+    file: str,
+    *,
+    exact: bool = False,
+    keep_fixed: bool = False,
+    part: TreePart = WHOLE_TREE,
 ) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a URDF, and notes: which joint is which q, which link is which kept frame, which angle was changed, what was not read.
+    """The robot of a URDF, and notes: which joint is which q, which link is which kept frame, which
+    angle was changed, what was not read.
 
     Parameters
     ----------
@@ -45,31 +64,33 @@ def read_urdf(
         Of the file.
     file : str
         Its name.
-    nearly : float, rad
-        Angles of the file this close to a multiple of pi/12 are taken as that: 1e-4 for files that say 1.5708.
+    exact : bool
+        Angles are those of the file; else those within SNAP of a multiple of pi/12 are taken as
+        that, since files say 1.5708, and an AngleWarning lists them.
     keep_fixed : bool
-        Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters, for frame_poses and jacobian; else they
+        Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters,
+        for frame_poses and jacobian; else they
         are only part of the body that holds them. Their inertia belongs to that body either way.
-    part : Part
+    part : TreePart
         Joints held at a position, and the chain that is kept.
 
     Raises
     ------
     DescriptionError
-        No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and line.
+        No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and
+        line.
     """
-    try:
-        tree = part_of(parse_urdf(content, nearly), part)
+    with located(file):
+        tree = part_of(parse_urdf(content, file, exact=exact), part)
         return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
-    except DescriptionError as error:
-        raise DescriptionError(error.message, path=error.path, file=file, line=error.line or 1) from error.__cause__
 
 
-def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
-    """Links and joints of a URDF file; roll, pitch and yaw within `nearly` (rad) of a multiple of pi/12 are taken as that."""
+def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
+    """Links and joints of a URDF file; roll, pitch and yaw as of `read_urdf`."""
+    nearly = 0.0 if exact else SNAP
     root = read_elements(content)
     if root.tag != "robot":
-        raise DescriptionError(f"found <{root.tag[:40]}>; expected <robot>", line=root.line)
+        raise DescriptionError(f"roots_text <{root.tag[:40]}>; expected <robot>", line=root.line)
     links: dict[str, Inertial | None] = {}
     joints: list[Joint] = []
     mimics: dict[str, Mimic] = {}
@@ -81,37 +102,84 @@ def parse_urdf(content: bytes, nearly: float = 0.0) -> Tree:
         elif e.tag == "joint":
             joints.append(_joint(e, nearly))
             if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
-                mimics[joints[-1].name] = (mimic.text("joint"), mimic.number("multiplier", "1"), mimic.number("offset", "0"))
+                mimics[joints[-1].name] = (
+                    mimic.text("joint"),
+                    mimic.number("multiplier", "1"),
+                    mimic.number("offset", "0"),
+                )
     if len(joints) > MAX_JOINTS:
-        raise DescriptionError(f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line)
+        raise DescriptionError(
+            f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line
+        )
     base = _root(links, joints, root.line)
     other = Counter(_left_out(root))
-    notes: tuple[str, ...] = (f"{DROPPED} {', '.join(f'{other[tag]} <{tag:.40}>' for tag in sorted(other))}",) if other else ()
-    notes += tuple(_changes(root, nearly))
-    points = [e.text("name") for e in root.children if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None]
-    notes += (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",) if points else ()
-    return Tree(root.attributes.get("name", ""), links, tuple(joints), base, _relations(joints, mimics), notes=notes)
+    notes: tuple[str, ...] = (
+        (f"{DROPPED} {', '.join(f'{other[tag]} <{tag:.40}>' for tag in sorted(other))}",)
+        if other
+        else ()
+    )
+    edges = [(joint.parent, joint.child, _length(joint)) for joint in joints]
+    reach = reaches(edges, base)
+    if lost := sorted(links.keys() - reach.keys()):
+        raise DescriptionError(
+            f"links {', '.join(lost[:5])} do not hang on {base!r}; their joints form a cycle",
+            line=root.line,
+        )
+    angles, changes = report_angles(file, [*_near(root)], reach, exact=exact)
+    notes += tuple(f"{SNAPPED} {change}" for change in changes)
+    points = [
+        e.text("name")
+        for e in root.children
+        if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None
+    ]
+    notes += (
+        (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",)
+        if points
+        else ()
+    )
+    return Tree(
+        root.attributes.get("name", ""),
+        links,
+        tuple(joints),
+        base,
+        _relations(joints, mimics),
+        notes=notes,
+        angles=angles,
+    )
 
 
-def _left_out(root: Element) -> Iterator[str]:
+def _left_out(root: XmlElement) -> Iterator[str]:
     """Tags of the elements of a robot, its links and its joints that are not read."""
     for e in (root, *root.children):
-        yield from (child.tag for child in e.children if e.tag in READ and child.tag not in READ[e.tag])
+        yield from (
+            child.tag for child in e.children if e.tag in READ and child.tag not in READ[e.tag]
+        )
 
 
-def _changes(root: Element, nearly: float) -> Iterator[str]:
-    """A sentence for each angle that `snapped` changes by more than rounding: of which joint or link, from what, to what."""
+def _near(root: XmlElement) -> Iterator[Rounding]:
+    """Angles that differ from a multiple of pi/12 by more than rounding and less than SNAP."""
     for e in root.children:
-        holder = e.first("inertial") if e.tag == "link" else e
-        origin = holder.first("origin") if holder is not None and e.tag in ("link", "joint") else None
-        for name, x in zip(("roll", "pitch", "yaw"), origin.numbers("rpy", 3, "0 0 0") if origin else (), strict=False):
-            k = twelfths(x, nearly)
-            if k is not None and abs(change := k * (math.pi / 12) - x) > SAME:
-                yield f"{SNAPPED} {name} of {e.tag} {e.text('name')!a:.60} (line {origin.line if origin else e.line}) from {x:.12g} to {PI * Fraction(k, 12)}, by {change:.1e} rad"
+        holder, child = e.first("inertial") if e.tag == "link" else e, e.first("child")
+        origin = holder.first("origin") if holder and e.tag in ("link", "joint") else None
+        angles = origin.numbers("rpy", 3, "0 0 0") if origin else ()
+        for name, x in zip(("roll", "pitch", "yaw"), angles, strict=False):
+            k = twelfths(x, SNAP)
+            if k is not None and abs(k * (math.pi / 12) - x) > SAME:
+                place = f"{name} of {e.tag} {e.text('name')!a:.60} (line {(origin or e).line})"
+                yield place, x, "" if e.tag == "link" or child is None else child.text("link")
+
+
+def _length(joint: Joint) -> float:
+    """Distance that a joint may put between the frames of its links, m."""
+    stroke = [abs(joint.limits.get(end, 0.0)) for end in ("lower", "upper")]
+    slide = max(stroke) if joint.kind == "prismatic" else 0.0
+    return float(np.linalg.norm(joint.pose[:3, 3])) + slide
 
 
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relation]:
-    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow each other."""
+    """q = multiplier q_leader + offset of the joints that mimic another, through any that follow
+    each other.
+    """
     moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
     relations: dict[str, Relation] = {}
     for joint in (joint for joint in joints if joint.name in mimics):
@@ -120,7 +188,9 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relat
             leader, factor, shift = mimics[leader]
             if leader in followed or leader not in moving:
                 what = (
-                    "joints follow each other in a circle" if leader in followed else f"there is no moving joint {leader[:60]!r} to follow"
+                    "joints follow each other in a circle"
+                    if leader in followed
+                    else f"there is no moving joint {leader[:60]!r} to follow"
                 )
                 raise DescriptionError(f"joint {joint.name!r}: {what}", line=joint.line)
             followed.add(leader)
@@ -130,23 +200,23 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relat
     return relations
 
 
-def _pose(e: Element | None, nearly: float) -> Array:
+def _pose(e: XmlElement | None, nearly: float) -> Array:
     """(4, 4) of an <origin>: R = Rz(yaw) Ry(pitch) Rx(roll)."""
     T = np.eye(4)
     if e is not None:
-        roll, pitch, yaw = (snapped(x, nearly) for x in e.numbers("rpy", 3, "0 0 0"))
+        roll, pitch, yaw = (_angle(x, nearly) for x in e.numbers("rpy", 3, "0 0 0"))
         T[:3, :3] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
         T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
     return T
 
 
-def snapped(angle: float, nearly: float) -> float:
-    """`angle`, or the multiple of pi/12 within `nearly` of it."""
-    k = twelfths(angle, nearly)
-    return angle if k is None else k * (math.pi / 12)
+def _angle(x: float, nearly: float) -> float:
+    """x, or the multiple of pi/12 within `nearly` of it."""
+    k = twelfths(x, nearly)
+    return x if k is None else k * (math.pi / 12)
 
 
-def _inertial(link: Element, nearly: float) -> Inertial | None:
+def _inertial(link: XmlElement, nearly: float) -> Inertial | None:
     e = link.first("inertial")
     if e is None:
         return None
@@ -158,32 +228,56 @@ def _inertial(link: Element, nearly: float) -> Inertial | None:
         raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
     if inertia is None:  # a point mass: programs that read URDF say so and go on
         return Inertial(M, _pose(e.first("origin"), nearly), np.zeros((3, 3)))
-    xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    return Inertial(M, _pose(e.first("origin"), nearly), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    xx, xy, xz, yy, yz, zz = (
+        inertia.number(name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    return Inertial(
+        M, _pose(e.first("origin"), nearly), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    )
 
 
-def _joint(e: Element, nearly: float) -> Joint:
+def _joint(e: XmlElement, nearly: float) -> Joint:
     kind, name = e.text("type"), e.text("name")
     if kind not in (*MOVING, FIXED_TYPE):
-        raise DescriptionError(f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}", line=e.line)
+        raise DescriptionError(
+            f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}",
+            line=e.line,
+        )
     ends = {tag: child for tag in ("parent", "child") if (child := e.first(tag)) is not None}
     if len(ends) < 2:
-        raise DescriptionError(f"joint {name!r} needs <parent link=...> and <child link=...>", line=e.line)
+        raise DescriptionError(
+            f"joint {name!r} needs <parent link=...> and <child link=...>", line=e.line
+        )
     given = e.first("axis")
     axis = np.array([1.0, 0.0, 0.0]) if given is None else given.numbers("xyz", 3, "1 0 0")
     length = float(np.linalg.norm(axis))
     if kind == FIXED_TYPE:
         axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
     if length < 1e-6:
-        raise DescriptionError(f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line)
+        raise DescriptionError(
+            f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line
+        )
     limit, dynamics = e.first("limit"), e.first("dynamics")
     keys = ("lower", "upper", "velocity", "effort")
-    bounds = {key: limit.number(key, largest=sys.float_info.max) for key in keys if key in limit.attributes} if limit is not None else {}
-    limits = {key: x for key, x in bounds.items() if abs(x) <= LARGEST}  # some files say 1e16 for none
-    damping, friction = (0.0 if dynamics is None else dynamics.number(key, "0") for key in ("damping", "friction"))
+    bounds = (
+        {
+            key: limit.number(key, largest=sys.float_info.max)
+            for key in keys
+            if key in limit.attributes
+        }
+        if limit is not None
+        else {}
+    )
+    limits = {
+        key: x for key, x in bounds.items() if abs(x) <= LARGEST
+    }  # some files say 1e16 for none
+    damping, friction = (
+        0.0 if dynamics is None else dynamics.number(key, "0") for key in ("damping", "friction")
+    )
     axis = axis if abs(length - 1) < 1e-15 else axis / length
-    return Joint(name, kind, ends["parent"].text("link"), ends["child"].text("link"), _pose(e.first("origin"), nearly), axis, e.line,
-                 limits, damping, friction)  # fmt: skip
+    links = (ends["parent"].text("link"), ends["child"].text("link"))
+    pose = _pose(e.first("origin"), nearly)
+    return Joint(name, kind, *links, pose, axis, e.line, limits, damping, friction)
 
 
 def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> str:
@@ -193,21 +287,27 @@ def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> 
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
-                raise DescriptionError(f"joint {joint.name!r}: there is no link {link[:60]!r}", line=joint.line)
+                raise DescriptionError(
+                    f"joint {joint.name!r}: there is no link {link[:60]!r}", line=joint.line
+                )
         if joint.child in parent:
-            raise DescriptionError(f"joint {joint.name!r}: link {joint.child!r} has a parent already; a URDF is a tree", line=joint.line)
+            raise DescriptionError(
+                (
+                    f"joint {joint.name!r}: link {joint.child!r} has a parent already; a URDF is a "
+                    "tree"
+                ),
+                line=joint.line,
+            )
         if joint.name in names:
-            raise DescriptionError(f"joint {joint.name!r} is given twice; keep one", line=joint.line)
+            raise DescriptionError(
+                f"joint {joint.name!r} is given twice; keep one", line=joint.line
+            )
         names.add(joint.name)
         parent[joint.child] = joint.parent
     roots = [link for link in links if link not in parent]
     if len(roots) != 1:
-        found = ", ".join(map(repr, roots[:5])) or "none: the joints form a cycle"
-        raise DescriptionError(f"links without parent: {found}; expected one, the base", line=line)
-    reached, new = set(roots), list(roots)
-    while new:
-        new = [joint.child for joint in joints if joint.parent in new and joint.child not in reached]
-        reached |= set(new)
-    if lost := sorted(set(links) - reached):
-        raise DescriptionError(f"links {', '.join(lost[:5])} do not hang on {roots[0]!r}; their joints form a cycle", line=line)
+        roots_text = ", ".join(map(repr, roots[:5])) or "none: the joints form a cycle"
+        raise DescriptionError(
+            f"links without parent: {roots_text}; expected one, the base", line=line
+        )
     return roots[0]

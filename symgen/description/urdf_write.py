@@ -1,6 +1,8 @@
-"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of Khalil; with notes on what is not carried.
+"""URDF of a Robot with values: one link and one joint per frame, z axes, link frames those of
+Khalil; with notes on what is not carried.
 
-The joint frame is iTj at q_j = 0 as x y z and roll, pitch, yaw. Inertials are about the centre of mass, c = MS / M:
+The joint frame is iTj at q_j = 0 as x y z and roll, pitch, yaw. Inertials are about the centre of
+mass, c = MS / M:
 I = J - M (c'c 1 - c c').
 """
 
@@ -13,16 +15,27 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from symgen.description.expression import Expression
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, one_joint_parameters, parameter
+from symgen.description.robot import (
+    FIXED,
+    INERTIAL,
+    PRISMATIC,
+    REVOLUTE,
+    Frame,
+    Robot,
+    one_joint_parameters,
+    parameter,
+)
 from symgen.description.tree import Array, transform, turn
 from symgen.errors import DescriptionError
 
-UNLIMITED = 1e9  # where a URDF asks for a limit that the robot does not have
+NO_LIMIT = 1e9  # where a URDF asks for a limit that the robot does not have
 _TYPES = {REVOLUTE: "revolute", PRISMATIC: "prismatic", FIXED: "fixed"}
 _DYNAMICS = {"FV": "damping", "FS": "friction"}
 
 
-def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple[str, tuple[str, ...]]:
+def write_urdf(
+    robot: Robot, values: Mapping[str, float] | None = None
+) -> tuple[str, tuple[str, ...]]:
     """Text of the URDF, and what of `robot` it does not carry.
 
     Parameters
@@ -30,7 +43,8 @@ def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple
     robot : Robot
         Without loops; passive joints follow one joint each.
     values : mapping, SI, optional
-        Standard parameters by name; those of the robot file where left out. A URDF holds masses, so they must be those of a physical robot:
+        Standard parameters by name; those of the robot file where left out. A URDF holds masses, so
+        they must be those of a physical robot:
         of a feasible estimate, or CAD.
 
     Raises
@@ -41,13 +55,21 @@ def write_urdf(robot: Robot, values: Mapping[str, float] | None = None) -> tuple
     values = dict(robot.values if values is None else values)
     if robot.loops:
         raise DescriptionError(
-            f"{robot.name}: a URDF is a tree; this robot has {len(robot.loops)} closed loop{'s' * (len(robot.loops) > 1)}"
+            f"{robot.name}: a URDF is a tree; this robot has {len(robot.loops)} closed "
+            f"loop{'s' * (len(robot.loops) > 1)}"
         )
-    if missing := [name for j in robot.links for p in INERTIAL if (name := parameter(p, j)) not in values]:
+    if missing := [
+        name for j in robot.links for p in INERTIAL if (name := parameter(p, j)) not in values
+    ]:
         raise DescriptionError(
-            f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; add them under values, 0 where one is zero"
+            f"{robot.name}: no value of {', '.join(missing[:12])}{' ...' * (len(missing) > 12)}; "
+            "add them under values, 0 where one is zero"
         )
-    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(robot.name)}>", '  <link name="link0"/>']
+    lines = [
+        '<?xml version="1.0"?>',
+        f"<robot name={quoteattr(robot.name)}>",
+        '  <link name="link0"/>',
+    ]
     for f in robot.frames:
         lines += _link(robot, f.j, values) + _joint(robot, f, values)
     return "\n".join([*lines, "</robot>"]) + "\n", _losses(robot, values)
@@ -63,12 +85,17 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
         return [f'  <link name="link{j}"/>']
     *J, mx, my, mz, M = standard
     if M < 0 or (M == 0 and (mx, my, mz) != (0, 0, 0)):
-        raise DescriptionError(f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically feasible estimate")
+        raise DescriptionError(
+            f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically "
+            "feasible estimate"
+        )
     c = np.array([mx, my, mz]) / M if M else np.zeros(3)
     I = np.zeros((3, 3))
     I[np.triu_indices(3)] = J
     I -= M * (c @ c * np.eye(3) - np.outer(c, c))
-    inertia = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True))
+    inertia = dict(
+        zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True)
+    )
     return [
         f'  <link name="link{j}">',
         "    <inertial>",
@@ -85,7 +112,9 @@ def _numbers(row: Array) -> str:
 
 
 def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
-    T = transform([e.value(robot.constants) for e in (f.gamma, f.b, f.alpha, f.d, f.theta0, f.r0)])  # iTj at q_j = 0
+    T = transform(
+        [e.value(robot.constants) for e in (f.gamma, f.b, f.alpha, f.d, f.theta0, f.r0)]
+    )  # iTj at q_j = 0
     lines = [
         f'  <joint name="q{f.j}" type="{_kind(robot, f)}">',
         f'    <parent link="link{f.ant}"/>',
@@ -96,28 +125,42 @@ def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
         return [*lines, "  </joint>"]
     lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**_limit(robot, f))}/>"]
     own = one_joint_parameters(robot, _DYNAMICS)
-    dynamics = {key: values[name] for family, key in _DYNAMICS.items() if (name := parameter(family, f.j)) in own & set(values)}
+    dynamics = {
+        key: values[name]
+        for family, key in _DYNAMICS.items()
+        if (name := parameter(family, f.j)) in own & set(values)
+    }
     if dynamics:
         lines.append(f"    <dynamics {_attributes(**dynamics)}/>")
     if f.j in robot.constraints:
         leader, multiplier, offset = _follows(robot, f.j)
-        lines.append(f'    <mimic joint="q{leader}" {_attributes(multiplier=multiplier, offset=offset)}/>')
+        lines.append(
+            f'    <mimic joint="q{leader}" {_attributes(multiplier=multiplier, offset=offset)}/>'
+        )
     return [*lines, "  </joint>"]
 
 
 def _kind(robot: Robot, f: Frame) -> str:
-    return "continuous" if f.sigma == REVOLUTE and "lower" not in _limit(robot, f) else _TYPES[f.sigma]
+    return (
+        "continuous" if f.sigma == REVOLUTE and "lower" not in _limit(robot, f) else _TYPES[f.sigma]
+    )
 
 
 def _limit(robot: Robot, f: Frame) -> dict[str, float]:
     k = robot.joints.index(f.j) if f.mu else None
-    row = {key: robot.limits[key][k] for key in ("q", "qd", "tau") if k is not None and key in robot.limits}
+    row = {
+        key: robot.limits[key][k]
+        for key in ("q", "qd", "tau")
+        if k is not None and key in robot.limits
+    }
     bounds: dict[str, float] = {}
     if isinstance(ends := row.get("q"), tuple):
         bounds = {"lower": ends[0], "upper": ends[1]}
     elif f.sigma == PRISMATIC:
-        bounds = {"lower": -UNLIMITED, "upper": UNLIMITED}
-    largest = {written: row.get(key, UNLIMITED) for key, written in (("qd", "velocity"), ("tau", "effort"))}
+        bounds = {"lower": -NO_LIMIT, "upper": NO_LIMIT}
+    largest = {
+        written: row.get(key, NO_LIMIT) for key, written in (("qd", "velocity"), ("tau", "effort"))
+    }
     return bounds | {key: x for key, x in largest.items() if not isinstance(x, tuple)}
 
 
@@ -126,14 +169,20 @@ def _follows(robot: Robot, j: int) -> tuple[int, float, float]:
     e = robot.constraints[j]
     leaders = [i for i in robot.moving if f"q{i}" in e.symbols]
     factor = e.coefficient(f"q{leaders[0]}") if len(leaders) == 1 else None
-    if factor is None or (e - factor * Expression.symbol(f"q{leaders[0]}")).symbols & {f"q{leaders[0]}"}:
-        raise DescriptionError(f"{robot.name}: q{j} = {e}; in a URDF a joint follows one other, multiplier and offset")
+    if factor is None or (e - factor * Expression.symbol(f"q{leaders[0]}")).symbols & {
+        f"q{leaders[0]}"
+    }:
+        raise DescriptionError(
+            f"{robot.name}: q{j} = {e}; in a URDF a joint follows one other, multiplier and offset"
+        )
     rest = e - factor * Expression.symbol(f"q{leaders[0]}")
     return leaders[0], factor.value(robot.constants), rest.value(robot.constants)
 
 
 def _roll_pitch_yaw(R: Array) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll); roll is read off what yaw and pitch leave, so that it is exact at pitch = +-pi/2 too."""
+    """R = Rz(yaw) Ry(pitch) Rx(roll); roll is read off what yaw and pitch leave, so that it is
+    exact at pitch = +-pi/2 too.
+    """
     c = math.hypot(R[0, 0], R[1, 0])
     yaw = math.atan2(R[1, 0], R[0, 0]) if c > 1e-12 else 0.0
     pitch = math.atan2(-R[2, 0], c)
@@ -143,7 +192,11 @@ def _roll_pitch_yaw(R: Array) -> Array:
 
 def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
     inertial = {parameter(p, j) for j in robot.links for p in INERTIAL}
-    lost = [name for name in robot.parameters if name not in inertial | one_joint_parameters(robot, _DYNAMICS)]
+    lost = [
+        name
+        for name in robot.parameters
+        if name not in inertial | one_joint_parameters(robot, _DYNAMICS)
+    ]
     notes = []
     if dropped := [name for name in lost if values.get(name, 0.0)]:
         notes.append(f"values without a place in a URDF, left out: {', '.join(dropped)}")
@@ -152,8 +205,14 @@ def _losses(robot: Robot, values: Mapping[str, float]) -> tuple[str, ...]:
     notes.append("constants as numbers, frames as placements: formulas are not carried")
     gravity = tuple(e.value(robot.constants) for e in robot.gravity)
     if gravity[:2] != (0.0, 0.0) or gravity[2] >= 0:
-        notes.append(f"gravity {gravity} m/s^2: a URDF has none, programs assume -z of the root link")
-    notes += [f"{what} not carried" for what in ("title", "source", "drives", "labels") if getattr(robot, what)]
+        notes.append(
+            f"gravity {gravity} m/s^2: a URDF has none, programs assume -z of the root link"
+        )
+    notes += [
+        f"{what} not carried"
+        for what in ("title", "source", "drives", "labels")
+        if getattr(robot, what)
+    ]
     if absent := [key for key in ("q", "qd", "tau") if key not in robot.limits]:
-        notes.append(f"no limits of {', '.join(absent)}: written as continuous or {UNLIMITED:g}")
+        notes.append(f"no limits of {', '.join(absent)}: written as continuous or {NO_LIMIT:g}")
     return tuple(notes)

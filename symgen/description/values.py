@@ -1,4 +1,6 @@
-"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of a table or of an estimate."""
+"""Numbers for a robot that come from elsewhere: constants of a command line, standard parameters of
+a table or of an estimate.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from symgen.errors import DescriptionError
 
 
 def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
-    """Name and number of NAME=NUMBER, as `option` takes them, the number a constant expression. Raises DescriptionError or ExpressionError."""
+    """Name and number of NAME=NUMBER, as `option` takes them, the number a constant expression.
+    Raises DescriptionError or ExpressionError.
+    """
     name, equals, value = text.rpartition("=")
     try:
         if name.strip() and equals:
@@ -24,7 +28,8 @@ def assignment(text: str, option: str = "--constant") -> tuple[str, float]:
 
 
 def values_of_csv(content: bytes, file: str) -> dict[str, float]:
-    """Standard parameters by name from lines of name,value or name,value,note; a header with these names may stand first.
+    """Standard parameters by name from lines of name,value or name,value,note; a header with these
+    names may stand first.
 
     Raises DescriptionError, with file and line, where a line is something else, or there is none.
     """
@@ -40,9 +45,13 @@ def values_of_csv(content: bytes, file: str) -> dict[str, float]:
             name, value = row[:2] if len(row) == 3 else row
             values[name] = float(value)
         except ValueError as error:
-            raise DescriptionError(f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value") from error
+            raise DescriptionError(
+                f"{file}, line {line}: found {','.join(row)[:60]!r}; expected name,value"
+            ) from error
         if not isfinite(values[name]):
-            raise DescriptionError(f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number")
+            raise DescriptionError(
+                f"{file}, line {line}: {name[:60]} is {value[:60]}; expected a finite number"
+            )
     if not values:
         raise DescriptionError(f"{file}: no values; expected lines of name,value")
     return values
@@ -70,11 +79,18 @@ def with_estimate(robot: Robot, standard: object, file: str) -> Robot:
     """
     if not isinstance(standard, dict):
         raise DescriptionError(
-            f"{file}: holds base parameters alone; a program needs standard ones: set estimate: {{method: feasible}} in the study and identify again"
+            f"{file}: holds base parameters alone; a program needs standard ones: set estimate: "
+            f"{{method: feasible}} in the study and identify again"
         )
     for name, x in standard.items():
         if isinstance(x, bool) or not isinstance(x, int | float) or not abs(x) < 1e300:
-            raise DescriptionError(f"{file}: details.standard: {name[:60]} is {x!r:.60}; expected a number; the file was changed")
+            raise DescriptionError(
+                f"{file}: details.standard: {name[:60]} is {x!r:.60}; expected a number; the file "
+                "was changed"
+            )
     if unknown := sorted(set(standard) - set(robot.parameters)):
-        raise DescriptionError(f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the estimate of another robot?")
+        raise DescriptionError(
+            f"{file}: {', '.join(unknown[:12])} are no parameters of {robot.name}; is it the "
+            "estimate of another robot?"
+        )
     return with_values(robot, {name: float(x) for name, x in standard.items()})

@@ -1,11 +1,14 @@
 """XML text to plain elements with their lines, refusing what a table of numbers does not need.
 
-The file is read by expat alone: a document type (hence entities, internal or external) ends the reading where it stands, nesting and the
-number of elements are bounded while reading, and nothing a file names is opened. Every error names its line.
+The file is read by expat alone: a document type (hence entities, internal or external) ends the
+reading where it stands, nesting and the
+number of elements are bounded while reading, and nothing a file names is opened. Every error names
+its line.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -18,16 +21,24 @@ MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
 @dataclass
-class Element:
+class XmlElement:
     """An XML element, the line and the byte where it starts."""
 
     tag: str
     attributes: dict[str, str]
     line: int
-    children: list[Element] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
     byte: int = 0
 
-    def first(self, tag: str) -> Element | None:
+    def own(self, *tags: str) -> Iterator[XmlElement]:
+        """Children with these tags, those inside its frames (MJCF) too."""
+        for child in self.children:
+            if child.tag in tags:
+                yield child
+            elif child.tag == "frame":
+                yield from child.own(*tags)
+
+    def first(self, tag: str) -> XmlElement | None:
         return next((child for child in self.children if child.tag == tag), None)
 
     def text(self, name: str, default: str | None = None) -> str:
@@ -36,7 +47,9 @@ class Element:
             raise DescriptionError(f"<{self.tag}> has no {name}; add it", line=self.line)
         return value
 
-    def numbers(self, name: str, n: int, default: str | None = None, largest: float = LARGEST) -> Array:
+    def numbers(
+        self, name: str, n: int, default: str | None = None, largest: float = LARGEST
+    ) -> Array:
         """n finite numbers of an attribute."""
         text = self.text(name, default)
         words = text.split()
@@ -46,7 +59,13 @@ class Element:
             values = []
         if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
             raise DescriptionError(
-                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of size at most {largest:g}", line=self.line
+                (
+                    f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of "
+                    "size "
+                    "at "
+                    f"most {largest:g}"
+                ),
+                line=self.line,
             )
         return np.array(values)
 
@@ -55,12 +74,14 @@ class Element:
         return float(self.numbers(name, 1, default, largest)[0])
 
 
-def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> Element:
+def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
     """The root element; DescriptionError with the line of whatever is no plain XML."""
     if len(content) > MAX_BYTES:
-        raise DescriptionError(f"more than {MAX_BYTES} bytes; meshes belong into files of their own", line=1)
+        raise DescriptionError(
+            f"more than {MAX_BYTES} bytes; meshes belong into files of their own", line=1
+        )
     parser = expat.ParserCreate()
-    top = Element("", {}, 0)
+    top = XmlElement("", {}, 0)
     open_, count = [top], 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -68,22 +89,35 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> Element:
         count += 1
         line = parser.CurrentLineNumber
         if len(open_) > max_depth or count > MAX_ELEMENTS:
-            raise DescriptionError(f"nested more than {max_depth} deep, or more than {MAX_ELEMENTS} elements", line=line)
+            raise DescriptionError(
+                f"nested more than {max_depth} deep, or more than {MAX_ELEMENTS} elements",
+                line=line,
+            )
         if tag.startswith("xacro:"):
-            raise DescriptionError(f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)", line=line)
-        open_.append(Element(tag, attributes, line, byte=parser.CurrentByteIndex))
+            raise DescriptionError(
+                f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)",
+                line=line,
+            )
+        open_.append(XmlElement(tag, attributes, line, byte=parser.CurrentByteIndex))
         open_[-2].children.append(open_[-1])
 
     def refuse(*_: object) -> int:
-        raise DescriptionError("document types and entities are not read; remove <!DOCTYPE ...>", line=parser.CurrentLineNumber)
+        raise DescriptionError(
+            "document types and entities are not read; remove <!DOCTYPE ...>",
+            line=parser.CurrentLineNumber,
+        )
 
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: open_.pop()
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = (
+        refuse
+    )
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
-        raise DescriptionError(f"no XML: {expat.ErrorString(error.code)}", line=error.lineno) from error
+        raise DescriptionError(
+            f"no XML: {expat.ErrorString(error.code)}", line=error.lineno
+        ) from error
     except (LookupError, ValueError) as error:  # of an encoding that is not one
         raise DescriptionError(f"no XML: {error}; save the file as UTF-8", line=1) from error
     return top.children[0]

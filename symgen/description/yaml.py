@@ -1,22 +1,26 @@
-"""YAML 1.2 text to plain data with line numbers, and from there to a checked Robot.
+"""Robot files: YAML 1.2 text to plain data with line numbers, from there to a checked Robot, and
+back to a text that reads as the same Robot.
 
-Only what a table of numbers needs is read: mappings, lists and scalars of the core schema. Tags, anchors and aliases, merge
-keys, repeated keys, second documents and non-finite numbers are refused, so that a file means what it shows. Whatever the
+Only what a table of numbers needs is read: mappings, lists and scalars of the core schema. Tags,
+anchors and aliases, merge
+keys, repeated keys, second documents and non-finite numbers are refused, so that a file means what
+it shows. Whatever the
 bytes are, the only exception that leaves this module is DescriptionError, with file and line.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from pydantic import ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.events import (
     AliasEvent,
-    DocumentEndEvent,
+    DocumentStartEvent,
     Event,
     MappingEndEvent,
     MappingStartEvent,
@@ -25,140 +29,224 @@ from ruamel.yaml.events import (
     SequenceStartEvent,
 )
 
-from symgen.description import robot as model
 from symgen.description.advice import yaml_advice
-from symgen.description.build import build
+from symgen.description.expression import ONE
+from symgen.description.fields import Path, located
+from symgen.description.parts import GEOMETRY, Element, Form, Row
 from symgen.description.robot import Robot
-from symgen.description.schema import SCHEMA, RobotFile, explain
+from symgen.description.schema import SCHEMA, robot_of
 from symgen.errors import DescriptionError
 
 MAX_BYTES, MAX_NESTING, MAX_SCALAR = 200_000, 12, 4000
 
 _INTEGER = re.compile(r"[-+]?[0-9]{1,15}\Z")
 _DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,3})?\Z")
-_CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
-_CONSTANTS |= {word: value for value, words in ((True, "true True TRUE"), (False, "false False FALSE")) for word in words.split()}
+CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
+CONSTANTS |= {
+    word: value
+    for value, words in ((True, "true True TRUE"), (False, "false False FALSE"))
+    for word in words.split()
+}
+
+
+WORDS = ("null", "true", "false", "yes", "no", "on", "off")  # of YAML, of version 1.1 too
+DRIVES = ("ratio", "offset", "torque_constant")
+BY_ROW = ("frames", "elements", "limits", "values", "labels")
 
 
 def parse_robot(content: bytes, file: str) -> Robot:
     """The robot described by the bytes of a file called `file`."""
-    lines: dict[model.Path, int] = {}
-    try:
+    lines: dict[Path, int] = {}
+
+    def line(path: Path) -> int:
+        places = (path[:k] for k in range(len(path), -1, -1))
+        return next((lines[place] for place in places if place in lines), 1)
+
+    with located(file, line):
         data = _document(content, lines)
         _check_version(data)
-        try:
-            table = RobotFile.model_validate(data)
-        except ValidationError as error:
-            message, path = explain(error)
-            raise DescriptionError(message, path=path) from error
-        return build(table, file=file, sha256=hashlib.sha256(content).hexdigest())
-    except DescriptionError as error:
-        line = error.line or next((lines[error.path[:k]] for k in range(len(error.path), -1, -1) if error.path[:k] in lines), 1)
-        raise DescriptionError(error.message, path=error.path, file=file, line=line) from error.__cause__
+        return robot_of(data, file, hashlib.sha256(content).hexdigest())
 
 
 def _check_version(data: Any) -> None:
     if not isinstance(data, dict):
         raise DescriptionError(
-            f"found {'nothing' if data is None else repr(data)[:60]}; expected a robot file: a table that starts with `symgen: {SCHEMA}`"
+            f"found {'nothing' if data is None else repr(data)[:60]}; expected a robot file: a "
+            f"table that starts with `symgen: {SCHEMA}`"
         )
     version = data.get("symgen")
     if isinstance(version, bool) or version != SCHEMA:
         given = f"symgen: {version!r}"[:60] if "symgen" in data else "no key `symgen`"
-        raise DescriptionError(f"{given}; expected `symgen: {SCHEMA}`, the schema version this release reads", path=("symgen",))
+        raise DescriptionError(
+            f"{given}; expected `symgen: {SCHEMA}`, the schema version this release reads",
+            path=("symgen",),
+        )
 
 
-def _document(content: bytes, lines: dict[model.Path, int]) -> Any:
+def _document(content: bytes, lines: dict[Path, int]) -> Any:
     """Plain data of the one document in `content`; `lines` receives the line of every key path."""
     if len(content) > MAX_BYTES:
         raise DescriptionError(f"more than {MAX_BYTES} bytes; a robot file has a few thousand")
     try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise DescriptionError(f"byte 0x{content[error.start]:02x} is not UTF-8; save the file as UTF-8", line=line) from error
-    try:
-        events = YAML(typ="safe", pure=True).parse(text)
-        return _Reader(iter(events), lines).document()
+        events = _plain(YAML(typ="safe", pure=True).parse(content.decode("utf-8-sig")))
+        next(events)  # start of the stream
+        if not isinstance(next(events), DocumentStartEvent):
+            return None
+        data = _value(next(events), events, (), lines)
+        next(events)  # end of the document
+        if isinstance(more := next(events), DocumentStartEvent):
+            raise DescriptionError(
+                "a second document starts here; a robot file holds one", line=_line(more)
+            )
+        return data
     except DescriptionError:
         raise
+    except UnicodeDecodeError as error:
+        line, byte = content.count(b"\n", 0, error.start) + 1, content[error.start]
+        message = f"byte 0x{byte:02x} is not UTF-8; save the file as UTF-8"
+        raise DescriptionError(message, line=line) from error
     except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        problem = str(error.problem or error.context)
-        raise DescriptionError(f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None) from error
-    except Exception as error:  # on malformed text the scanner also raises IndexError, AttributeError and others: none of it is YAML
-        raise DescriptionError(f"not YAML: {str(error).splitlines()[0] if str(error) else type(error).__name__}") from error
+        mark, problem = (
+            error.problem_mark or error.context_mark,
+            str(error.problem or error.context),
+        )
+        raise DescriptionError(
+            f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None
+        ) from error
+    except Exception as error:  # on malformed text the scanner raises IndexError and others too
+        first = (str(error) or type(error).__name__).splitlines()[0]
+        raise DescriptionError(f"not YAML: {first}") from error
 
 
-class _Reader:
-    """Builds plain data from the events of one document."""
+def _line(event: Any) -> int:
+    return int(event.start_mark.line) + 1
 
-    def __init__(self, events: Any, lines: dict[model.Path, int]) -> None:
-        self.events, self.lines = events, lines
 
-    def next(self) -> Event:
-        event: Event = next(self.events)
-        line = event.start_mark.line + 1
+def _plain(events: Iterator[Event]) -> Iterator[Event]:
+    """The events, without what makes a file mean more than it shows."""
+    for event in events:
         if isinstance(event, AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise DescriptionError("anchors and aliases (& and *) are not read; write the value out", line=line)
+            message = "anchors and aliases (& and *) are not read; write the value out"
+            raise DescriptionError(message, line=_line(event))
         if getattr(event, "tag", None) not in (None, "!"):
-            raise DescriptionError("tags (!) are not read; write a plain value", line=line)
-        return event
+            raise DescriptionError("tags (!) are not read; write a plain value", line=_line(event))
+        yield event
 
-    def document(self) -> Any:
-        data = None
-        for event in iter(self.next, None):
-            if isinstance(event, ScalarEvent | MappingStartEvent | SequenceStartEvent):
-                data = self.value(event, ())
-            elif isinstance(event, DocumentEndEvent):
-                break
-            elif type(event).__name__ == "StreamEndEvent":
-                return None
-        end = self.next()
-        if type(end).__name__ != "StreamEndEvent":
-            raise DescriptionError("a second document starts here; a robot file holds one", line=end.start_mark.line + 1)
-        return data
 
-    def value(self, event: Event, path: model.Path) -> Any:
-        self.lines.setdefault(path, event.start_mark.line + 1)
-        if len(path) > MAX_NESTING:
-            raise DescriptionError(f"nested more than {MAX_NESTING} deep", line=event.start_mark.line + 1)
-        if isinstance(event, MappingStartEvent):
-            return self.mapping(path)
-        if isinstance(event, SequenceStartEvent):
-            items: list[Any] = []
-            while not isinstance(item := self.next(), SequenceEndEvent):
-                items.append(self.value(item, (*path, len(items))))
-            return items
+def _value(event: Event, events: Iterator[Event], path: Path, lines: dict[Path, int]) -> Any:
+    """Plain data of the value that starts with `event`."""
+    lines.setdefault(path, _line(event))
+    if len(path) > MAX_NESTING:
+        raise DescriptionError(f"nested more than {MAX_NESTING} deep", line=_line(event))
+    if isinstance(event, MappingStartEvent):
+        return _mapping(events, path, lines)
+    if not isinstance(event, SequenceStartEvent):
         return _scalar(event)
+    items: list[Any] = []
+    while not isinstance(item := next(events), SequenceEndEvent):
+        items.append(_value(item, events, (*path, len(items)), lines))
+    return items
 
-    def mapping(self, path: model.Path) -> dict[Any, Any]:
-        table: dict[Any, Any] = {}
-        while not isinstance(event := self.next(), MappingEndEvent):
-            line = event.start_mark.line + 1
-            key = _scalar(event) if isinstance(event, ScalarEvent) else None
-            if not isinstance(key, int | str) or isinstance(key, bool) or key == "<<":
-                raise DescriptionError(f"key {getattr(event, 'value', '[...]')!r:.40}: expected a name or a whole number", line=line)
-            if key in table:
-                raise DescriptionError(
-                    f"key {key!r} is given twice (first on line {self.lines[(*path, key)]}); keep one", path=(*path, key), line=line
-                )
-            self.lines[(*path, key)] = line
-            table[key] = self.value(self.next(), (*path, key))
-        return table
+
+def _mapping(events: Iterator[Event], path: Path, lines: dict[Path, int]) -> dict[Any, Any]:
+    table: dict[Any, Any] = {}
+    while not isinstance(event := next(events), MappingEndEvent):
+        key: Any = _scalar(event) if isinstance(event, ScalarEvent) else None
+        message = ""
+        if not isinstance(key, int | str) or isinstance(key, bool) or key == "<<":
+            given = getattr(event, "value", "[...]")
+            message = f"key {given!r:.40}: expected a name or a whole number"
+        elif key in table:
+            first = lines[(*path, key)]
+            message = f"key {key!r} is given twice (first on line {first}); keep one"
+        if message:
+            raise DescriptionError(message, line=_line(event))
+        lines[(*path, key)] = _line(event)
+        table[key] = _value(next(events), events, (*path, key), lines)
+    return table
 
 
 def _scalar(event: Any) -> Any:
     """null, bool, int and float of the YAML 1.2 core schema when plain, else text."""
     text: str = event.value
     if len(text) > MAX_SCALAR:
-        raise DescriptionError(f"text of {len(text)} characters; at most {MAX_SCALAR} are read", line=event.start_mark.line + 1)
+        message = f"text of {len(text)} characters; at most {MAX_SCALAR} are read"
+        raise DescriptionError(message, line=_line(event))
     if event.style is not None:
         return text
-    if text in _CONSTANTS:
-        return _CONSTANTS[text]
+    if text in CONSTANTS:
+        return CONSTANTS[text]
     if _INTEGER.match(text):
         return int(text)
-    if _DECIMAL.match(text) and (number := float(text)) - number == 0:
-        return number
-    return text
+    decimal = _DECIMAL.match(text)
+    return number if decimal and (number := float(text)) - number == 0 else text
+
+
+def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
+    """Text of the file; `comments` are lines that stand first, each after a #."""
+    drives = robot.drives
+    tables: dict[str, Any] = {
+        "symgen": SCHEMA,
+        "name": robot.name,
+        "title": json.dumps(robot.title, ensure_ascii=False) if robot.title else "",
+        "source": json.dumps(robot.source, ensure_ascii=False) if robot.source else "",
+        "gravity": robot.gravity,
+        "constants": robot.constants,
+        "frames": {
+            f.j: {
+                key: value
+                for key in ("ant", "sigma", "mu", *GEOMETRY)
+                if (value := getattr(f, key)) or key not in ("gamma", "b")
+            }
+            for f in robot.frames
+        },
+        "loops": [
+            {"cut": loop.cut, "twin": loop.twin}
+            | ({"start": {f"q{j}": x for j, x in loop.start.items()}} if loop.start else {})
+            for loop in robot.loops
+        ],
+        "constraints": {f"q{j}": e for j, e in robot.constraints.items()},
+        "massless": sorted(robot.massless),
+        "elements": {e.family: _element(robot, e) for e in robot.elements},
+        "drives": {} if drives is None else {key: getattr(drives, key) for key in DRIVES},
+        "limits": robot.limits,
+        "values": robot.values,
+        "labels": {j: json.dumps(x, ensure_ascii=False) for j, x in robot.labels.items()},
+    }
+    lines = [f"# {line}" for line in comments]
+    for key, table in tables.items():
+        if key in BY_ROW and table:
+            lines += [f"{key}:", *(f"  {_flow(k)}: {_flow(row)}" for k, row in table.items())]
+        elif key == "loops" and table:
+            lines += ["loops:", *(f"  - {_flow(loop)}" for loop in table)]
+        elif table or key == "constants":
+            lines.append(f"{key}: {_flow(table)}")
+    return "\n".join(lines) + "\n"
+
+
+def _flow(value: Any) -> str:
+    """A value on one line; a name that YAML reads as something else between quotes."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{_flow(key)}: {_flow(x)}' for key, x in value.items())}}}"
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(_flow, value))}]"
+    text = str(value)
+    return f'"{text}"' if text.lower() in WORDS else text
+
+
+def _element(robot: Robot, e: Element) -> dict[str, Any]:
+    everywhere = e.along == {j: {j: ONE} for j in robot.joints}
+    along = "all" if everywhere else {j: _row(row) for j, row in e.along.items()}
+    form = {j: _form(form) for j, form in e.form.items()}
+    table = {"kind": e.kind, "along": along, "form": form, "when": e.when}
+    return {key: value for key, value in table.items() if value}
+
+
+def _row(row: Row) -> str:
+    return " + ".join(f"q{j}" if c == ONE else f"({c})*q{j}" for j, c in row.items())
+
+
+def _form(form: Form) -> str:
+    """q' B q, each pair once."""
+    terms = [(i, j, c if i == j else c * 2) for (i, j), c in form.items() if i <= j]
+    return " + ".join(f"q{i}*q{j}" if c == ONE else f"({c})*q{i}*q{j}" for i, j, c in terms)

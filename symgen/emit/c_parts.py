@@ -1,6 +1,8 @@
-"""The body of a long kernel in parts, each a C function: compilers take time with the square of a function's length.
+"""The body of a long kernel in parts, each a C function: compilers take time with the square of a
+function's length.
 
-What one part computes and a later one reads crosses over in a row of V, shape (rows, TILE); rows are used again once their last reader is done.
+What one part computes and a later one reads crosses over in a row of V, shape (rows, TILE); rows
+are used again once their last reader is done.
 """
 
 from __future__ import annotations
@@ -36,16 +38,25 @@ class Part:
     words: frozenset[str]
 
 
-def parts(before: Sequence[str], inputs: Sequence[str], sections: Sequence[Section]) -> tuple[list[Part], int]:
-    """The parts of a body and the rows of V; none where the body is short. `inputs` are lines that any part may repeat."""
+def parts(
+    before: Sequence[str], inputs: Sequence[str], sections: Sequence[Section]
+) -> tuple[list[Part], int]:
+    """The parts of a body and the rows of V; none where the body is short. `inputs` are lines that
+    any part may repeat.
+    """
     lines = [(section.title, line) for section in sections for line in section.lines]
     if len(lines) <= LONG:
         return [], 0
     count = -(-len(lines) // PART)
     size = -(-len(lines) // count)
     groups = [lines[start : start + size] for start in range(0, len(lines), size)]
-    home = {name: p for p, group in enumerate(groups) for _, line in group if (name := _defined(line))}
-    reads = [[name for name in words_of(line for _, line in group) if home.get(name, p) < p] for p, group in enumerate(groups)]
+    home = {
+        name: p for p, group in enumerate(groups) for _, line in group if (name := _defined(line))
+    }
+    reads = [
+        [name for name in words_of(line for _, line in group) if home.get(name, p) < p]
+        for p, group in enumerate(groups)
+    ]
     row, rows = _rows(home, reads)
     return [_part(before, inputs, groups[p], reads[p], row) for p in range(len(groups))], rows
 
@@ -66,10 +77,16 @@ def _rows(home: dict[str, int], reads: Sequence[Sequence[str]]) -> tuple[dict[st
 
 
 def _part(
-    before: Sequence[str], inputs: Sequence[str], group: Sequence[tuple[str, str]], reads: Sequence[str], row: dict[str, int]
+    before: Sequence[str],
+    inputs: Sequence[str],
+    group: Sequence[tuple[str, str]],
+    reads: Sequence[str],
+    row: dict[str, int],
 ) -> Part:
     words = words_of(line for _, line in group)
-    own = [line for line in inputs if _defined(line) in words] + [f"const double {name} = V[{row[name]}][t];" for name in reads]
+    own = [line for line in inputs if _defined(line) in words] + [
+        f"const double {name} = V[{row[name]}][t];" for name in reads
+    ]
     under: list[tuple[str, list[str]]] = [("Inputs", own)]
     for title, line in group:
         if title != under[-1][0]:  # the same heading may come again, later: lines stay in order
@@ -78,7 +95,11 @@ def _part(
         under[-1][1].extend([line, f"V[{row[name]}][t] = {name};"] if name in row else [line])
     fixed = definitions(before, words)
     sections = tuple(Section(title, tuple(lines)) for title, lines in under if lines)
-    return Part(fixed, sections, frozenset(words_of([*fixed, *(line for section in sections for line in section.lines)])))
+    return Part(
+        fixed,
+        sections,
+        frozenset(words_of([*fixed, *(line for section in sections for line in section.lines)])),
+    )
 
 
 def definitions(before: Sequence[str], words: Iterable[str]) -> tuple[str, ...]:

@@ -1,4 +1,6 @@
-"""The header of an emitted module, and its tables: what a reader needs before the first line of code."""
+"""The header of an emitted module, and its tables: what a reader needs before the first line of
+code.
+"""
 
 from __future__ import annotations
 
@@ -6,74 +8,126 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
+from symgen.derive.closure import Closure
 from symgen.derive.columns import element_names
-from symgen.derive.loops import close
-from symgen.derive.names import FAMILIES
+from symgen.derive.names import FAMILIES, families_of
 from symgen.description.robot import FIXED, Robot
-from symgen.emit.spec import WIDTH, ModuleSpec, unit
+from symgen.emit.printers import Text
+from symgen.emit.render import WIDTH
+from symgen.emit.spec import ModuleSpec, unit
 from symgen.regroup.regrouping import Regrouping
 
 COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
 
 
-def header(spec: ModuleSpec) -> list[str]:
-    """Lines of the module docstring below the command."""
+def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[str]:
+    """Lines of the module docstring below the command.
+
+    texts : the printed models, by name. formulas : whether the regrouping formulas stand here.
+    """
     robot, regrouping = spec.robot, spec.regrouping
     gravity = ", ".join(str(e) for e in robot.gravity)
     lines = [
         "",
         "Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS",
         *(f"    {line}" for line in frame_table(robot)),
-        f"Gravity     acceleration ({gravity}) in frame 0, m/s**2",
-        "Torques     delivered by the actuators, so friction enters with a plus: Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET",
-        "Parameters  XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), MX MY MZ first moments",
+        *(wrapped(f"Angles      {robot.angles}", "") if robot.angles else ()),
+        *line_of("Gravity", f"acceleration ({gravity}) in frame 0, m/s**2"),
+        *line_of(
+            "Torques",
+            "delivered by the actuators, so friction enters with a plus: "
+            "Gamma = A*qdd + H + FV*qd + FS*sign(qd) + OFFSET",
+        ),
+        *line_of(
+            "Parameters",
+            "XX..ZZ inertia tensor about the origin of the link frame (XY = -integral x*y dm), "
+            "MX MY MZ first moments",
+        ),
         *(f"Element     {line}" for line in element_lines(robot)),
-        *(f"Loop        {line}" for line in loop_lines(robot)),
+        *(
+            line
+            for text in loop_lines(robot, spec.derivation.closure)
+            for line in line_of("Loop", text)
+        ),
         "",
-        f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990), {regrouping.method}",
+        f"Base parameters, {len(regrouping)} of {len(robot.parameters)}; Gautier and Khalil (1990)",
+        *wrapped(regrouping.method, "    "),
     ]
-    alone = [b.name for b in regrouping.base if b.name == b.own]
-    for b in regrouping.base:
-        if b.name != b.own:
-            lines += wrapped(f"{b.name} = {b.formula}", "    ")
-    if alone:
-        lines += wrapped("as they are: " + " ".join(alone), "    ")
-    lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "")
+    if formulas:
+        for name, formula in grouped(regrouping).items():
+            lines += wrapped(f"{name} = {formula}", "    ")
+    else:
+        lines.append("    FORMULAS says what they are made of; what it leaves out is as it is")
+    lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "    ")
     absorbing = one_sided_friction_that_absorbs(regrouping)
     if absorbing:
         lines += wrapped(
-            f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells from friction; at rest, "
-            "in `gravity` and in `bias` at qd = 0, that force is missing.",
-            "",
+            f"In motion only: {' '.join(absorbing)} take in a constant force that no offset tells "
+            "from friction; at rest, in `gravity` and in `bias` at qd = 0, that force is missing.",
+            "    ",
         )
     lines += [
         "",
-        "Names       family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 column 1; p plus, m minus in sums",
+        *line_of(
+            "Names",
+            "family, then component digits, then link: W12 is component 1 of link 2, U312 row 3 "
+            "column 1, Z132 component 1 in frame 3 of the axis of joint 2; a letter at the end "
+            "is a part that several share, N16a of N16",
+        ),
     ]
-    lines += [f"    {family:<4} {FAMILIES[family]}" for family in families(spec)]
-    return [*lines, "", "Cost per sample", *(f"    {name:<17} {f.cost}" for name, f in spec.functions.items())]
+    given = {name for text in texts.values() for name in text.given}
+    given |= {"GAM1"} | {e.comment for e in spec.functions["regressor"].computed}
+    lines += [f"    {family:<4} {FAMILIES[family]}" for family in families_of(given)]
+    for name, of in sorted(next(iter(texts.values())).names.renamed.items()):
+        lines += wrapped(f"{name} stands for {of}, which is another name of this text", "    ")
+    return [
+        *lines,
+        "",
+        "Cost per sample",
+        *(f"    {name:<18} {f.cost}" for name, f in spec.functions.items()),
+    ]
 
 
-def families(spec: ModuleSpec) -> list[str]:
-    """Families of the names in any block, in the order of FAMILIES."""
-    occurring = {family for f in spec.functions.values() for family in f.families} | {"GAM", "DG"}
-    return [family for family in FAMILIES if family in occurring]
+def line_of(title: str, text: str) -> list[str]:
+    """A line of the header, its title in the first column."""
+    return wrapped(f"{title:<11} {text}", "", " " * 12)
+
+
+def grouped(regrouping: Regrouping) -> dict[str, str]:
+    """Formulas of the base parameters that take in others."""
+    return {b.name: str(b.formula) for b in regrouping.base if b.name != b.own}
 
 
 def one_sided_friction_that_absorbs(regrouping: Regrouping) -> list[str]:
-    """Base parameters of one-sided Coulomb friction that stand for a weight too: D_FSP - D_FSN = 1 in motion, 0 at rest."""
+    """Base parameters of one-sided Coulomb friction that stand for a weight too: D_FSP - D_FSN = 1
+    in motion, 0 at rest.
+    """
     elements = element_names(regrouping.robot)
-    return [b.name for b in regrouping.base if b.name != b.own and b.own in elements and elements[b.own][0].when]
+    return [
+        b.name
+        for b in regrouping.base
+        if b.name != b.own and b.own in elements and elements[b.own][0].when
+    ]
 
 
 def frame_table(robot: Robot) -> list[str]:
-    """The rows of the frame table, aligned; columns that are zero everywhere are left out, except the classical six."""
+    """The rows of the frame table, aligned; columns that are zero everywhere are left out, except
+    the classical six.
+    """
     kept = informative_columns(robot)
     table = [list(kept), *([str(getattr(f, c)) for c in kept] for f in robot.frames)]
     if robot.labels:
-        table = [[*row, label] for row, label in zip(table, ["label", *(robot.labels.get(f.j, "") for f in robot.frames)], strict=True)]
+        table = [
+            [*row, label]
+            for row, label in zip(
+                table, ["label", *(robot.labels.get(f.j, "") for f in robot.frames)], strict=True
+            )
+        ]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return ["  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in table]
+    return [
+        "  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+        for row in table
+    ]
 
 
 def informative_columns(robot: Robot) -> tuple[str, ...]:
@@ -90,7 +144,9 @@ def element_lines(robot: Robot) -> list[str]:
     """One line per element family: which rows or forms its parameters act along."""
     lines = []
     for e in robot.elements:
-        rows = {j: " + ".join(_times(c, f"q{i}") for i, c in row.items()) for j, row in e.along.items()}
+        rows = {
+            j: " + ".join(_times(c, f"q{i}") for i, c in row.items()) for j, row in e.along.items()
+        }
         own = [j for j in rows if rows[j] == f"q{j}"]
         parts = []
         if own:
@@ -102,17 +158,21 @@ def element_lines(robot: Robot) -> list[str]:
     return lines
 
 
-def loop_lines(robot: Robot) -> list[str]:
+def loop_lines(robot: Robot, closure: Closure) -> list[str]:
     """The loops, and every passive joint as a function of others."""
-    closure = close(robot)
     lines = [f"frame {loop.twin} coincides with cut frame {loop.cut}" for loop in robot.loops]
     for j in robot.passive:
         if j in closure.tied:
             continue
-        lines.append(f"q{j} = {closure.formula(j)}" + (" (declared)" if j in robot.constraints else ""))
+        lines.append(
+            f"q{j} = {closure.formula(j)}" + (" (declared)" if j in robot.constraints else "")
+        )
     if closure.tied:
         start = ", ".join(f"q{j} = {closure.start[j]:.4g}" for j in closure.independent)
-        lines.append(f"q{', q'.join(map(str, closure.tied))} from the closure equations by Newton; assembly mode of {start}")
+        lines.append(
+            f"q{', q'.join(map(str, closure.tied))} from the closure equations by Newton; assembly "
+            f"mode of {start}"
+        )
     return lines
 
 
@@ -130,8 +190,13 @@ def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
 
 
 def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
-    """The constants of the module, as Python source; STRUCTURE as an array where the module has `numpy`, else as a tuple of rows."""
+    """The constants of the module, as Python source; STRUCTURE as an array where the module has
+    `numpy`, else as a tuple of rows.
+    """
     robot, regrouping = spec.robot, spec.regrouping
+    units = names("UNITS", [unit(robot, b.own) for b in regrouping.base])
+    units[0] = units[0].replace("= ", "= dict(zip(BASE_PARAMETERS, ", 1)
+    units[-1] += "))"
     return [
         f"SCHEMA = {1!r}",
         f"NAME = {robot.name!r}",
@@ -140,12 +205,19 @@ def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
         *([f"PASSIVE = {robot.passive!r}"] if robot.passive else []),
         *(literal("LABELS", dict(robot.labels)) if robot.labels else []),
         *literal("CONSTANTS", dict(robot.constants)),
-        *literal("BASE_PARAMETERS", regrouping.names),
-        *literal("STANDARD_PARAMETERS", robot.parameters),
-        *literal("UNITS", {b.name: unit(robot, b.own) for b in regrouping.base}),
-        *literal("FORMULAS", {b.name: str(b.formula) for b in regrouping.base}),
-        *literal("NO_EFFECT", regrouping.no_effect),
+        *names("BASE_PARAMETERS", regrouping.names),
+        *names("STANDARD_PARAMETERS", robot.parameters),
+        *names("NO_EFFECT", regrouping.no_effect),
+        *by_line("FORMULAS", grouped(regrouping)),
+        *units,
         *_structure(spec, numpy),
+    ]
+
+
+def data(spec: ModuleSpec) -> list[str]:
+    """What the robot file says beside the models: drives, limits, values, as Python source."""
+    robot = spec.robot
+    return [
         *_drives(robot),
         *literal("LIMITS", dict(robot.limits)),
         *literal("VALUES", dict(robot.values)),
@@ -170,37 +242,70 @@ def _drives(robot: Robot) -> list[str]:
 
 def _structure(spec: ModuleSpec, numpy: bool) -> list[str]:
     marks = 'mark == "x" for mark in row'
-    first, last = (f"np.array([[{marks}] for row in (", ")])") if numpy else (f"tuple(tuple({marks}) for row in (", "))")
+    first, last = (
+        (f"np.array([[{marks}] for row in (", ")])")
+        if numpy
+        else (f"tuple(tuple({marks}) for row in (", "))")
+    )
     rows = ['"' + "".join("x" if mark else "." for mark in row) + '",' for row in spec.structure]
     return [
-        f"STRUCTURE = {first}  # [k, j]: whether base parameter k acts on joint j",
+        "# STRUCTURE[k, j]: whether base parameter k acts on joint j",
+        f"STRUCTURE = {first}",
         *(f"    {line}" for line in wrap(" ".join(rows), WIDTH - 4, break_long_words=False)),
         last,
     ]
 
 
+def names(name: str, values: Sequence[str]) -> list[str]:
+    """`name = (...)`, a tuple of words as one text that is split."""
+    flat = f"{name} = {tuple(values)!r}"
+    if len(flat) <= WIDTH:
+        return [flat]
+    return [f'{name} = tuple("""', *wrap(" ".join(values), WIDTH), '""".split())']
+
+
+def by_line(name: str, values: Mapping[str, str]) -> list[str]:
+    """`name = {...}`, an entry a line, long texts in parts."""
+    lines = []
+    for key, value in values.items():
+        first, *more = wrap(value, WIDTH - 20, break_long_words=False) or [""]
+        parts = [first, *(f" {part}" for part in more)]
+        lines.append(f"    {key!r}: {parts[0]!r}" + ("," if not more else ""))
+        lines += [f"        {part!r}" + ("," if part is parts[-1] else "") for part in parts[1:]]
+    return [f"{name} = {{", *lines, "}"] if lines else [f"{name} = {{}}"]
+
+
 def literal(name: str, value: Any) -> list[str]:
     """`name = value` as Python source, wrapped entry by entry."""
-    flat = f"{name} = {value!r}"
-    if len(flat) <= WIDTH or not value:
+    return _literal(f"{name} = ", value, "")
+
+
+def _literal(start: str, value: Any, end: str) -> list[str]:
+    flat = f"{start}{value!r}{end}"
+    if len(flat) <= WIDTH - 4 or not value:
         return [flat]
-    if isinstance(value, Mapping):
-        entries, opening, closing = [f"{k!r}: {v!r}" for k, v in value.items()], "{", "}"
-    else:
-        entries, opening, closing = [repr(v) for v in value], "(", ")"
-    return [f"{name} = {opening}", *packed(entries), closing]
+    if not isinstance(value, Mapping):
+        return [f"{start}(", *packed([repr(v) for v in value]), f"){end}"]
+    if any(isinstance(v, tuple) for v in value.values()):
+        rows = [line for k, v in value.items() for line in _literal(f"{k!r}: ", v, ",")]
+        return [f"{start}{{", *(f"    {row}" for row in rows), f"}}{end}"]
+    return [f"{start}{{", *packed([f"{k!r}: {v!r}" for k, v in value.items()]), f"}}{end}"]
 
 
 def plain(text: str) -> str:
     """Text that cannot end a docstring."""
-    return " ".join(text.replace("\\", "/").replace('"""', "'''").split(" ")).replace("\r", " ").replace("\n", " ")
+    return (
+        " ".join(text.replace("\\", "/").replace('"""', "'''").split(" "))
+        .replace("\r", " ")
+        .replace("\n", " ")
+    )
 
 
 def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
     """Entries separated by commas, as many on a line as fit."""
     lines, line = [], indent
     for entry in entries:
-        if len(line) + len(entry) + 1 > WIDTH and line.strip():
+        if len(line) + len(entry) + 1 > WIDTH - 4 and line.strip():
             lines.append(line.rstrip())
             line = indent
         line += entry + ", "
@@ -210,4 +315,11 @@ def packed(entries: Sequence[str], indent: str = "    ") -> list[str]:
 def wrapped(text: str, indent: str, hanging: str | None = None) -> list[str]:
     """Text broken at spaces."""
     more = indent + "    " if hanging is None else hanging
-    return wrap(text, WIDTH, initial_indent=indent, subsequent_indent=more, break_long_words=False, break_on_hyphens=False)
+    return wrap(
+        text,
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=more,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

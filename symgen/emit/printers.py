@@ -1,21 +1,88 @@
-"""Graph to lines of Python: which nodes get a line of their own, what they are called, and how an expression is written.
+"""Graph to lines of text: which nodes get a line of their own, what they are called, and how an
+expression is written.
 
-A node has a line if it has a name, or if it is used more than once; then it takes its hint, or a name made of its factors
-(C4DV23 = C4*DV23). Everything else is written inside its only user, so each operation of the graph stands in the text exactly once.
+A node has a line if it has a name, or if it is used more than once; then it takes its hint, a name
+made of its factors (C4DV23 = C4*DV23), or that of the quantity that it is a part of (N16a).
+Everything else is written inside its only user, so each operation of the graph stands in the text
+exactly once.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from string import ascii_lowercase
 
-from symgen.derive.graph import ADD, CONST, COS, INV, MUL, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
+from symgen.derive.graph import (
+    ADD,
+    CONST,
+    COS,
+    INV,
+    MUL,
+    SIGN,
+    SIN,
+    SQRT,
+    SYM,
+    Node,
+    Scalar,
+    reachable,
+)
+from symgen.description.expression import decimal
+from symgen.description.namespace import Namespace
 
-CALLS = {COS: "np.cos", SIN: "np.sin", SIGN: "np.sign", SQRT: "np.sqrt"}
-MAX_NAME = 60
+SAYABLE = 3  # factors of a name that is made of them
+
+
+def number(c: Fraction) -> str:
+    """A constant as Python reads it back."""
+    return str(c.numerator) if c.denominator == 1 and abs(c) < 2**53 else repr(float(c))
+
+
+@dataclass(frozen=True)
+class Language:
+    """How operations are written.
+
+    Attributes
+    ----------
+    calls : mapping
+        Function of each of cos, sin, sign and sqrt.
+    above, below : str
+        The part of {} above or below zero.
+    pi, one, square : str
+        pi, the 1 of 1/x, and the square of {}.
+    number : callable
+        A rational as text.
+    lift : str
+        Before the argument of a function of constants, which an array package refuses.
+    """
+
+    calls: Mapping[str, str]
+    above: str
+    below: str
+    pi: str
+    one: str = "1"
+    square: str = "{0}**2"
+    number: Callable[[Fraction], str] = number
+    lift: str = ""
+
+
+def _calls(package: str) -> dict[str, str]:
+    return {op: f"{package}{op}" for op in (COS, SIN, SIGN, SQRT)}
+
+
+NUMPY = Language(_calls("np."), "np.maximum({}, 0.0)", "np.minimum({}, 0.0)", "np.pi")
+CASADI = Language(_calls("ca."), "ca.fmax({}, 0.0)", "ca.fmin({}, 0.0)", "ca.pi")
+ARRAYS = Language(
+    _calls("xp.") | {SIGN: "_sign"},
+    "xp.clip({}, min=0.0)",
+    "xp.clip({}, max=0.0)",
+    "xp.pi",
+    lift="zero + ",
+)
+PLAIN = Language(_calls(""), "max({}, 0)", "min({}, 0)", "pi", number=decimal)
+"""The grammar of robot files, numbers exact."""
 
 
 @dataclass(frozen=True)
@@ -29,26 +96,46 @@ class Section:
 class Text:
     """The lines of one function: `sections`, then an expression for each output by `expression`.
 
-    What is particular to Python and NumPy stands in the attributes and short methods that a printer of another language replaces.
+    Parameters
+    ----------
+    outputs : sequence
+        Values of one graph.
+    headings : sequence of (index of the first node, title)
+        Of its steps.
+    names : Namespace
+        The names of the function.
+    labels : sequence of str
+        What each output is called, for parts that several share.
     """
 
-    calls: ClassVar[dict[str, str]] = CALLS
-    one: ClassVar[str] = "1"
-    pi: ClassVar[str] = "np.pi"
+    language: Language = NUMPY
 
-    def __init__(self, outputs: Sequence[Scalar | int], headings: Sequence[tuple[int, str]], taken: Iterable[str]) -> None:
-        self.nodes = reachable(outputs)
+    def __init__(
+        self,
+        outputs: Sequence[Scalar | int],
+        headings: Sequence[tuple[int, str]],
+        names: Namespace,
+        labels: Sequence[str] = (),
+        language: Language | None = None,
+    ) -> None:
+        self.language = language or self.language
+        self.nodes, self.names = reachable(outputs), names
         self.uses: dict[int, int] = {}
-        for s in [x for node in self.nodes for x in node.operands] + [o for o in outputs if isinstance(o, Scalar)]:
+        for s in self._uses(outputs):
             self.uses[s.node.index] = self.uses.get(s.node.index, 0) + 1
-        self.taken = set(taken)
         self.called: dict[int, str] = {}
+        self.sign: dict[int, int] = {}  # of the value that is called so
         for node in self.nodes:
             if node.op == SYM:
-                self.called[node.index] = self.pi if node.value == "pi" else self._symbol(str(node.value))
-        self.named = {node.index for node in self.nodes if node.op not in (SYM, CONST) and self._has_line(node)}
-        self._assign_names()
+                self.called[node.index] = self._symbol(node)
+        self.named = {n.index for n in self.nodes if n.op not in (SYM, CONST) and self._has_line(n)}
+        self._assign_names(outputs, labels)
         self.sections = self._sections(headings)
+
+    def _uses(self, outputs: Sequence[Scalar | int]) -> Iterator[Scalar]:
+        for node in self.nodes:
+            yield from node.operands
+        yield from (o for o in outputs if isinstance(o, Scalar))
 
     @property
     def given(self) -> set[str]:
@@ -58,7 +145,7 @@ class Text:
 
     @property
     def inputs(self) -> set[str]:
-        """Names of the symbols that the outputs need."""
+        """Names of the symbols that the outputs need, as the derivation has them."""
         return {str(node.value) for node in self.nodes if node.op == SYM}
 
     @property
@@ -71,80 +158,109 @@ class Text:
         """(sines, cosines) in the text."""
         return sum(n.op == SIN for n in self.nodes), sum(n.op == COS for n in self.nodes)
 
-    def _symbol(self, name: str) -> str:
-        return name
+    def _symbol(self, node: Node) -> str:
+        kind, name = node.value
+        if kind == "pi":
+            return self.language.pi
+        return self.names.own(name) if kind == "rate" else self.names.of_file(name)
 
     def _has_line(self, node: Node) -> bool:
         return bool(node.name) or self.uses[node.index] > 1
 
-    def _number(self, c: Fraction) -> str:
-        return number(c)
+    # --- names ---
 
-    def _square(self, factor: str) -> str:
-        return f"{factor}**2"
+    def _assign_names(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> None:
+        waiting = [n for n in self.nodes if n.index in self.named]
+        for node in waiting:
+            self.sign[node.index] = node.name_sign if node.name or node.hint else 1
+            if node.name:
+                self.called[node.index] = self.names.own(node.name)
+        waiting = [n for n in waiting if not n.name]
+        for node in waiting:
+            if node.hint:
+                self.called[node.index] = self.names.own(node.hint)
+        whole = self._wholes(outputs, labels)
+        for node in waiting:
+            if not node.hint:
+                self.called[node.index] = self._made_of(node) or self._part_of(node, whole)
 
-    def _clipped(self, x: str, bound: str) -> str:
-        """The part of x above (`maximum`) or below (`minimum`) zero."""
-        return f"np.{bound}({x}, 0.0)"
-
-    def _assign_names(self) -> None:
-        for node in self.nodes:
-            if node.index in self.named and node.name:
-                self._call(node, node.name)
-        for node in self.nodes:
-            if node.index in self.named and node.index not in self.called:
-                self._call(node, node.hint or self._made_of(node))
-
-    def _call(self, node: Node, name: str) -> None:
-        while name in self.taken:  # a constant or parameter of the robot file may be called S2
-            name += "b"
-        self.taken.add(name)
-        self.called[node.index] = name
+    def _wholes(self, outputs: Sequence[Scalar | int], labels: Sequence[str]) -> dict[int, str]:
+        """The first named quantity, or else the first output, that each node enters."""
+        whole: dict[int, str] = {}
+        for o, label in zip(outputs, labels, strict=bool(labels)):
+            if isinstance(o, Scalar) and label:
+                whole.setdefault(o.node.index, label)
+        for node in reversed(self.nodes):
+            name = self.called.get(node.index) or whole.get(node.index)
+            for x in node.operands if name else ():
+                whole[x.node.index] = str(name)
+        return whole
 
     def _made_of(self, node: Node) -> str:
-        """The value of the node in letters, of the sign in which its line starts without a minus: p is plus, m minus, products stand side by side."""
-        node.name_sign, word = self._word(Scalar(None, node, 1))  # type: ignore[arg-type]
-        if len(word) > MAX_NAME or not word[0].isalpha():
-            word = "K" + word[: MAX_NAME - 1]
-        while word in self.taken:
-            word += "b"
-        return word
+        """Factors side by side: of a product of few named ones; its line starts without a minus."""
+        words = self._factors(node)
+        if words is None or len(words) > SAYABLE:
+            return ""
+        self.sign[node.index] = self._sign_of(node)
+        return self.names.own("".join(sorted(words, key=lambda w: w.startswith("x"))))
 
-    def _word(self, s: Scalar) -> tuple[int, str]:
-        """(sign, letters) of a value."""
-        node = s.node
-        if node.index in self.called:
-            return s.sign * self._name_sign(node), self.called[node.index].replace(".", "")
-        if node.op == CONST:
-            return s.sign, "x" + str(node.value).replace("/", "d")
-        if node.op == ADD:
-            (sign, word), *rest = sorted(map(self._word, self._addends(s)), key=lambda term: -term[0])
-            return sign, word + "".join(("p" if sign * other > 0 else "m") + letters for other, letters in rest)
-        words = [self._word(x) for x in node.operands]
+    def _factors(self, node: Node) -> list[str] | None:
         if node.op != MUL:
-            return s.sign, node.op + "".join("m" * (sign < 0) + word for sign, word in words)
-        sums = [x.node.op == ADD and x.node.index not in self.called for x in node.operands]
-        letters = [f"_{word}" if total else word for (_, word), total in zip(words, sums, strict=True)]
-        return s.sign * words[0][0] * words[1][0], "".join(sorted(letters, key=lambda w: (w.startswith("_"), w.startswith("x")))).lstrip(
-            "_"
-        )
+            return None
+        words: list[str] = []
+        for x in node.operands:
+            if x.node.index in self.called:
+                words.append(self.called[x.node.index].replace(".", ""))
+            elif x.node.op == CONST:
+                words.append("x" + str(x.node.value).replace("/", "d"))
+            elif (inner := self._factors(x.node)) is not None:
+                words += inner
+            else:
+                return None
+        return words if words[0][0].isalpha() and not words[0].startswith("x") else None
+
+    def _sign_of(self, node: Node) -> int:
+        sign = 1
+        for x in node.operands:
+            sign *= x.sign * (
+                self._name_sign(x.node) if x.node.index in self.called else self._sign_of(x.node)
+            )
+        return sign
+
+    def _part_of(self, node: Node, whole: Mapping[int, str]) -> str:
+        """N16a, a part of N16 that other quantities share."""
+        of = whole.get(node.index, "K").rstrip(ascii_lowercase + "_") or "K"
+        for k in range(len(self.nodes)):
+            letters = ascii_lowercase[k % 26] * (k // 26 + 1)
+            if not self.names.has(f"{of}{letters}"):
+                return self.names.own(f"{of}{letters}")
+        raise AssertionError("more parts than nodes")
+
+    # --- lines ---
 
     def _sections(self, headings: Sequence[tuple[int, str]]) -> tuple[Section, ...]:
         marks = [(0, "Inputs"), *headings]
         sections: list[Section] = []
         fixed = [n for n in self.nodes if n.index in self.named and n.fixed]
         if fixed:
-            sections.append(Section("Constants", tuple(self._line(n) for n in fixed)))
-        trigonometry = {n.index for n in reachable([Scalar(None, n, 1) for n in self.nodes if n.op in (COS, SIN)])}  # type: ignore[arg-type]
-        angles = [n for n in self.nodes if n.index in self.named and not n.fixed and n.index in trigonometry]
+            sections.append(Section("Constants", tuple(map(self._line, fixed))))
+        circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
+        trigonometry = {n.index for n in reachable(circular)}
+        angles = [
+            n
+            for n in self.nodes
+            if n.index in self.named and not n.fixed and n.index in trigonometry
+        ]
         if angles:
-            sections.append(Section("Trigonometry", tuple(self._line(n) for n in angles)))
+            sections.append(Section("Trigonometry", tuple(map(self._line, angles))))
         done = {n.index for n in fixed + angles}
         starts = [start for start, _ in marks]
         by_mark: dict[int, list[str]] = {}
         for node in self.nodes:
             if node.index in self.named and node.index not in done:
-                by_mark.setdefault(bisect_right(starts, node.index) - 1, []).append(self._line(node))
+                by_mark.setdefault(bisect_right(starts, node.index) - 1, []).append(
+                    self._line(node)
+                )
         for k, lines in by_mark.items():
             if sections and sections[-1].title == marks[k][1]:
                 sections[-1] = Section(marks[k][1], sections[-1].lines + tuple(lines))
@@ -153,82 +269,83 @@ class Text:
         return tuple(sections)
 
     def _line(self, node: Node) -> str:
-        return f"{self.called[node.index]} = {self._body(Scalar(None, node, self._name_sign(node)))}"  # type: ignore[arg-type]
+        return f"{self.called[node.index]} = {self._body(self._as_named(node))}"
 
     def _name_sign(self, node: Node) -> int:
-        return node.name_sign if node.index in self.named else 1
+        return self.sign.get(node.index, 1)
+
+    @staticmethod
+    def _positive(node: Node, sign: int = 1) -> Scalar:
+        return Scalar(None, node, sign)  # type: ignore[arg-type]
+
+    def _as_named(self, node: Node) -> Scalar:
+        return self._positive(node, self._name_sign(node))
 
     # --- expressions ---
 
-    def place(self, result: str, indices: Sequence[int]) -> str:
-        """An entry of a result, as the target of an assignment."""
-        return f"{result}[{', '.join(map(str, indices))}]"
-
     def expression(self, s: Scalar | int) -> str:
         """Text of an output."""
-        if isinstance(s, int):
-            return str(float(s))
-        return self._operand(s)
+        return self._operand(s) if isinstance(s, Scalar) else f"{float(s)}"
 
     def _operand(self, s: Scalar) -> str:
-        """Text of a named node by name, of another by its body."""
         if s.node.index in self.called:
             return ("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called[s.node.index]
         return self._body(s)
 
     def _body(self, s: Scalar) -> str:
-        node = s.node
+        node, language = s.node, self.language
+        minus = "-" if s.sign < 0 else ""
         match node.op:
             case "const":
-                return ("-" if s.sign < 0 else "") + self._number(node.value)
+                return minus + language.number(node.value)
             case "add":
                 return self._sum(s)
             case "mul":
                 return self._product(s)
             case "pos":
                 (x,) = node.operands
-                inner = self._operand(x if x.sign > 0 else -x)
-                text = self._clipped(inner, "maximum" if x.sign > 0 else "minimum")
+                form = language.above if x.sign > 0 else language.below
+                text = form.format(self._operand(x if x.sign > 0 else -x))
                 return text if (s.sign > 0) == (x.sign > 0) else "-" + text
             case "inv":
-                return ("-" if s.sign < 0 else "") + f"{self.one}/{self._divisor(node.operands[0])}"
-        return ("-" if s.sign < 0 else "") + f"{self.calls[node.op]}({self._operand(node.operands[0])})"
+                return f"{minus}{language.one}/{self._divisor(node.operands[0])}"
+        lift = language.lift if node.fixed else ""
+        return f"{minus}{language.calls[node.op]}({lift}{self._operand(node.operands[0])})"
 
     def _sum(self, s: Scalar) -> str:
-        first, *rest = sorted(
-            map(self._operand, self._addends(s)), key=lambda t: t.startswith("-")
-        )  # a positive term first saves a negation
-        return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest)
+        """Positive terms first: that saves a negation."""
+        terms = map(self._operand, self._addends(s))
+        first, *rest = sorted(terms, key=lambda t: t.startswith("-"))
+        return first + "".join(
+            f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest
+        )
 
     def _addends(self, s: Scalar) -> list[Scalar]:
         """The terms of a sum, those of sums without a line of their own included."""
         terms: list[Scalar] = []
         for x in s.node.operands:
             x = x if s.sign > 0 else -x
-            terms += self._addends(x) if x.node.op == ADD and x.node.index not in self.called else [x]
+            inside = x.node.op == ADD and x.node.index not in self.called
+            terms += self._addends(x) if inside else [x]
         return terms
 
     def _product(self, s: Scalar) -> str:
         sign, factors = s.sign, []
         a, b = s.node.operands
         if a.node is b.node:
-            square = self._square(self._factor(Scalar(None, a.node, self._name_sign(a.node))))  # type: ignore[arg-type]
+            square = self.language.square.format(self._factor(self._as_named(a.node)))
             return ("-" if sign < 0 else "") + square
         for x in sorted((a, b), key=lambda x: not x.node.fixed):
             name_sign = self._name_sign(x.node) if x.node.index in self.called else 1
             sign *= x.sign * name_sign
-            factors.append(self._factor(Scalar(None, x.node, name_sign)))  # type: ignore[arg-type]
+            factors.append(self._factor(self._positive(x.node, name_sign)))
         return ("-" if sign < 0 else "") + "*".join(factors)
 
     def _factor(self, s: Scalar) -> str:
         text = self._operand(s)
-        return f"({text})" if (s.node.index not in self.called and s.node.op in (ADD, INV)) or text.startswith("-") else text
+        whole = s.node.index in self.called or s.node.op not in (ADD, INV)
+        return text if whole and not text.startswith("-") else f"({text})"
 
     def _divisor(self, s: Scalar) -> str:
         text = self._factor(s)
         return f"({text})" if "*" in text and not text.startswith("(") else text
-
-
-def number(c: Fraction) -> str:
-    """A constant as Python reads it back."""
-    return str(c.numerator) if c.denominator == 1 and abs(c) < 2**53 else repr(float(c))

@@ -2,71 +2,63 @@
 
 from __future__ import annotations
 
-import ast
-import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from symgen.errors import SymgenError
+WIDTH = 100
 
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
     return Environment(
-        loader=PackageLoader("symgen.emit"), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
+        loader=PackageLoader("symgen.emit"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
 
 
 def laid_out(template: str, context: Mapping[str, object]) -> str:
-    """The text of `templates/<template>.jinja` with the values of `context`."""
-    return _environment().get_template(f"{template}.jinja").render(context)
+    """The text of `templates/<template>.jinja` with the values of `context`, in lines that fit."""
+    text = _environment().get_template(f"{template}.jinja").render(context)
+    return "\n".join(_fitted(text.split("\n"), template.endswith(".c")))
 
 
-def python_module(template: str, context: Mapping[str, object], constants: Collection[str], results: Collection[str] = ()) -> str:
-    """`laid_out`, of a Python module whose functions take `constants` as arguments.
-
-    SymgenError where such a function binds or calls one of these names for a purpose of its own; `results` are the names of arrays that lines in
-    `context` assign.
+def _fitted(lines: Iterable[str], in_c: bool) -> Iterator[str]:
+    """Lines of at most WIDTH columns: long ones go on, indented, behind a space that may end
+    one.
     """
-    text = laid_out(template, context)
-    if _words().union(results) & {*constants} and (clash := sorted(set(_clashes(ast.parse(text), {*constants})))):
-        raise SymgenError(f"constants.{', '.join(clash)}: the emitted module calls something else so; rename it in the robot file")
-    return text
+    in_text = False
+    for line in lines:
+        quotes = line.count('"""')
+        while len(line) > WIDTH and (end := _end(line, in_c or in_text or quotes > 0)):
+            yield line[:end].rstrip()
+            indent = " " * (len(line) - len(line.lstrip()) + (0 if in_text or quotes else 4))
+            remark = "# " if line.lstrip().startswith("# ") else ""
+            line = f"{indent}{remark}{line[end:].lstrip()}"
+        in_text ^= quotes % 2 == 1
+        yield line
 
 
-@lru_cache(maxsize=1)
-def _words() -> frozenset[str]:
-    """Every word of the templates: the names that their functions use are among them."""
-    environment = _environment()
-    assert environment.loader is not None
-    return frozenset(
-        w for name in environment.list_templates() for w in re.findall(r"\w+", environment.loader.get_source(environment, name)[0])
-    )
-
-
-def _clashes(module: ast.Module, constants: set[str]) -> Iterator[str]:
-    """Constants that a function takes twice, uses as a name of the module, or assigns before it passes them on."""
-    classes, functions = ({node.name for node in module.body if isinstance(node, kind)} for kind in (ast.ClassDef, ast.FunctionDef))
-    for function in (node for node in module.body if isinstance(node, ast.FunctionDef)):
-        arguments = [a.arg for a in (*function.args.args, *function.args.kwonlyargs)]
-        taken = constants & {*arguments}
-        if not taken:
-            continue
-        assigned: dict[str, int] = {}  # name: first line
-        nodes = list(ast.walk(function))
-        apart = {id(x) for node in nodes if isinstance(node, ast.comprehension) for x in ast.walk(node.target)}
-        for node in nodes:
-            first = node.lineno - 1 if isinstance(node, ast.For | ast.While) else None  # what a loop assigns its next pass reads
-            for x in ast.walk(node) if first is not None else [node]:
-                if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store) and id(x) not in apart:
-                    assigned[x.id] = min(assigned.get(x.id, x.lineno), x.lineno if first is None else first)
-        for call in (node for node in nodes if isinstance(node, ast.Call)):
-            if not isinstance(call.func, ast.Name):
-                continue
-            passed = {x.id: x.lineno for x in (*call.args, *(k.value for k in call.keywords)) if isinstance(x, ast.Name)}
-            if call.func.id in functions:
-                yield from (name for name in taken & {*passed} if assigned.get(name, passed[name]) < passed[name])
-            yield from taken & {call.func.id, *(classes & {*passed})}
-        yield from (name for name in taken if arguments.count(name) > 1)
+def _end(line: str, in_text: bool) -> int:
+    """Where a line may end: the last space within WIDTH, in code outside strings and in
+    brackets.
+    """
+    start = len(line) - len(line.lstrip())
+    free = in_text or line[start:].startswith("# ")
+    depth, quote, end = 0, "", 0
+    for k, c in enumerate(line[: WIDTH + 1]):
+        if quote:
+            quote = "" if c == quote else quote
+        elif c in "\"'" and not free:
+            quote = c
+        elif c in "([{":
+            depth += 1
+        elif c in ")]}":
+            depth -= 1
+        elif c == " " and k > start + 4 and (free or depth > 0):
+            end = k
+    return end

@@ -1,178 +1,188 @@
-"""What an emitted module says, as data: the lines of its blocks, what each of them reads, its constant entries, its costs.
-
-Everything is computed here; templates only lay it out.
+"""What the text of a robot has to say, as data without text: its models as values of a graph, what
+each of them reads, its constant entries, its costs. Made once, printed by every target.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from textwrap import wrap
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 from symgen.derive.columns import element_names, inertial_names
-from symgen.derive.graph import Scalar
-from symgen.derive.loops import close
-from symgen.derive.names import families_of
-from symgen.description.robot import PRISMATIC, Robot
-from symgen.emit.models import (
-    LOCALS,
-    MODELS,
-    STATES,
-    Entry,
-    Model,
-    Only,
-    Values,
-    is_inertial,
-    is_inertial_or_actuator,
-    rates_of_tied_joints,
-    regressor_program,
-    sizes,
-    tables_of,
-    torques,
-)
-from symgen.emit.printers import Section, Text
-from symgen.regroup.regrouping import Regrouping
+from symgen.derive.derivation import Derivation, derive
+from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
+from symgen.derive.model import Entry, Model, Place, Request, Values, labels
+from symgen.derive.models import MODELS
+from symgen.description.namespace import Namespace
+from symgen.description.robot import KINDS, PRISMATIC, Robot
+from symgen.regroup.regrouping import Regrouping, regroup
 
-WIDTH = 120
-KIND_UNITS = {  # revolute, prismatic
-    "inertia": ("kg*m**2", "kg"),
-    "viscous": ("N*m*s/rad", "N*s/m"),
-    "coulomb": ("N*m", "N"),
-    "offset": ("N*m", "N"),
-    "stiffness": ("N*m/rad", "N/m"),
-}
+STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}  # argument: family of its components
 
 
 @dataclass(frozen=True)
 class Function:
-    """The block of one model in Python.
+    """One function: a model over the base parameters, and the array that it fills.
 
     Attributes
     ----------
-    states, constants : tuple of str
-        What the block reads of q, qd, qdd and G (rates of the tied joints), and of the constants of the robot.
-    reads_X : bool
-        Whether the block reads base parameters.
-    preset : list of (place, value)
-        Entries that are numbers other than zero.
-    families : tuple of str
-        Families of the names in its lines.
-    mul, add, sin, cos : int
-        Operations per sample.
+    model : Model
+        What it evaluates.
+    values : Values
+        Its entries.
+    shape : tuple of int
+        Of its result without samples; column by column, (b, n), where the model is stored so.
     """
 
     model: Model
-    states: tuple[str, ...]
-    constants: tuple[str, ...]
-    reads_X: bool
-    preset: list[tuple[tuple[int, ...], float]] = field(repr=False)
-    sections: tuple[Section, ...] = field(repr=False)
-    families: tuple[str, ...]
-    mul: int
-    add: int
-    sin: int
-    cos: int
+    values: Values
+    shape: tuple[int, ...]
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        """The operations that its entries need."""
+        return reachable(self.values.outputs)
+
+    @cached_property
+    def inputs(self) -> set[Symbol]:
+        """The symbols that its entries need."""
+        return {node.value for node in self.nodes if node.op == SYM}
+
+    def reads(self, kind: str) -> bool:
+        return any(symbol.kind == kind for symbol in self.inputs)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """What it reads of q, qd, qdd, and of G, the rates of the tied joints."""
+        kinds = {**{state: state for state in STATES}, "G": "rate"}
+        return tuple(state for state, kind in kinds.items() if self.reads(kind))
+
+    def constants(self, robot: Robot) -> tuple[str, ...]:
+        """What it reads of the constants of the robot, in their order."""
+        return tuple(name for name in robot.constants if Symbol("constant", name) in self.inputs)
+
+    def places(self, entry: Entry) -> tuple[Place, ...]:
+        """Where an entry stands in the array: twice beside the diagonal of a symmetric matrix."""
+        mirrored = entry.place[::-1]
+        if self.model.by_columns:
+            return (mirrored,)
+        return tuple(
+            dict.fromkeys((entry.place, mirrored if self.model.symmetric else entry.place))
+        )
+
+    @property
+    def by_place(self) -> list[tuple[Place, Entry]]:
+        """Every place with its entry, in the order of the places."""
+        pairs = [(place, entry) for entry in self.values.entries for place in self.places(entry)]
+        return sorted(pairs, key=lambda pair: pair[0])
+
+    @property
+    def preset(self) -> list[tuple[Place, float]]:
+        """Entries that are numbers other than zero."""
+        return [
+            (p, float(e.value)) for p, e in self.by_place if isinstance(e.value, int) and e.value
+        ]
+
+    @property
+    def computed(self) -> list[Entry]:
+        """Entries that are no numbers, in the order of their places read from the right."""
+        return [entry for entry in self.values.entries if isinstance(entry.value, Scalar)]
+
+    def count(self, op: str) -> int:
+        return sum(node.op == op for node in self.nodes)
+
+    @property
+    def operations(self) -> tuple[int, int]:
+        """(multiplications, additions) per sample."""
+        return self.count(MUL), self.count(ADD)
 
     @property
     def cost(self) -> str:
-        return f"{self.mul} multiplications, {self.add} additions, {self.sin} sin, {self.cos} cos"
+        """Operations per sample."""
+        return (
+            f"{self.count(MUL)} multiplications, {self.count(ADD)} additions, "
+            f"{self.count(SIN)} sin, {self.count(COS)} cos"
+        )
 
 
 @dataclass(frozen=True)
 class ModuleSpec:
-    """All that the templates of a Python module lay out; structure[k][j]: entry (base parameter, joint) not identically zero."""
+    """The functions of a robot over its base parameters."""
 
-    robot: Robot
+    derivation: Derivation
     regrouping: Regrouping
-    structure: tuple[tuple[bool, ...], ...]
     functions: Mapping[str, Function]
+
+    @property
+    def robot(self) -> Robot:
+        return self.regrouping.robot
 
     @property
     def tied(self) -> tuple[int, ...]:
         """Passive joints that only the closure equations tie to the actuated ones."""
-        return close(self.robot).tied
+        return self.derivation.closure.tied
+
+    @property
+    def structure(self) -> tuple[tuple[bool, ...], ...]:
+        """[k][row]: whether base parameter k acts on a joint: D is not identically zero there."""
+        b, n = self.functions["regressor"].shape
+        acts = {place for place, e in self.functions["regressor"].by_place if e.value != 0}
+        return tuple(tuple((k, row) in acts for row in range(n)) for k in range(b))
 
     @property
     def sizes(self) -> dict[str, int]:
-        return sizes(self.robot, len(self.regrouping))
+        """Actuated, tied, independent joints n, m, k; base, standard parameters b, p; frames."""
+        n, m = len(self.robot.joints), len(self.tied)
+        p, frames = len(self.robot.parameters), len(self.robot.frames)
+        return {"n": n, "m": m, "k": n + m, "b": len(self.regrouping), "p": p, "frames": frames}
+
+    def names(self, is_word: Callable[[str], bool] = lambda name: False) -> Namespace:
+        """The names of one text of this robot."""
+        robot = self.robot
+        own = (*robot.constants, *robot.parameters, *self.regrouping.names)
+        return Namespace(own, is_word)
 
 
-def module_spec(regrouping: Regrouping, printer: type[Text] = Text) -> ModuleSpec:
-    """Derive every model of the module for the base parameters of `regrouping`, and print it in the language of `printer`."""
-    robot = regrouping.robot
-    structure = [[False] * len(robot.joints) for _ in regrouping.base]
-    functions = {}
-    for name, model in tables_of(robot).items():
-        assert model.values is not None
-        values = model.values(regrouping)
-        if name == "regressor":
-            for (k, row), entry in values.by_place:
-                structure[k][row] = entry.value != 0 if isinstance(entry.value, int) else True
-        functions[name] = _function(regrouping, model, values, printer)
-    return ModuleSpec(robot, regrouping, tuple(map(tuple, structure)), functions)
+def module_spec(regrouping: Regrouping) -> ModuleSpec:
+    """Every model of an emitted module, over the base parameters of `regrouping`."""
+    d = derive(regrouping.robot)
+    printed = [m for m in MODELS.values() if m.printed and (d.closure.tied or not m.of_loops)]
+    return ModuleSpec(d, regrouping, {m.name: function(regrouping, m.name) for m in printed})
 
 
-def inverse_dynamics(regrouping: Regrouping, only: Only = lambda own: True) -> Function:
-    """Gamma with the base parameters for which only(own name) holds."""
-    return _function(regrouping, MODELS["inverse_dynamics"], torques(regrouping, only=only), Text)
+def function(
+    regrouping: Regrouping, name: str, only: Callable[[str], bool] = lambda own: True
+) -> Function:
+    """A model over the base parameters that are called after a standard parameter with `only`."""
+    d, model = derive(regrouping.robot), MODELS[name]
+    request = Request({b.own: b.name for b in regrouping.base if only(b.own)})
+    shape = shape_of(model, d, tuple(request.parameters.values()))
+    return Function(model, model.values(d, request), shape)
 
 
-def _function(regrouping: Regrouping, model: Model, values: Values, printer: type[Text]) -> Function:
-    robot = regrouping.robot
-    text = printer(values.outputs, values.headings, (*LOCALS, *robot.constants))
-    needed = text.inputs
-    independent = close(robot).independent
-    sources = {state: [f"{letter}{j}" for j in independent] for state, letter in STATES.items()}
-    sources |= {"G": list(rates_of_tied_joints(robot)), "X": list(regrouping.names)}
-    inputs = [line for source, names in sources.items() for line in _unpack(source, names, needed)]
-    read = tuple(source for source, names in sources.items() if needed & {*names})
-    written = [entry for entry in values.entries if isinstance(entry.value, Scalar)]
-    return Function(
-        model=model,
-        states=tuple(source for source in read if source != "X"),
-        constants=tuple(name for name in robot.constants if name in needed),
-        reads_X="X" in read,
-        preset=[(place, float(entry.value)) for place, entry in values.by_place if isinstance(entry.value, int) and entry.value],
-        sections=tuple(s for s in (Section("Inputs", tuple(inputs)), *text.sections, *_results(text, model, written)) if s.lines),
-        families=families_of(text.given),
-        mul=text.operations[0],
-        add=text.operations[1],
-        sin=text.trigonometry[0],
-        cos=text.trigonometry[1],
-    )
+def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[int, ...]:
+    """The shape of the array without samples."""
+    shape = tuple(len(labels(d, axis, parameters)) for axis in model.axes)
+    return shape[::-1] if model.by_columns else shape
 
 
-def _results(text: Text, model: Model, entries: Iterable[Entry]) -> list[Section]:
-    lines: dict[str, list[str]] = {}  # by heading
-    for entry in entries:
-        targets = " = ".join(text.place(model.result, place) for place in entry.places)
-        lines.setdefault(entry.heading, []).append(f"{targets} = {text.expression(entry.value)}\t{entry.comment}")
-    return [Section(heading, aligned(under)) for heading, under in lines.items()]
+@lru_cache(maxsize=2)
+def spec_of(robot: Robot) -> ModuleSpec:
+    """The models of a robot over its base parameters; kept, since its module and its C file are
+    asked for one after the other.
+    """
+    return module_spec(regroup(robot))
 
 
-def aligned(lines: Sequence[str]) -> tuple[str, ...]:
-    """Comments behind a tab in one column, up to a limit."""
-    parts = [line.partition("\t") for line in lines]
-    width = min(max((len(code) for code, _, _ in parts), default=0), 64)
-    return tuple(f"{code:<{width}}  # {comment}" if comment else code for code, _, comment in parts)
+def is_inertial(robot: Robot) -> Callable[[str], bool]:
+    """Whether a standard parameter is one of the ten of a link."""
+    return inertial_names(robot).__contains__
 
 
-def _unpack(source: str, names: Sequence[str], needed: set[str]) -> list[str]:
-    """`q1, q2 = q`, or a slice of it where those needed stand side by side; else one by one."""
-    used = [(k, name) for k, name in enumerate(names) if name in needed]
-    if len(used) < 2 or used[-1][0] - used[0][0] >= len(used):
-        return [f"{name} = {source}[{k}]" for k, name in used]
-    start, stop = used[0][0] or "", used[-1][0] + 1
-    span = "" if len(used) == len(names) else f"[{start}:{stop if stop < len(names) else ''}]"
-    return unpacked([name for _, name in used], f"{source}{span}")
-
-
-def unpacked(names: Sequence[str], source: str) -> list[str]:
-    """`names = source` on as many lines as it needs."""
-    text = ", ".join(names) + ("," if len(names) == 1 else "")
-    if len(text) + len(source) + 3 < WIDTH - 4:
-        return [f"{text} = {source}"]
-    return ["(", *(f"    {line}" for line in wrap(text, WIDTH - 8)), f") = {source}"]
+def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
+    """Whether a standard parameter is inertial or the inertia of an actuator."""
+    inertial, elements = inertial_names(robot), element_names(robot)
+    return lambda own: own in inertial or elements[own][0].kind == "inertia"
 
 
 def unit(robot: Robot, name: str) -> str:
@@ -182,16 +192,4 @@ def unit(robot: Robot, name: str) -> str:
         family = inertial[name][0]
         return "kg" if family == "M" else "kg*m" if family.startswith("M") else "kg*m**2"
     e, j = element_names(robot)[name]
-    return KIND_UNITS[e.kind][robot.frame(j).sigma == PRISMATIC]
-
-
-__all__ = [
-    "Function",
-    "ModuleSpec",
-    "inverse_dynamics",
-    "is_inertial",
-    "is_inertial_or_actuator",
-    "module_spec",
-    "regressor_program",
-    "unit",
-]
+    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]

@@ -1,4 +1,6 @@
-"""The targets: what is emitted, under which file name, and for which robots. Light: nothing is derived or printed here."""
+"""The targets: what is emitted, under which file name, and for which robots. Light: nothing is
+derived or printed here.
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Base parameters with exact formulas, the formulas in every language they are printed in, and their certificate."""
+"""Base parameters with exact formulas, and the formulas in every language they are printed in."""

@@ -13,8 +13,10 @@ from symgen.derive.exact import Array, power
 def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
     """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p.
 
-    The row with the fewest entries at the start is taken first and touches its own columns alone, which is quick where the branches of a tree
-    share few columns. Without `reduced` the rows of earlier pivots stay as they are: the rank alone.
+    The row with the fewest entries at the start is taken first and touches its own columns alone,
+    which is quick where the branches of a tree
+    share few columns. Without `reduced` the rows of earlier pivots stay as they are: the rank
+    alone.
     """
     M = M[np.argsort(np.count_nonzero(M, axis=1), kind="stable")] % p
     left = np.ones(len(M), dtype=bool)
@@ -44,9 +46,11 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
 
 
 def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
-    """beta with W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once, shape (G, columns - 1); None unless all are consistent.
+    """beta with W[g, :, -1] = W[g, :, :-1] beta[g] for every g at once, shape (G, columns - 1);
+    None unless all are consistent.
 
-    Random combinations of the rows need no pivoting; three more than unknowns, which must come out zero.
+    Random combinations of the rows need no pivoting; three more than unknowns, which must come out
+    zero.
     """
     count, rows, columns = W.shape
     unknowns = columns - 1
@@ -65,7 +69,9 @@ def solve_each(W: Array, p: int, rng: np.random.Generator) -> Array | None:
 
 
 def small_rational(x: int, p: int, bound: int = 1000) -> Fraction | None:
-    """The fraction a/b with |a|, b <= bound that equals x mod p, if there is one (Wang's reconstruction)."""
+    """The fraction a/b with |a|, b <= bound that equals x mod p, if there is one (Wang's
+    reconstruction).
+    """
     r0, r1, t0, t1 = p, x % p, 0, 1
     while r1 > bound:
         quotient = r0 // r1

@@ -1,8 +1,12 @@
-"""A robot whose numbers are kept as written: 0.4318 becomes an atom of the formulas, 0.4318**2*M2 in place of 0.18645124*M2.
+"""A robot whose numbers are kept as written: 0.4318 becomes an atom of the formulas, 0.4318**2*M2
+in place of 0.18645124*M2.
 
-Lengths, gravity, mimic ratios and the rows of elements are polynomials over constants; each rational coefficient c of theirs that is no small
-whole number becomes sign(c) `Number(|c|)`. Equal numbers are one atom. The atoms have two uses: formulas read like the robot file, and
-coefficients are recognised at random values of the atoms, as functions of low degree, where the digits of a number are too long for rational
+Lengths, gravity, mimic ratios and the rows of elements are polynomials over constants; each
+rational coefficient c of theirs that is no small
+whole number becomes sign(c) `Number(|c|)`. Equal numbers are one atom. The atoms have two uses:
+formulas read like the robot file, and
+coefficients are recognised at random values of the atoms, as functions of low degree, where the
+digits of a number are too long for rational
 reconstruction. What is recognised is then checked at the numbers themselves (`certificate`).
 """
 
@@ -18,18 +22,26 @@ LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than len
 
 
 def numbered(robot: Robot) -> Robot:
-    """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number` atoms."""
+    """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number`
+    atoms.
+    """
     return mapped(robot, kept)
 
 
 def kept(e: Expression) -> Expression:
-    """The same polynomial with its rational coefficients as atoms, those inside square roots and inverses too."""
+    """The same polynomial with its rational coefficients as atoms, those inside square roots and
+    inverses too.
+    """
     total = Expression()
     for m, c in e.terms.items():
         term = Expression({(): Fraction(1 if c > 0 else -1)}) * _atom(abs(c))
         for a, n in m:
             base = Expression({((a, 1),): Fraction(1)})
-            if isinstance(a, Call) and a.function in ("sqrt", "inv") and a.argument.constant is None:
+            if (
+                isinstance(a, Call)
+                and a.function in ("sqrt", "inv")
+                and a.argument.constant is None
+            ):
                 base = call(a.function, kept(a.argument))
             term = term * base**n
         total = total + term
@@ -44,8 +56,17 @@ def _atom(c: Fraction) -> Expression:
 
 def numbers_of(robot: Robot) -> tuple[Number, ...]:
     """The Number atoms of a robot made by `numbered`, in the order of the file."""
-    expressions = [e for f in robot.frames for e in (f.b, f.d, f.r)] + [*robot.gravity, *robot.constraints.values()]
-    expressions += [g for e in robot.elements for table in (e.along, e.form) for row in table.values() for g in row.values()]
+    expressions = [e for f in robot.frames for e in (f.b, f.d, f.r)] + [
+        *robot.gravity,
+        *robot.constraints.values(),
+    ]
+    expressions += [
+        g
+        for e in robot.elements
+        for table in (e.along, e.form)
+        for row in table.values()
+        for g in row.values()
+    ]
     found: dict[Number, None] = {}
     while expressions:
         for m in expressions.pop(0).terms:

@@ -1,7 +1,9 @@
 """Base parameters with their regrouping formulas, exact.
 
-General rules over Q(geometry) remove most columns; rank and base choice come from the echelon form over F_p with the columns in
-Khalil's order of preference; the few particular relations left are solved exactly; a certificate checks the whole.
+General rules over Q(geometry) remove most columns; rank and base choice come from the echelon form
+over F_p with the columns in
+Khalil's order of preference; the few particular relations left are solved exactly; a certificate
+checks the whole.
 """
 
 from __future__ import annotations
@@ -11,20 +13,21 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 
+import numpy as np
+
 from symgen.derive.columns import element_names, inertial_names
-from symgen.derive.exact import Draw, Fp
+from symgen.derive.exact import Draw
 from symgen.derive.loops import close
 from symgen.derive.time_limit import limited
 from symgen.description.expression import ONE, ZERO, Call, Expression, with_known_cosines
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
+from symgen.regroup.floats import float_relations, numeric_coefficients
 from symgen.regroup.formula import Formula
-from symgen.regroup.general import base_and_relations
-from symgen.regroup.latex import aligned
-from symgen.regroup.notebook import table
 from symgen.regroup.numbers import numbered
+from symgen.regroup.residues import drawn, sample, states_for
 from symgen.regroup.rules import Combination, Step, Transfer
-from symgen.regroup.solve import coefficients, numeric_coefficients, sample, states_for
+from symgen.regroup.solve import coefficients
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"
@@ -90,19 +93,6 @@ class Regrouping:
     def __len__(self) -> int:
         return len(self.base)
 
-    @property
-    def counts(self) -> str:
-        """How many base parameters there are, and how they were derived."""
-        return f"{len(self)} base parameters of {len(self.robot.parameters)}, {self.method}"
-
-    def _repr_html_(self) -> str:
-        formulas = {b.name: b.formula for b in self.base if b.name != b.own}
-        alone = [b.name for b in self.base if b.name == b.own]
-        return table(self.robot.title or self.robot.name, self.counts, formulas, {"As they are": alone, "No effect": self.no_effect})
-
-    def _repr_latex_(self) -> str:
-        return f"$${aligned((b.name, b.formula) for b in self.base)}$$"
-
 
 def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     """The base parameters of a robot with their formulas.
@@ -119,7 +109,8 @@ def regroup(robot: Robot, *, seed: int = 1) -> Regrouping:
     DescriptionError
         The loops cannot close.
     SymgenError
-        A general loop closes in too few states near its start; the derivation takes more processor time than its limit.
+        A general loop closes in too few states near its start; the derivation takes more processor
+        time than its limit.
     """
     with limited(f"the regrouping of {robot.name}"):
         return _regrouped(robot, seed)
@@ -130,35 +121,43 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
     """Kept, since formulas, certificate and module of a robot are asked for one after the other."""
     given, robot = robot, numbered(robot)
     transfer = Transfer(robot)
-    names = preference(robot, transfer.kept)
-    if close(robot).tied:
-        return replace(_regroup_general(robot, transfer, names), robot=given)
-    samples = states_for(robot, names)
-    draw = Draw(robot, seed, samples)
-    pivots, R = rref(sample(draw, names), draw.p)
-    base = tuple(names[c] for c in pivots)
-    dependent = [c for c in range(len(names)) if c not in pivots]
-    supports = {names[c]: tuple(base[k] for k in range(len(base)) if R[k, c]) for c in dependent}
-    exact, missing = coefficients(robot, supports)
-    betas = exact | {name: numeric_coefficients(given, name, supports[name]) for name in missing}
-    relations = {name: dict(zip(supports[name], betas.get(name, []), strict=True)) for name in supports}
-    regrouping = _assemble(robot, transfer, base, relations, draw)
-    return replace(regrouping, robot=given, method=f"{NUMERIC}; {_reason(missing)}" if missing else EXACT)
+    names = preference(robot, transfer.remaining)
+    reason = ""
+    try:
+        draw = drawn(robot, seed, states_for(robot, names))
+        pivots, R = rref(sample(draw, names).reshape(-1, len(names)), draw.p)
+    except ArithmeticError as error:
+        base, relations = float_relations(given, names)
+        reason = str(error)
+    else:
+        base = tuple(names[c] for c in pivots)
+        supports = {
+            name: tuple(base[k] for k in np.flatnonzero(R[:, c]))
+            for c, name in enumerate(names)
+            if c not in pivots
+        }
+        exact, missing = coefficients(robot, supports)
+        betas = exact | {n: numeric_coefficients(given, n, supports[n]) for n in missing}
+        relations = {
+            name: dict(zip(support, betas.get(name, []), strict=True))
+            for name, support in supports.items()
+        }
+        reason = _reason(missing) if missing else ""
+    method = f"{NUMERIC}; {reason}" if reason else EXACT
+    regrouping = _assemble(robot, transfer, base, relations, Draw(robot, seed, 1))
+    return replace(regrouping, robot=given, method=method)
 
 
 def _reason(missing: Mapping[str, str]) -> str:
     """Why coefficients were not recognised: of the first column, and how many more there are."""
     name, reason = next(iter(missing.items()))
-    return f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} not recognised: {reason}"
+    return (
+        f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} "
+        f"not recognised: {reason}"
+    )
 
 
 regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is the package
-
-
-def _regroup_general(robot: Robot, transfer: Transfer, names: tuple[str, ...]) -> Regrouping:
-    base, relations, reason = base_and_relations(robot, names)
-    method = f"{NUMERIC}; {reason}" if reason else EXACT
-    return replace(_assemble(robot, transfer, base, relations, Draw(robot, 1, 1)), method=method)
 
 
 def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -182,9 +181,15 @@ def preference(robot: Robot, names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _assemble(
-    robot: Robot, transfer: Transfer, base: tuple[str, ...], relations: Mapping[str, Mapping[str, Expression]], draw: Draw
+    robot: Robot,
+    transfer: Transfer,
+    base: tuple[str, ...],
+    relations: Mapping[str, Mapping[str, Expression]],
+    draw: Draw,
 ) -> Regrouping:
-    """Base parameters from the general transfer and the particular relations {dependent: {base column: coefficient}}."""
+    """Base parameters from the general transfer and the particular relations {dependent: {base
+    column: coefficient}}.
+    """
     combination: dict[str, Combination] = {name: transfer.combination[name] for name in base}
     steps = list(transfer.steps)
     for dependent, relation in relations.items():
@@ -198,7 +203,11 @@ def _assemble(
     used: set[str] = set()
     for own in sorted(combination, key=order.__getitem__):
         terms = {name: simplified(with_known_cosines(c)) for name, c in combination[own].items()}
-        terms = {name: c for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]])) if not _vanishes(c, draw)}
+        terms = {
+            name: c
+            for name, c in sorted(terms.items(), key=lambda nc: (nc[0] != own, order[nc[0]]))
+            if not _vanishes(c, draw)
+        }
         used |= set(terms)
         parameters.append(BaseParameter(own if terms == {own: ONE} else own + "R", own, terms))
     no_effect = tuple(name for name in robot.parameters if name not in used)
@@ -206,15 +215,18 @@ def _assemble(
 
 
 def _vanishes(c: Expression, draw: Draw) -> bool:
-    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over F_p."""
+    """Whether a coefficient is zero, cos(pi/4)**2 - sin(pi/4)**2 included: angles are exact over
+    F_p.
+    """
     if all(isinstance(a, str) for a in c.atoms):
         return not c
-    value = draw.constant(c)
-    return not value.x.any() if isinstance(value, Fp) else value == 0
+    return not draw.residues(draw.constant(c)).any()
 
 
 def simplified(e: Expression) -> Expression:
-    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there with one coefficient."""
+    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
+    with one coefficient.
+    """
     for m, c in e.terms.items():
         for a, n in m:
             if isinstance(a, Call) and a.function == "cos" and n >= 2:
@@ -229,14 +241,19 @@ def simplified(e: Expression) -> Expression:
 
 
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
-    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds frictions of dependent directions.
+    """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds
+    frictions of dependent directions.
 
     sign(KR q1) is sign(KR) sign(q1): FS1 + KR FS2 holds for the sign that KR has in the file.
     """
     robot, closure = regrouping.robot, close(regrouping.robot)
     leads: dict[str, Expression] = {}
     for name, (e, j) in element_names(robot).items():
-        if (e.kind == "coulomb" or e.when is not None) and j in e.along and (row := closure.in_independent(e.along[j])):
+        if (
+            (e.kind == "coulomb" or e.when is not None)
+            and j in e.along
+            and (row := closure.in_independent(e.along[j]))
+        ):
             leads[name] = row[0][1]
     conditions: dict[Expression, tuple[str, Expression, int]] = {}
     for b in regrouping.base:
@@ -244,5 +261,7 @@ def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]
             if name != b.own and name in leads and b.own in leads:
                 ratio = leads[name] * leads[b.own].inverse()
                 if ratio.symbols:
-                    conditions.setdefault(ratio, (b.name, ratio, 1 if ratio.value(robot.constants) > 0 else -1))
+                    conditions.setdefault(
+                        ratio, (b.name, ratio, 1 if ratio.value(robot.constants) > 0 else -1)
+                    )
     return list(conditions.values())

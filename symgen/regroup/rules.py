@@ -1,13 +1,15 @@
 """General regrouping relations, exact over Q(geometry), from the tips to the base.
 
-Identities between regressor columns that hold for any motion of link i = ant(j) and any gravity [GK90, KB95], hence also in closed loops.
+Identities between regressor columns that hold for any motion of link i = ant(j) and any gravity
+[GK90, KB95], hence also in closed loops.
 Revolute j, with a = A_j e3 and p = P_ij (both constant):
 
     D_YY = -D_XX + D_J_i( A diag(1,1,0) A' )
     D_MZ = D_MS_i(a) + D_J_i( 2 (p.a) E - p a' - a p' )
     D_M  = D_M_i + D_MS_i(p) + D_J_i( (p.p) E - p p' )
 
-so YY_j, MZ_j, M_j go to link i. Prismatic j: the inertia tensor goes to link i, J_i += iRj J_j iRj'. Fixed j: all ten parameters go.
+so YY_j, MZ_j, M_j go to link i. Prismatic j: the inertia tensor goes to link i, J_i += iRj J_j
+iRj'. Fixed j: all ten parameters go.
 What reaches the base has no effect.
 
 [GK90] M. Gautier, W. Khalil, IEEE T-RA 6(3), 1990.  [KB95] W. Khalil, F. Bennis, IJRR 14(2), 1995.
@@ -24,36 +26,48 @@ TENSOR = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), 
 FIRST = ("MX", "MY", "MZ")
 
 Combination = dict[str, Expression]  # {parameter: coefficient}
-Step = tuple[str, str, Expression]  # (from, into, coefficient): `into` receives coefficient * `from`
+Step = tuple[
+    str, str, Expression
+]  # (from, into, coefficient): `into` receives coefficient * `from`
 
 
 class Transfer:
-    """Where the parameters of a link end up: `steps` one link down at a time, `combination` of each kept parameter.
+    """Where the parameters of a link end up: `steps` one link down at a time, `combination` of each
+    remaining parameter.
 
-    After the tips have been processed, the torque is sum over kept names k of D_k combination[k](chi).
+    After the tips have been processed, the torque is sum over the remaining names k of D_k
+    combination[k](chi).
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.combination: dict[str, Combination] = {name: {name: ONE} for name in robot.parameters}
         self.steps: list[Step] = []
-        self.rigid: set[int] = set()  # frames fixed to a link, or to the base, that are none themselves: what reaches them goes on
+        self.rigid: set[int] = (
+            set()
+        )  # frames fixed to a link or the base, no links themselves: what reaches them goes on
         for f in robot.frames:
-            if f.sigma == FIXED and f.j not in robot.links and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid):
+            if (
+                f.sigma == FIXED
+                and f.j not in robot.links
+                and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid)
+            ):
                 self.rigid.add(f.j)
         for f in reversed(robot.frames):
             if f.j in robot.links and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid):
                 self._link(f)
 
     @property
-    def kept(self) -> tuple[str, ...]:
+    def remaining(self) -> tuple[str, ...]:
         return tuple(name for name in self.robot.parameters if name in self.combination)
 
     def _link(self, frame: Frame) -> None:
         for name, image in link_relations(frame).items():
             into: Combination = {}
             for (k, at), c in image.items():
-                for target, share in self._reached(k, frame.ant).items() if at else [(parameter(k, frame.j), ONE)]:
+                for target, share in (
+                    self._reached(k, frame.ant).items() if at else [(parameter(k, frame.j), ONE)]
+                ):
                     into[target] = into.get(target, ZERO) + c * share
             self._move(parameter(name, frame.j), {target: c for target, c in into.items() if c})
 
@@ -83,7 +97,9 @@ class Transfer:
 
 
 def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
-    """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j): coefficient}}."""
+    """{parameter of link j that goes: {(parameter, 1 if of link i else 0 of link j):
+    coefficient}}.
+    """
     cg, sg, ca, sa = (call(trig, e) for e in (f.gamma, f.alpha) for trig in ("cos", "sin"))
     A = axis_rotation(cg, sg, ca, sa)
     p = displacement(A, f.b, f.d, f.r0)
@@ -98,7 +114,12 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
     turned = Rotation(A, call("cos", f.theta0), call("sin", f.theta0))
     R = [turned.up(e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]  # axes of frame j in frame i
     for name, (k, m) in TENSOR.items():
-        relations[name] = _tensor([[R[k][x] * R[m][y] + (R[m][x] * R[k][y] if k != m else ZERO) for y in range(3)] for x in range(3)])
+        relations[name] = _tensor(
+            [
+                [R[k][x] * R[m][y] + (R[m][x] * R[k][y] if k != m else ZERO) for y in range(3)]
+                for x in range(3)
+            ]
+        )
     if f.sigma == PRISMATIC:
         return relations
     for k, name in enumerate(FIRST):
@@ -110,7 +131,13 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
 def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
     """(p.u) E - p u', or 2 (p.u) E - p u' - u p' if `symmetric`."""
     trace = (p[0] * u[0] + p[1] * u[1] + p[2] * u[2]) * (1 + symmetric)
-    return [[(trace if k == m else ZERO) - p[k] * u[m] - (u[k] * p[m] if symmetric else ZERO) for m in range(3)] for k in range(3)]
+    return [
+        [
+            (trace if k == m else ZERO) - p[k] * u[m] - (u[k] * p[m] if symmetric else ZERO)
+            for m in range(3)
+        ]
+        for k in range(3)
+    ]
 
 
 def _tensor(J: list[list[Expression]]) -> dict[tuple[str, int], Expression]:

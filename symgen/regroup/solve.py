@@ -1,170 +1,141 @@
 """Coefficients of the particular relations in Q(geometry): D_dependent = sum_k beta_k D_base,k.
 
-Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of fixed angles. Changing one of them at a
-time shows which ones matter. The rest is linear algebra: beta = P/Q with P, Q polynomials of rising degree in what matters,
+Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of
+fixed
+angles. Changing one of them at a time shows which ones matter. The rest is linear algebra: beta =
+P/Q
+with P, Q polynomials of rising degree in what matters,
 
-    sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0     at more random geometries g than there are unknowns,
+    sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0
 
-a nullspace over F_p whose entries are then read as rationals, over as many primes as they need. What may vary is tried from much to little: the
-numbers of the file, square roots and all fixed angles as indeterminates; fractions of pi at their values; everything at its value, for a relation that
-holds for these numbers alone. Nothing is assumed of the result: the certificate checks it.
+at more random geometries g than there are unknowns, a nullspace over F_p whose entries are then
+read
+as rationals, over as many primes as they need. What may vary is tried from much to little: the
+numbers of the file, square roots and all fixed angles as indeterminates; fractions of pi at their
+values; everything at its value, for a relation that holds for these numbers alone. Nothing is
+assumed
+of the result: the certificate checks it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache, partial
-from itertools import combinations, combinations_with_replacement, product
+from itertools import combinations, combinations_with_replacement, product, takewhile
 from math import comb, isqrt
-from typing import Protocol
 
 import numpy as np
 
 from symgen.derive.angles import PI, Variable, fixed_angles, roots_of, units_of
-from symgen.derive.columns import columns, sampled_columns
-from symgen.derive.exact import Array, Draw, Fp, primes_for
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
-from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion
+from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.time_limit import require_time
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
 from symgen.regroup.numbers import numbers_of
+from symgen.regroup.residues import drawn, sample, states_for
 
 MAX_UNKNOWNS = 500
 MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
 MAX_WORK = 4e8  # multiplications of one recognition, some seconds
-FREEDOMS = (("numbers", "pi"), ("numbers",), ())  # what is an indeterminate beside constants and transcendental angles
+FREEDOMS = (
+    ("numbers", "pi"),
+    ("numbers",),
+    (),
+)  # what is an indeterminate beside constants and transcendental angles
+FEWEST_GEOMETRIES = 16  # geometries of a pool
 MANY = 2  # variables beyond which those that are mere factors are set apart
 SCALES, POWERS = (2, 3), (1, -1, 2, -2, 3, -3, 4, -4)
-DEGREES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (3, 0), (3, 2), (3, 3), (4, 0), (4, 4), (6, 0), (6, 6))
+DEGREES = (
+    (0, 0),
+    (1, 0),
+    (1, 1),
+    (2, 0),
+    (2, 1),
+    (2, 2),
+    (3, 0),
+    (3, 2),
+    (3, 3),
+    (4, 0),
+    (4, 4),
+    (6, 0),
+    (6, 6),
+)
 
 Products = Sequence[tuple[Expression, ...]]
-Supports = Mapping[str, tuple[str, ...]]  # {dependent column: the base columns it is a combination of}
+Supports = Mapping[
+    str, tuple[str, ...]
+]  # {dependent column: the base columns it is a combination of}
 
 
-def sample(draw: Draw, names: tuple[str, ...]) -> Array:
-    """The regressor columns `names` at the draw's states, shape (..., n_active * samples, len(names)), int64 residues."""
-    robot = draw.robot
-    D = columns(Motion(Geometry(robot, draw, close(robot))), names)
-    W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
-    for k, name in enumerate(names):
-        for row, j in enumerate(robot.joints):
-            value = D[name].get(j, 0)
-            W[k, row] = value.x if isinstance(value, Fp) else value % draw.p
-    W = np.moveaxis(W, -1, 2)  # names, joints, samples, geometries
-    return np.moveaxis(W.reshape(len(names), -1, *draw.shape[:-1]), (0, 1), (-1, -2))
-
-
-def states_for(robot: Robot, names: Sequence[str]) -> int:
-    """Random states that show the rank of the columns `names`.
-
-    The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted for the set of every column, and for all joints.
+def coefficients(
+    robot: Robot, supports: Supports
+) -> tuple[dict[str, list[Expression]], dict[str, str]]:
+    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate
+    degree fits the reason.
     """
-    known = _acting(robot)
-    acts = np.stack([known[name] for name in names])
-    sets = np.unique(np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0)
-    needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
-    return int(np.ceil(needed + 10 / len(robot.joints))) + 4
-
-
-@lru_cache(maxsize=8)
-def _acting(robot: Robot) -> dict[str, Array]:
-    """{column: whether it acts on each joint} of all standard parameters, at random states."""
-    W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
-    return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))
-
-
-def coefficients(robot: Robot, supports: Supports) -> tuple[dict[str, list[Expression]], dict[str, str]]:
-    """beta of D_dependent = sum_k beta_k D_support,k, exact, and for those that no P/Q of moderate degree fits the reason."""
     supports = {name: support for name, support in supports.items() if support}
     result: dict[str, list[Expression]] = {}
     reasons: dict[str, str] = {}
     for free in FREEDOMS:
         left = {name: support for name, support in supports.items() if name not in result}
         if left:
-            recognition = Recognition(robot, left, partial(Residues, robot, left, free), reasons)
-            result |= recognition.coefficients()
+            result |= Recognition(robot, left, free, reasons).coefficients()
     return result, {name: reasons[name] for name in supports if name not in result}
 
 
-def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
-    """beta of D_name = sum_k beta_k D_support,k as numbers, for the constants of the robot file, by least squares at random states."""
-    rng = np.random.default_rng(43)
-    count = states_for(robot, (*support, name))
-    q, qd, qdd = (dict(zip(robot.moving, rng.uniform(-1, 1, (len(robot.moving), count)), strict=True)) for _ in range(3))
-    motion = Motion(Geometry(robot, FloatAlgebra(robot, q, qd, qdd), close(robot)))
-    W = sampled_columns(motion, (*support, name), count).reshape(-1, len(support) + 1)
-    size = np.linalg.norm(W[:, :-1], axis=0)
-    return [Expression.number(repr(float(x))) for x in np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size]
-
-
-class Source(Protocol):
-    """Where the residues come from: F_p itself, or high precision where the loops cannot be closed over F_p."""
-
-    p: int
-    variables: tuple[Variable, ...]
-
-    def random(self, count: int) -> dict[Variable, Array]:
-        """`count` random geometries: residues, shape (count, 1)."""
-
-    def beta(self, geometry: dict[Variable, Array], count: int) -> dict[str, Array | None]:
-        """{dependent: residues of its coefficients, shape (count, support), or None if it does not depend at every geometry}."""
-
-    def value(self, geometry: dict[Variable, Array], count: int, e: Expression) -> Array:
-        """Residues of a constant expression at the geometries."""
-
-
-class Residues:
-    """Coefficients over F_p, for serial robots, trees and parallelograms."""
+class Pool:
+    """Residues of the coefficients at a growing number of random geometries over the k-th prime;
+    `free` says what may vary.
+    """
 
     def __init__(self, robot: Robot, supports: Supports, free: Sequence[str], k: int) -> None:
         self.robot, self.supports = robot, supports
-        self.samples = max(states_for(robot, (*support, d)) for d, support in supports.items())
-        self.names = tuple(dict.fromkeys(name for d, support in supports.items() for name in (*support, d)))
+        self.samples = max(states_for(robot, (*s, d), spare=0) for d, s in supports.items())
+        self.names = tuple(
+            dict.fromkeys(name for d, support in supports.items() for name in (*support, d))
+        )
         whole = (PI, Fraction(1, units_of(robot).D))
-        units = [u for u in units_of(robot).all if u != whole or ("pi" in free and fixed_angles(robot))]
-        numbers: list[Variable] = [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
+        units = [
+            u for u in units_of(robot).all if u != whole or ("pi" in free and fixed_angles(robot))
+        ]
+        numbers: list[Variable] = (
+            [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
+        )
         self.variables: tuple[Variable, ...] = (*robot.constants, "pi", *units, *numbers)
         self.p = primes_for(robot, k + 1)[k]
         self.rng = np.random.default_rng(len(supports) + 1000 * k)
+        self.count, self.geometry = 0, self.random(0)
+        self.beta: dict[str, Array | None] = {
+            name: np.zeros((0, len(support)), dtype=np.int64) for name, support in supports.items()
+        }
+        self.values: dict[Expression, Array] = {}
 
     def random(self, count: int) -> dict[Variable, Array]:
+        """`count` random geometries: residues, shape (count, 1)."""
         return {v: self.rng.integers(2, self.p, (count, 1)) for v in self.variables}
 
-    def beta(self, geometry: dict[Variable, Array], count: int) -> dict[str, Array | None]:
-        draw = Draw(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
-        W = np.broadcast_to(sample(draw, self.names), (count, len(self.robot.joints) * self.samples, len(self.names)))
+    def solved(self, geometry: Mapping[Variable, Array], count: int) -> dict[str, Array | None]:
+        """{dependent: residues of its coefficients, shape (count, support), or None if it does not
+        depend at every geometry}.
+        """
+        draw = drawn(self.robot, 11, self.samples, p=self.p, geometry=geometry, count=count)
+        W = sample(draw, self.names)
         index = {name: k for k, name in enumerate(self.names)}
-        return {d: solve_each(W[:, :, [index[name] for name in (*s, d)]], self.p, self.rng) for d, s in self.supports.items()}
-
-    def value(self, geometry: dict[Variable, Array], count: int, e: Expression) -> Array:
-        value = Draw(self.robot, 11, 1, p=self.p, geometry=geometry, count=count).constant(e)
-        return value.x.reshape(-1) if isinstance(value, Fp) else np.full(1, value % self.p)
-
-
-class Pool:
-    """Residues of the coefficients at a growing number of random geometries over one prime."""
-
-    def __init__(self, source: Source, supports: Supports) -> None:
-        self.source, self.p = source, source.p
-        self.count = 0
-        self.geometry = source.random(0)
-        self.beta: dict[str, Array | None] = {name: np.zeros((0, len(support)), dtype=np.int64) for name, support in supports.items()}
-        self.values: dict[Expression, Array] = {}
+        return {
+            d: solve_each(W[:, :, [index[name] for name in (*s, d)]], self.p, self.rng)
+            for d, s in self.supports.items()
+        }
 
     def grow(self, count: int) -> None:
         """At least `count` geometries."""
         if count <= self.count:
             return
-        more = max(count - self.count, self.count, 12)
-        geometry = self.source.random(more)
-        beta = self.source.beta(geometry, more)
-        self.geometry = {v: np.concatenate([self.geometry[v], geometry[v]]) for v in geometry} if self.count else geometry
+        more = max(count - self.count, self.count, FEWEST_GEOMETRIES)
+        geometry = self.random(more)
+        beta = self.solved(geometry, more)
+        self.geometry = {v: np.concatenate([self.geometry[v], x]) for v, x in geometry.items()}
         self.count += more
         for name, b in beta.items():
             old = self.beta[name]
@@ -176,21 +147,30 @@ class Pool:
         total = np.ones(self.count, dtype=np.int64)
         for e in m:
             if e not in self.values:
-                self.values[e] = self.source.value(self.geometry, self.count, e)
+                draw = Draw(self.robot, 11, 1, p=self.p, geometry=self.geometry, count=self.count)
+                self.values[e] = draw.spread(draw.constant(e)).reshape(-1)
             total = total * self.values[e] % self.p
         return total
 
     def vector(self, name: str, k: int, P: Products, Q: Products) -> dict[int, int] | None:
-        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None where there is none; cos(a) and cos(3a) make others."""
+        """{place among [*Q, *P]: residue} of the first relation with a denominator, or None where
+        there is none; cos(a) and cos(3a) make others.
+        """
         count = len(P) + len(Q) + 4
         self.grow(count)
         beta = self.beta[name]
         if beta is None:
             return None
-        columns = [-beta[:count, k] * self.value(m)[:count] % self.p for m in Q] + [self.value(m)[:count] for m in P]
+        columns = [-beta[:count, k] * self.value(m)[:count] % self.p for m in Q] + [
+            self.value(m)[:count] for m in P
+        ]
         pivots, R = rref(np.stack(columns, axis=1), self.p)
         for free in (c for c in range(len(Q), len(columns)) if c not in pivots):
-            entries = {c: -int(R[i, free]) % self.p for i, c in enumerate(pivots) if c < free and R[i, free]}
+            entries = {
+                c: -int(R[i, free]) % self.p
+                for i, c in enumerate(pivots)
+                if c < free and R[i, free]
+            }
             if min(entries, default=free) < len(Q):
                 return entries | {free: 1}
         return None
@@ -198,7 +178,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What a coefficient depends on: `free` variables in some way, others as a factor with a power."""
+    """What a coefficient depends on: `free` variables, and others as factors with a power."""
 
     free: tuple[Variable, ...]
     powers: Mapping[str | Number | Call, int]
@@ -208,72 +188,99 @@ class Dependence:
 
 
 class Recognition:
-    """Expressions from residues. `source(k)` gives them over the k-th prime, None where there is no such prime."""
+    """Expressions from residues, where `free` may vary."""
 
-    def __init__(self, robot: Robot, supports: Supports, source: Callable[[int], Source | None], reasons: dict[str, str]) -> None:
-        self.robot, self.supports, self.source, self.reasons = robot, supports, source, reasons
-        first = source(0)
-        assert first is not None
-        self.pools = [Pool(first, supports)]
+    def __init__(
+        self, robot: Robot, supports: Supports, free: Sequence[str], reasons: dict[str, str]
+    ) -> None:
+        self.robot, self.supports, self.free, self.reasons = robot, supports, free, reasons
+        self.pools = [Pool(robot, supports, free, 0)]
         self.work = 0  # multiplications, roughly
 
     def coefficients(self) -> dict[str, list[Expression]]:
         """{dependent: coefficients} of those that were recognised."""
-        matters = self._what_matters()
         result: dict[str, list[Expression]] = {}
-        for name, support in self.supports.items():
-            if name in matters:
-                found: list[Expression] = []
-                for k in range(len(support)):
-                    e = self._recognise(name, k, matters[name][k])
-                    if e is None:
-                        break
-                    found.append(e)
-                else:
-                    result[name] = found
+        for name, matters in self._what_matters().items():
+            each = (self._recognise(name, k, depends) for k, depends in enumerate(matters))
+            recognised = [e for e in takewhile(lambda e: e is not None, each) if e is not None]
+            if len(recognised) == len(matters):
+                result[name] = recognised
         return result
 
     def _what_matters(self) -> dict[str, list[Dependence]]:
-        source = self.pools[0].source
-        variables = source.variables
-        reference, changed = source.random(1), source.random(1)
+        pool = self.pools[0]
+        variables = pool.variables
+        reference, changed = pool.random(1), pool.random(1)
 
         def at(cases: list[dict[Variable, Array]]) -> dict[str, Array | None]:
-            return source.beta({v: np.concatenate([case[v] for case in cases]) for v in variables}, len(cases))
+            geometry = {v: np.concatenate([case[v] for case in cases]) for v in variables}
+            return pool.solved(geometry, len(cases))
 
         result: dict[str, list[Dependence]] = {}
         for name, b in at([reference] + [reference | {v: changed[v]} for v in variables]).items():
             if b is None:
                 self.reasons[name] = "the relation does not hold for every geometry"
             else:
-                moved = [[v for i, v in enumerate(variables, start=1) if b[i, k] != b[0, k]] for k in range(b.shape[1])]
+                moved = [
+                    [v for i, v in enumerate(variables, start=1) if b[i, k] != b[0, k]]
+                    for k in range(b.shape[1])
+                ]
                 result[name] = [Dependence(tuple(vs), {}) for vs in moved]
         many = [
-            v for v in variables if not isinstance(v, tuple) and any(len(d) > MANY and v in d.free for ds in result.values() for d in ds)
+            v
+            for v in variables
+            if not isinstance(v, tuple)
+            and any(len(d) > MANY and v in d.free for ds in result.values() for d in ds)
         ]
-        scaled = at([reference] + [reference | {v: reference[v] * n % source.p} for v in many for n in SCALES]) if many else {}
+        scaled = (
+            at(
+                [reference]
+                + [reference | {v: reference[v] * n % pool.p} for v in many for n in SCALES]
+            )
+            if many
+            else {}
+        )
         for name, b in scaled.items():
             for k, d in enumerate(result.get(name, [])):
                 if len(d) > MANY and b is not None:
                     powers = {
-                        v: self._power(b[0, k], [b[1 + len(SCALES) * i + j, k] for j in range(len(SCALES))]) for i, v in enumerate(many)
+                        v: self._power(
+                            b[0, k], [b[1 + len(SCALES) * i + j, k] for j in range(len(SCALES))]
+                        )
+                        for i, v in enumerate(many)
                     }
-                    known = {v: n for v, n in powers.items() if n and v in d.free}
-                    result[name][k] = Dependence(tuple(v for v in d.free if v not in known), known)
+                    factors = {v: n for v, n in powers.items() if n and v in d.free}
+                    result[name][k] = Dependence(
+                        tuple(v for v in d.free if v not in factors), factors
+                    )
         return result
 
     def _power(self, reference: int, scaled: Sequence[int]) -> int:
-        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 where it does not."""
+        """n where scaling a variable by SCALES scales a coefficient by their n-th powers, 0 where
+        it does not.
+        """
         p = self.pools[0].p
         ratios = [int(x) * pow(int(reference), -1, p) % p for x in scaled] if reference else []
         return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
 
     def _recognise(self, name: str, k: int, depends: Dependence) -> Expression | None:
         matters = depends.free
-        above, below = (tuple(_atom(v) for v, n in depends.powers.items() for _ in range(sign * n)) for sign in (1, -1))
+        above, below = (
+            tuple(_atom(v) for v, n in depends.powers.items() for _ in range(sign * n))
+            for sign in (1, -1)
+        )
         for (numerator, denominator), angles in product(DEGREES, self._choices(matters)):
             require_time()
-            if comb(len(matters) - sum(isinstance(v, tuple) for v in matters) + len(angles) + numerator, numerator) > MAX_UNKNOWNS:
+            if (
+                comb(
+                    len(matters)
+                    - sum(isinstance(v, tuple) for v in matters)
+                    + len(angles)
+                    + numerator,
+                    numerator,
+                )
+                > MAX_UNKNOWNS
+            ):
                 continue  # more products without a sine than may be looked for
             P = [(*m, *above) for m in self._monomials(matters, angles, numerator)]
             Q = [(*m, *below) for m in self._monomials(matters, angles, denominator)]
@@ -292,50 +299,77 @@ class Recognition:
                 if entries is None:
                     self.reasons[name] = "a coefficient is not rational in what may vary"
                     return None
-                self.reasons[name] = "a denominator vanishes at the fixed angles"  # unless it does not
+                self.reasons[name] = (
+                    "a denominator vanishes at the fixed angles"  # unless it does not
+                )
                 return _fraction(entries, P, Q)
-        self.reasons[name] = f"no fraction of degree up to {DEGREES[-1]} in {_texts((*matters, *depends.powers)) or 'rational numbers'}"
+        self.reasons[name] = (
+            f"no fraction of degree up to {DEGREES[-1]} in "
+            f"{_texts((*matters, *depends.powers)) or 'rational numbers'}"
+        )
         return None
 
-    def _rationals(self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products) -> dict[int, Fraction] | None:
-        """The vector as rationals: small ones from one prime, others by the Chinese remainder theorem until one more prime agrees."""
+    def _rationals(
+        self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
+    ) -> dict[int, Fraction] | None:
+        """The vector as rationals: small ones from one prime, others by the Chinese remainder
+        theorem until one more prime agrees.
+        """
         small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}
         if all(x is not None for x in small.values()):
             return {c: x for c, x in small.items() if x is not None}
         residue, modulus = dict(vector), self.pools[0].p
         for m in range(1, MAX_PRIMES):
             if m == len(self.pools):
-                source = self.source(m)
-                if source is None:
-                    return None
-                self.pools.append(Pool(source, self.supports))
+                self.pools.append(Pool(self.robot, self.supports, self.free, m))
             p, other = self.pools[m].p, self.pools[m].vector(name, k, P, Q)
             if other is None or set(other) != set(vector):
                 return None
             bound = isqrt(modulus // 2)
             entries = {c: small_rational(x, modulus, bound) for c, x in residue.items()}
-            known = {c: x for c, x in entries.items() if x is not None and x.denominator % p}
-            if len(known) == len(entries) and all((x.numerator - other[c] * x.denominator) % p == 0 for c, x in known.items()):
-                return known
+            rationals = {c: x for c, x in entries.items() if x is not None and x.denominator % p}
+            if len(rationals) == len(entries) and all(
+                (x.numerator - other[c] * x.denominator) % p == 0 for c, x in rationals.items()
+            ):
+                return rationals
             inverse = pow(modulus, -1, p)
             residue = {c: x + modulus * ((other[c] - x) * inverse % p) for c, x in residue.items()}
             modulus *= p
         return None
 
     def _choices(self, matters: Sequence[Variable]) -> list[tuple[Expression, ...]]:
-        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they hold every unit that matters."""
-        units, known = {v for v in matters if isinstance(v, tuple)}, units_of(self.robot)
-        held = {e: units & {unit for unit, _ in known.of(e)} for e in fixed_angles(self.robot)}
+        """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they
+        hold every unit that matters.
+        """
+        units, written = {v for v in matters if isinstance(v, tuple)}, units_of(self.robot)
+        held = {e: units & {unit for unit, _ in written.of(e)} for e in fixed_angles(self.robot)}
         angles = [e for e in held if held[e]]
-        choices = [c for n in (1, 2) for c in combinations(angles, n) if set().union(*(held[e] for e in c)) == units]
+        choices = [
+            c
+            for n in (1, 2)
+            for c in combinations(angles, n)
+            if set().union(*(held[e] for e in c)) == units
+        ]
         return [*choices, *([tuple(angles)] if len(angles) > 2 else [])] if angles else [()]
 
-    def _monomials(self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int) -> Products:
-        """Products of at most `degree` constants, cosines and sines; sin to the first power only, as sin**2 = 1 - cos**2."""
+    def _monomials(
+        self, matters: Sequence[Variable], angles: Sequence[Expression], degree: int
+    ) -> Products:
+        """Products of at most `degree` constants, cosines and sines; sin to the first power only,
+        as sin**2 = 1 - cos**2.
+        """
         sines = [_atom(Call("sin", e)) for e in angles]
-        atoms = [_atom(v) for v in matters if not isinstance(v, tuple)] + [_atom(Call("cos", e)) for e in angles] + sines
+        atoms = (
+            [_atom(v) for v in matters if not isinstance(v, tuple)]
+            + [_atom(Call("cos", e)) for e in angles]
+            + sines
+        )
         once = range(len(atoms) - len(sines), len(atoms))
-        places = [m for d in range(degree + 1) for m in combinations_with_replacement(range(len(atoms)), d)]
+        places = [
+            m
+            for d in range(degree + 1)
+            for m in combinations_with_replacement(range(len(atoms)), d)
+        ]
         return [tuple(atoms[k] for k in m) for m in places if all(m.count(s) < 2 for s in once)]
 
 
@@ -361,4 +395,6 @@ def _atom(a: str | Number | Call) -> Expression:
 
 
 def _texts(matters: Sequence[Variable]) -> str:
-    return ", ".join(str(v) if not isinstance(v, tuple) else str(Expression({v[0]: v[1]})) for v in matters)
+    return ", ".join(
+        str(v) if not isinstance(v, tuple) else str(Expression({v[0]: v[1]})) for v in matters
+    )

@@ -1,12 +1,16 @@
-"""What each standard parameter does: its link, the base parameters and joint torques it enters, or why it enters none.
+"""What each standard parameter does: its link, the base parameters and joint torques it enters, or
+why it enters none.
 
-A parameter acts through its energy, E + U of its link if it alone were 1 (Gautier and Khalil, IEEE T-RA 6(3), 1990):
+A parameter acts through its energy, E + U of its link if it alone were 1 (Gautier and Khalil, IEEE
+T-RA 6(3), 1990):
 
     XX w1**2/2   XY w1 w2   XZ w1 w3   YY w2**2/2   YZ w2 w3   ZZ w3**2/2
     MX w3 v2 - w2 v3 - g1   MY w1 v3 - w3 v1 - g2   MZ w2 v1 - w1 v2 - g3   M v.v/2 - g.P
 
-w, v: angular velocity and velocity of the origin, g: acceleration of gravity, all in the link frame, P: position of the origin. A
-parameter whose energy never changes has no effect; the reason names the factors that are zero in every motion.
+w, v: angular velocity and velocity of the origin, g: acceleration of gravity, all in the link
+frame, P: position of the origin. A
+parameter whose energy never changes has no effect; the reason names the factors that are zero in
+every motion.
 """
 
 from __future__ import annotations
@@ -14,24 +18,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from symgen.derive.columns import element_names, inertial_names
-from symgen.derive.geometry import Geometry
+from symgen.derive.derivation import derive
+from symgen.derive.energies import origin_velocities
 from symgen.derive.graph import Scalar as Node
-from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.kinematics import frame_poses
-from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import ZERO3, Scalar, Vector, add, cross, dot, vadd
-from symgen.description.robot import PRISMATIC, Robot
+from symgen.derive.scalar import Scalar, dot
+from symgen.description.robot import KINDS, Robot
 from symgen.emit.spec import ModuleSpec, unit
 
 AXES = "xyz"
-MEANING = {
-    "inertia": "inertia of the actuator",
-    "viscous": "viscous friction",
-    "coulomb": "Coulomb friction",
-    "offset": "constant torque or force",
-    "stiffness": "stiffness",
-}
 
 
 @dataclass(frozen=True)
@@ -75,15 +69,27 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
     inertial, elements = inertial_names(robot), element_names(robot)
     result = []
     for name, rows in into.items():
-        joints = tuple(j for row, j in enumerate(robot.joints) if any(spec.structure[k][row] for k in rows))
+        joints = tuple(
+            j for row, j in enumerate(robot.joints) if any(spec.structure[k][row] for k in rows)
+        )
         base = tuple(spec.regrouping.names[k] for k in rows)
         if name in inertial:
             family, j = inertial[name]
-            meaning, place, why = inertial_meaning(family, j), f"link {j}", reasons.inertial(family, j)
+            meaning, place, why = (
+                inertial_meaning(family, j),
+                f"link {j}",
+                reasons.inertial(family, j),
+            )
         else:
             e, j = elements[name]
-            meaning, place, why = MEANING[e.kind], f"joint {j}", "it acts along a coordinate that does not move or carries no torque"
-        result.append(Effect(name, meaning, unit(robot, name), place, j, base, joints, "" if rows else why))
+            meaning, place, why = (
+                KINDS[e.kind].meaning,
+                f"joint {j}",
+                "it acts along a coordinate that does not move or carries no torque",
+            )
+        result.append(
+            Effect(name, meaning, unit(robot, name), place, j, base, joints, "" if rows else why)
+        )
     return tuple(result)
 
 
@@ -94,7 +100,11 @@ def inertial_meaning(family: str, j: int) -> str:
     a, b = family[0].lower(), family[1].lower()
     if a == "m":
         return f"first moment of link {j}, mass times centre of mass along {b}{j}"
-    kind = f"moment of inertia of link {j} about {a}{j}" if a == b else f"product of inertia of link {j}, -∫{a}{b} dm"
+    kind = (
+        f"moment of inertia of link {j} about {a}{j}"
+        if a == b
+        else f"product of inertia of link {j}, -∫{a}{b} dm"
+    )
     return f"{kind}, at the origin of frame {j}"
 
 
@@ -103,51 +113,59 @@ class Reasons:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        algebra = GraphAlgebra(robot)
-        geometry = Geometry(robot, algebra, close(robot))
-        motion = Motion(geometry)
-        self.w = {j: link.w for j, link in motion.link.items()}
-        self.v = origin_velocities(motion, geometry)
-        poses, g = frame_poses(geometry), tuple(algebra.constant(e) for e in robot.gravity)
-        self.level = {j: [_constant(dot(g, [A[k][m] for k in range(3)])) for m in range(3)] for j, (A, _) in poses.items()}
+        d = derive(robot)
+        self.w = {j: link.w for j, link in d.motion.link.items()}
+        self.v = origin_velocities(d.motion)
+        g = tuple(d.algebra.constant(e) for e in robot.gravity)
+        self.level = {
+            j: [_constant(dot(g, [A[k][m] for k in range(3)])) for m in range(3)]
+            for j, (A, _) in d.poses.items()
+        }
         self.gravity = any(robot.gravity)
 
     def inertial(self, family: str, j: int) -> str:
         """Why the parameter `family` of link j has no effect."""
         if family == "M":
-            return self._mass(j)
+            return (
+                f"the energy of a mass at the origin of frame {j} is the same in every motion"
+                if not all(map(_zero, self.v[j]))
+                else f"the origin of frame {j} does not move, so mass there has neither kinetic "
+                "energy nor work against gravity"
+            )
         k, m = (AXES.index(c) if c in AXES else -1 for c in family.lower())
         if family.startswith("M"):
             return self._first_moment(j, m)
-        for axis in dict.fromkeys((k, m)):
+        for axis in (k, m):
             if _zero(self.w[j][axis]):
-                return f"link {j} never turns about {AXES[axis]}{j}, and the energy has its rate as a factor"
-        return f"the energy, the product of the rates about {AXES[k]}{j} and {AXES[m]}{j}, is the same in every motion"
-
-    def _mass(self, j: int) -> str:
-        if all(map(_zero, self.v[j])):
-            return f"the origin of frame {j} does not move, so mass there has neither kinetic energy nor work against gravity"
-        return f"the energy of a mass at the origin of frame {j} is the same in every motion"
+                return (
+                    f"link {j} never turns about {AXES[axis]}{j}, and the energy has its rate as a "
+                    "factor"
+                )
+        return (
+            f"the energy, the product of the rates about {AXES[k]}{j} and {AXES[m]}{j}, is the "
+            "same in every motion"
+        )
 
     def _first_moment(self, j: int, m: int) -> str:
         a, b = (m + 1) % 3, (m + 2) % 3
         w, v = self.w[j], self.v[j]
         still = all(map(_zero, v))
         if not all(_zero(w[x]) or _zero(v[y]) for x, y in ((a, b), (b, a))) or not self.level[j][m]:
-            return f"mass moved along {AXES[m]}{j} changes the energy by the same amount in every motion"
-        kinetic = f"the origin of frame {j} does not move" if still else f"the coupling of turning and moving along {AXES[m]}{j} is zero"
+            return (
+                f"mass moved along {AXES[m]}{j} changes the energy by the same amount in every "
+                "motion"
+            )
+        kinetic = (
+            f"the origin of frame {j} does not move"
+            if still
+            else f"the coupling of turning and moving along {AXES[m]}{j} is zero"
+        )
         if not self.gravity:
             return f"{kinetic}, and there is no gravity"
-        return f"{kinetic}, and {AXES[m]}{j} keeps its angle to gravity, so nothing changes with mass moved along it"
-
-
-def origin_velocities(motion: Motion, geometry: Geometry) -> dict[int, Vector]:
-    """v_j = jRi (v_i + w_i x P_ij) [+ qd_j e3 if prismatic], in frame j."""
-    v: dict[int, Vector] = {0: ZERO3}
-    for f in motion.robot.frames:
-        x, y, z = geometry.rotation[f.j].down(vadd(v[f.ant], cross(motion.link[f.ant].w, geometry.P[f.j])))
-        v[f.j] = (x, y, add(z, motion.qd(f.j)) if f.sigma == PRISMATIC else z)
-    return v
+        return (
+            f"{kinetic}, and {AXES[m]}{j} keeps its angle to gravity, so nothing changes with "
+            "mass moved along it"
+        )
 
 
 def _zero(x: Scalar) -> bool:

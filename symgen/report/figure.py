@@ -1,21 +1,27 @@
-"""The numbers of the drawing: frame table, positions of the passive joints, range of the sliders. The page computes the geometry itself."""
+"""The numbers of the drawing: frame table, positions of the passive joints, range of the sliders.
+The page computes the geometry itself.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from symgen.derive.loops import close
+from symgen.derive.closure import Closure
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import SymgenError
 
 
-def figure(robot: Robot) -> dict[str, Any]:
-    """Plain values for JSON, SI and rad: `theta` and `r` without the joint position, `follows` as q_j = offset + sum_i of_i q_i."""
-    closure = close(robot)
+def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
+    """Plain values for JSON, SI and rad: `theta` and `r` without the joint position, `follows` as
+    q_j = offset + sum_i of_i q_i.
+    """
     follows = {
-        j: {"of": {i: _value(robot, g, f"q{j}") for i, g in closure.row[j].items()}, "offset": _value(robot, closure.offset[j], f"q{j}")}
+        j: {
+            "of": {i: _value(robot, g, f"q{j}") for i, g in closure.row[j].items()},
+            "offset": _value(robot, closure.offset[j], f"q{j}"),
+        }
         for j in robot.passive
         if j not in closure.tied
     }
@@ -23,47 +29,73 @@ def figure(robot: Robot) -> dict[str, Any]:
         {"j": f.j, "ant": f.ant, "sigma": f.sigma}
         | {
             name: _value(robot, e, f"{name} of frame {f.j}")
-            for name, e in (("gamma", f.gamma), ("b", f.b), ("alpha", f.alpha), ("d", f.d), ("theta", f.theta0), ("r", f.r0))
+            for name, e in (
+                ("gamma", f.gamma),
+                ("b", f.b),
+                ("alpha", f.alpha),
+                ("d", f.d),
+                ("theta", f.theta0),
+                ("r", f.r0),
+            )
         }
         for f in robot.frames
     ]
     return {
         "frames": frames,
         "gravity": [_value(robot, e, "gravity") for e in robot.gravity],
-        "joints": joint_ranges(robot, sum(abs(f[name]) for f in frames for name in ("b", "d", "r"))),
+        "joints": joint_ranges(
+            robot, closure, sum(abs(f[name]) for f in frames for name in ("b", "d", "r"))
+        ),
         "follows": follows,
         "tied": {j: closure.start[j] for j in closure.tied},
         "loops": [{"cut": loop.cut, "twin": loop.twin} for loop in robot.loops],
     }
 
 
-def joint_ranges(robot: Robot, size: float) -> list[dict[str, Any]]:
-    """Slider of every actuated joint: its limits, else half a turn or half the size of the robot to either side; start at 0 if that is inside."""
-    closure = close(robot)
+def joint_ranges(robot: Robot, closure: Closure, size: float) -> list[dict[str, Any]]:
+    """Slider of every actuated joint: its limits, else half a turn or half the size of the robot to
+    either side; start at 0 if that is inside.
+    """
     ranges = []
     for row, j in enumerate(robot.joints):
         slides = robot.frame(j).sigma == PRISMATIC
         half = (size / 2 or 0.5) if slides else math.pi
         low, high = robot.limits["q"][row] if "q" in robot.limits else (-half, half)  # type: ignore[misc]
         start = closure.start[j] if closure.tied else 0.0 if low <= 0 <= high else (low + high) / 2
-        ranges.append({"j": j, "slides": slides, "low": min(low, start), "high": max(high, start), "start": start})
+        ranges.append(
+            {
+                "j": j,
+                "slides": slides,
+                "low": min(low, start),
+                "high": max(high, start),
+                "start": start,
+            }
+        )
     return ranges
 
 
-def passive_text(robot: Robot) -> dict[int, str]:
+def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
     """How each passive joint gets its position, in words."""
-    tied = close(robot).tied
+    words = {True: "declared", False: "found from the loop"}
     return {
-        j: "solved from the loop" if j in tied else "declared" if j in robot.constraints else "found from the loop" for j in robot.passive
+        j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]
+        for j in robot.passive
     }
 
 
 def _value(robot: Robot, e: Expression, what: str) -> float:
-    """The number of an expression for the constants of the robot file. Raises SymgenError where there is none."""
+    """The number of an expression for the constants of the robot file. Raises SymgenError where
+    there is none.
+    """
     try:
         value = e.value(robot.constants)
     except (ArithmeticError, ValueError) as error:
-        raise SymgenError(f"{robot.name}: {what} = {e} has no value for the constants {dict(robot.constants)}: {error}") from error
+        raise SymgenError(
+            f"{robot.name}: {what} = {e} has no value for the constants {dict(robot.constants)}: "
+            f"{error}"
+        ) from error
     if not math.isfinite(value):
-        raise SymgenError(f"{robot.name}: {what} = {e} is not finite for the constants {dict(robot.constants)}")
+        raise SymgenError(
+            f"{robot.name}: {what} = {e} is not finite for the constants {dict(robot.constants)}"
+        )
     return value

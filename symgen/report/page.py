@@ -1,7 +1,10 @@
-"""The page of a robot as one HTML file that opens anywhere: one script and one style sheet inside, no request to anyone. jinja2 only here.
+"""The page of a robot as one HTML file that opens anywhere: one script and one style sheet inside,
+no request to anyone. jinja2 only here.
 
-Names, titles and expressions are escaped by the template or by `mathml.element`; numbers for the script are JSON in which <, > and & are
-written as escapes; the content security policy allows this script and this style sheet by their hashes, hence nothing else.
+Names, titles and expressions are escaped by the template or by `mathml`; numbers for the
+script are JSON in which <, > and & are
+written as escapes; the content security policy allows this script and this style sheet by their
+hashes, hence nothing else.
 """
 
 from __future__ import annotations
@@ -12,38 +15,31 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
+from math import prod
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
 
+from symgen.certify.certificate import Certificate
+from symgen.certify.modules import certify
+from symgen.derive.closure import Closure
 from symgen.derive.loops import close
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
-from symgen.emit.certified import certify
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec, unit
-from symgen.regroup import mathml
-from symgen.regroup.certificate import Certificate
-from symgen.regroup.mathml import MathML
 from symgen.regroup.regrouping import Regrouping
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text
+from symgen.symbols import mathml, trees
 from symgen.symbols.markup import shown_models
+from symgen.symbols.mathml import MathML
 from symgen.version import VERSION
 
 SCRIPTS = ("kinematics.js", "drawing.js", "page.js")
 HEADINGS = {"ant": "a", "mu": "μ", "sigma": "σ", "gamma": "γ", "alpha": "α", "theta": "θ"}
 KINDS_OF_JOINT = ("revolute", "prismatic", "fixed")
-MODELS = ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses", "closure", "curvature")
-
-
-class Verbatim(str):
-    """Text of this package that the template inserts as it is."""
-
-    __slots__ = ()
-
-    def __html__(self) -> str:
-        return self
 
 
 def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -> str:
@@ -61,26 +57,30 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     SymgenError
         A length has no value.
     """
-    robot, spec = regrouping.robot, module_spec(regrouping)
-    drawing, parameters = figure(robot), effects(spec)
+    robot, spec, closure = regrouping.robot, module_spec(regrouping), close(regrouping.robot)
+    drawing, parameters = figure(robot, closure), effects(spec)
     certificate = certificate or certify(regrouping)
     models, notes = shown_models(regrouping)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
+    sources = passive_text(robot, closure)
     return _template().render(
         robot=robot,
         title=robot.title or robot.name,
-        style=Verbatim(style),
-        script=Verbatim(script),
-        policy=f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; base-uri 'none'; form-action 'none'",
+        style=Markup(style),
+        script=Markup(script),
+        policy=(
+            f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
+            "base-uri 'none'; form-action 'none'"
+        ),
         data=embedded(drawing | {"parameters": _pointed_at(spec, parameters)}),
         verdict=_verdict(regrouping, certificate),
-        joints=[j | {"name": mathml.math(mathml.name(f"q{j['j']}"))} for j in drawing["joints"]],
-        passive=[(mathml.math(mathml.name(f"q{j}")), j, text) for j, text in passive_text(robot).items()],
+        joints=[j | {"name": _symbol(f"q{j['j']}")} for j in drawing["joints"]],
+        passive=[(_symbol(f"q{j}"), j, text) for j, text in sources.items()],
         frames=_frame_rows(robot),
-        constants=[(mathml.math(mathml.name(name)), f"{value:.10g}") for name, value in robot.constants.items()],
-        relations=_relations(robot),
+        constants=[(_symbol(name), f"{value:.10g}") for name, value in robot.constants.items()],
+        relations=[(_relation(closure, j), text) for j, text in sources.items()],
         elements=[_element_row(e) for e in robot.elements],
-        gravity=[mathml.math(mathml.expression(e)) for e in robot.gravity],
+        gravity=[mathml.math(trees.expression(e)) for e in robot.gravity],
         formulas=_formulas(spec),
         models=models,
         model_notes=notes,
@@ -92,10 +92,18 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     )
 
 
-def embedded(value: Any) -> Verbatim:
+def _symbol(name: str) -> MathML:
+    return mathml.math(trees.symbol(name))
+
+
+def _parameter(name: str) -> MathML:
+    return mathml.math(trees.parameter(name))
+
+
+def embedded(value: Any) -> Markup:
     """JSON that neither ends a script element nor opens a comment in one."""
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
-    return Verbatim(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
 def _hash(text: str) -> str:
@@ -108,45 +116,54 @@ def _resource(name: str) -> str:
 
 def _verdict(regrouping: Regrouping, certificate: Certificate) -> str:
     robot = regrouping.robot
-    counts = f"{len(regrouping)} base parameters of {len(robot.parameters)} standard parameters, {len(regrouping.no_effect)} without effect"
+    counts = (
+        f"{len(regrouping)} base parameters of {len(robot.parameters)} standard parameters, "
+        f"{len(regrouping.no_effect)} without effect"
+    )
     proof = "the certificate holds" if certificate.valid else "the certificate does NOT hold"
     return f"{counts}; {regrouping.method}; {proof}."
 
 
 def _frame_rows(robot: Robot) -> dict[str, Any]:
-    kept = informative_columns(robot)
-    rows = []
-    for f in robot.frames:
-        cells = [mathml.math(mathml.expression(x)) if isinstance(x := getattr(f, c), Expression) else str(x) for c in kept[1:]]
-        rows.append(
-            {"j": f.j, "cells": cells, "kind": ", ".join([KINDS_OF_JOINT[f.sigma], *([robot.labels[f.j]] if f.j in robot.labels else [])])}
-        )
-    return {"header": [HEADINGS.get(c, c) for c in kept], "rows": rows}
+    columns = informative_columns(robot)
+
+    def cell(value: Any) -> str:
+        is_formula = isinstance(value, Expression)
+        return mathml.math(trees.expression(value)) if is_formula else str(value)
+
+    rows = [
+        {
+            "j": f.j,
+            "cells": [cell(getattr(f, column)) for column in columns[1:]],
+            "kind": ", ".join(filter(None, (KINDS_OF_JOINT[f.sigma], robot.labels.get(f.j)))),
+        }
+        for f in robot.frames
+    ]
+    return {"header": [HEADINGS.get(column, column) for column in columns], "rows": rows}
 
 
-def _relations(robot: Robot) -> list[tuple[MathML, str]]:
-    """Loops and passive joints: what holds, and where it comes from."""
-    closure, texts = close(robot), passive_text(robot)
-    rows = []
-    for j in robot.passive:
-        left = mathml.name(f"q{j}")
-        if j in closure.tied:
-            rows.append((mathml.math(left), texts[j]))
-            continue
-        equation = mathml.element("mrow", left, mathml.element("mo", "="), mathml.expression(closure.formula(j)))
-        rows.append((mathml.math(equation), texts[j]))
-    return rows
+def _relation(closure: Closure, j: int) -> MathML:
+    """What holds for a passive joint: its formula, or its name where it is solved for."""
+    shown = trees.symbol(f"q{j}")
+    if j not in closure.tied:
+        shown = trees.equation(shown, trees.expression(closure.formula(j)))
+    return mathml.math(shown)
 
 
 def _element_row(e: Element) -> dict[str, Any]:
     """Each parameter of a family with the coordinate s = G q or the form it acts along."""
-    acts = []
-    for j in e.keys:
-        if j in e.along:
-            total = sum((g * Expression.symbol(f"q{i}") for i, g in e.along[j].items()), Expression())
-        else:
-            total = sum((b * Expression.symbol(f"q{i}") * Expression.symbol(f"q{m}") for (i, m), b in e.form[j].items()), Expression())
-        acts.append((mathml.math(mathml.parameter(f"{e.family}{j}")), mathml.math(mathml.expression(total))))
+
+    def coordinate(j: int) -> Expression:
+        weights = {(i,): g for i, g in e.along[j].items()} if j in e.along else e.form[j]
+        terms = (
+            prod((Expression.symbol(f"q{i}") for i in joints), start=g)
+            for joints, g in weights.items()
+        )
+        return sum(terms, Expression())
+
+    acts = [
+        (_parameter(f"{e.family}{j}"), mathml.math(trees.expression(coordinate(j)))) for j in e.keys
+    ]
     return {"family": e.family, "kind": e.kind, "when": e.when, "acts": acts}
 
 
@@ -155,11 +172,13 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
     return [
         {
             "name": b.name,
-            "symbol": mathml.math(mathml.parameter(b.name)),
-            "terms": mathml.formula(b.formula) if b.name != b.own else [],
+            "symbol": _parameter(b.name),
+            "terms": mathml.terms(trees.formula(b.formula)) if b.name != b.own else [],
             "text": str(b.formula),
             "unit": printed(unit(robot, b.own)),
-            "joints": [(j, entered) for j, entered in zip(robot.joints, spec.structure[k], strict=True)],
+            "joints": [
+                (j, entered) for j, entered in zip(robot.joints, spec.structure[k], strict=True)
+            ],
         }
         for k, b in enumerate(spec.regrouping.base)
     ]
@@ -175,7 +194,9 @@ def _places(parameters: Sequence[Effect]) -> dict[str, list[dict[str, Any]]]:
     places: dict[str, list[dict[str, Any]]] = {}
     for e in parameters:
         fate = "none" if not e.base else "alone" if e.base == (e.name,) else "regrouped"
-        places.setdefault(e.place, []).append({"name": e.name, "symbol": mathml.math(mathml.parameter(e.name)), "fate": fate})
+        places.setdefault(e.place, []).append(
+            {"name": e.name, "symbol": _parameter(e.name), "fate": fate}
+        )
     return places
 
 
@@ -184,7 +205,7 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
     reasons: dict[str, list[MathML]] = {}
     for e in parameters:
         if e.why:
-            reasons.setdefault(e.why, []).append(mathml.math(mathml.parameter(e.name)))
+            reasons.setdefault(e.why, []).append(_parameter(e.name))
     return [(names, why) for why, names in reasons.items()]
 
 
@@ -202,13 +223,27 @@ def _pointed_at(spec: ModuleSpec, parameters: Sequence[Effect]) -> Mapping[str, 
     return entries
 
 
-def _entry(e: Effect, text: str, base: Sequence[str], joints: Sequence[int], why: str) -> dict[str, Any]:
-    return {"text": text, "unit": printed(e.unit), "place": e.place, "link": e.link, "base": base, "joints": joints, "why": why}
+def _entry(
+    e: Effect, text: str, base: Sequence[str], joints: Sequence[int], why: str
+) -> dict[str, Any]:
+    return {
+        "text": text,
+        "unit": printed(e.unit),
+        "place": e.place,
+        "link": e.link,
+        "base": base,
+        "joints": joints,
+        "why": why,
+    }
 
 
 @lru_cache(maxsize=1)
 def _template() -> Template:
     environment = Environment(
-        loader=PackageLoader("symgen.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("symgen.report", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template("robot.html.jinja")

@@ -1,11 +1,15 @@
-"""Long formulas on several lines: cut before + and -, outside of brackets first, inside where a term is wider than a line."""
+"""Long formulas on several lines: cut before + and -, outside of brackets first, inside where a
+term is wider than a line.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
 
-def lines(head: str, formula: str, width: int, hanging: str, measure: Callable[[str], int] = len) -> list[str]:
+def lines(
+    head: str, formula: str, width: int, hanging: str, measure: Callable[[str], int] = len
+) -> list[str]:
     """`head` with as much of the formula as fits, then lines that begin with `hanging`."""
     done: list[str] = []
     line, empty = head, True
@@ -18,8 +22,12 @@ def lines(head: str, formula: str, width: int, hanging: str, measure: Callable[[
     return [*done, line]
 
 
-def pieces(formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0) -> Iterator[str]:
-    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width` cut further in."""
+def pieces(
+    formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0
+) -> Iterator[str]:
+    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width`
+    cut further in.
+    """
     for piece in _cut(formula, depth):
         if measure(piece) <= width or depth > 8:
             yield piece

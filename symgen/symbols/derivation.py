@@ -1,4 +1,6 @@
-"""What a model is derived from: robot, parameters, closure, and the graph algebra in which symbols may have values."""
+"""What a model is derived from: robot, parameters, closure, and the graph algebra in which symbols
+may have values.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +8,23 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property, partial
 from math import hypot, isfinite
 from typing import Any
 
 from symgen.derive.closure import Closure, open_tree
-from symgen.derive.columns import element_names
-from symgen.derive.geometry import Geometry
+from symgen.derive.derivation import Derivation, derive, derived
+from symgen.derive.graph import Symbol
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loops import close
-from symgen.derive.scalar import Scalar, Turn, add, mul
-from symgen.description.at_values import at_values, exact
-from symgen.description.expression import ONE, ZERO, Expression
+from symgen.derive.model import Request
+from symgen.derive.names import Names
+from symgen.derive.rewrite import Input
+from symgen.derive.scalar import Scalar, add, mul
+from symgen.description.at_values import at_values, exact, substituted
+from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
-from symgen.description.robot import Element, Robot
+from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import Regrouping, regroup
@@ -62,67 +68,38 @@ class Source:
     def parameters(self) -> tuple[str, ...]:
         return tuple(self.own.values())
 
+    @cached_property
+    def derivation(self) -> Derivation:
+        """The derivation, with all passive joints on their own where they stay symbols."""
+        if self.closure is self.relations:
+            return derive(self.robot)
+        return derived(self.robot, self.closure)
 
-class ValuedAlgebra(GraphAlgebra):
-    """The algebra of graph nodes with values in the place of some symbols."""
+    def request(self, of: int = 0, frame: int = 0) -> Request:
+        """A request of a model over the parameters, with the given values."""
+        inputs: dict[Symbol, Input] = {}
+        for kind, letter in (("q", "q"), ("qd", "QP"), ("qdd", "QDP")):
+            for j in self.robot.moving:
+                if (name := f"{letter}{j}") in self.given:
+                    inputs[Symbol(kind, name)] = self.given[name]
+        for own, name in self.own.items():
+            if name in self.given:
+                inputs[Symbol("parameter", own)] = self.given[name]
+        named = Names(len(self.robot.frames))
+        for u in () if self.closure is self.relations else self.closure.tied:
+            for i in self.robot.joints:
+                inputs[Symbol("rate", named("G", u, i))] = partial(self._rate, u, i)
+        return Request(self.own, of, frame, inputs)
 
-    def __init__(self, source: Source) -> None:
-        super().__init__(source.robot)
-        self.source = source
-
-    def valued(self, name: str, *, fixed: bool = False) -> Scalar:
-        """A symbol, or its value; only zero is structural, since a rate of 1 is no reason to leave out its sign."""
-        value = self.source.given.get(name)
-        if value is None:
-            return self.graph.symbol(name, fixed=fixed)
-        return self.graph.lift(self.constant(value)) if value else 0
-
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        values = self.source.given
-        for j, n in turn:
-            offset = offset + values.get(f"q{j}", ZERO) * n
-        return super().cos_sin(tuple((j, n) for j, n in turn if f"q{j}" not in values), offset)
-
-    def q(self, j: int) -> Scalar:
-        return self.valued(f"q{j}")
-
-    def qd(self, j: int) -> Scalar:
-        return self.valued(f"QP{j}")
-
-    def qdd(self, j: int) -> Scalar:
-        return self.valued(f"QDP{j}")
-
-    def rate(self, u: int, i: int) -> Scalar:
-        """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations give it."""
+    def _rate(self, u: int, i: int, algebra: GraphAlgebra) -> Scalar:
+        """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations
+        give it.
+        """
         total: Scalar = 0
-        for k, n in self.source.relations.row[u].items():
-            step = super().rate(k, i) if k in self.source.relations.tied else int(k == i)
-            total = add(total, mul(self.constant(n), step))
+        for k, n in self.relations.row[u].items():
+            step = algebra.rate(k, i) if k in self.relations.tied else int(k == i)
+            total = add(total, mul(algebra.constant(n), step))
         return total
-
-
-class Derivation:
-    """One graph: the algebra, the geometry and the parameters as its scalars."""
-
-    def __init__(self, source: Source) -> None:
-        self.source, self.robot, self.closure = source, source.robot, source.closure
-        self.algebra = ValuedAlgebra(source)
-        self.geometry = Geometry(self.robot, self.algebra, self.closure)
-        self.K: dict[str, Scalar] = {}
-        for own, name in source.own.items():
-            value = self.algebra.valued(name, fixed=True)
-            if not (isinstance(value, int) and value == 0):
-                self.K[own] = value
-
-    @property
-    def elements(self) -> dict[str, tuple[Element, int]]:
-        """The elements whose parameters have an effect, by parameter."""
-        return {name: e for name, e in element_names(self.robot).items() if name in self.K}
-
-    def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
-        """G' of values by moving joint: by actuated joint, all of them."""
-        projected = self.closure.project(self.algebra, torque)
-        return {i: projected.get(i, 0) for i in self.robot.joints}
 
 
 def source_of(
@@ -133,7 +110,9 @@ def source_of(
     passive: str | None = None,
     regrouping: Regrouping | None = None,
 ) -> Source:
-    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot where it is known already."""
+    """The robot with what was asked, see `symgen.symbolic`; `regrouping` is that of the robot where
+    it is known already.
+    """
     _one_of("parameters", parameters, PARAMETERS)
     formulas: dict[str, Formula]
     if parameters == "base":
@@ -151,7 +130,10 @@ def source_of(
     if constants:
         robot = at_values(robot, constants)
         formulas = {
-            name: Formula({p: c for p, e in f.combination.items() if (c := e.substitute(constants))}) for name, f in formulas.items()
+            name: Formula(
+                {p: c for p, e in f.combination.items() if (c := substituted(e, constants))}
+            )
+            for name, f in formulas.items()
         }
     relations = close(robot)
     closure = relations
@@ -160,7 +142,8 @@ def source_of(
         if passive == "functions" and relations.tied:
             tied = ", ".join(f"q{u}" for u in relations.tied)
             raise SymgenError(
-                f"{tied} of {robot.name} have no closed form: only the closure equations tie them to the actuated joints; "
+                f"{tied} of {robot.name} have no closed form: only the closure equations tie them "
+                "to the actuated joints; "
                 "leave out passive, or passive='symbols', and take their equations from `closure`"
             )
         if passive == "symbols":
@@ -173,24 +156,39 @@ def _one_of(what: str, given: str, known: Iterable[str]) -> None:
         raise SymgenError(f"{what}={given!r}; expected one of {', '.join(known)}")
 
 
-def _parsed(robot: Robot, parameters: Iterable[str], values: Mapping[str, Any]) -> dict[str, Expression]:
-    """Values as exact expressions over pi and the constants of the robot, read by the grammar of robot files."""
+def _parsed(
+    robot: Robot, parameters: Iterable[str], values: Mapping[str, Any]
+) -> dict[str, Expression]:
+    """Values as exact expressions over pi and the constants of the robot, read by the grammar of
+    robot files.
+    """
     moving = [f"{state}{j}" for state in ("q", "QP", "QDP") for j in robot.moving]
     known = [*robot.constants, *moving, *parameters]
     result = {}
     for symbol, value in values.items():
         name = str(symbol)
         if name not in known:
-            close_to = ", ".join(difflib.get_close_matches(name, known, n=4, cutoff=0.5)) or f"{', '.join(known[:6])} ..."
-            raise SymgenError(f"{name!r} is no symbol of the models of {robot.name}; close: {close_to}")
+            close_to = (
+                ", ".join(difflib.get_close_matches(name, known, n=4, cutoff=0.5))
+                or f"{', '.join(known[:6])} ..."
+            )
+            raise SymgenError(
+                f"{name!r} is no symbol of the models of {robot.name}; close: {close_to}"
+            )
         if isinstance(value, Expression):
             result[name] = value
         elif isinstance(value, float):
             if not isfinite(value):
-                raise SymgenError(f"{name} = {value}; expected a finite number, or a text such as 'pi/2'")
+                raise SymgenError(
+                    f"{name} = {value}; expected a finite number, or a text such as 'pi/2'"
+                )
             result[name] = exact(value, angle=name in moving)
         else:
-            text = f"{value.numerator}/{value.denominator}" if isinstance(value, Fraction) else str(value)
+            text = (
+                f"{value.numerator}/{value.denominator}"
+                if isinstance(value, Fraction)
+                else str(value)
+            )
             result[name] = parse(text, [c for c in robot.constants if c not in values])
     return result
 
@@ -206,7 +204,10 @@ def _with_gravity(robot: Robot, kind: str) -> Robot:
         return robot
     size = hypot(*map(float, robot.gravity))
     if "g" in robot.constants:
-        raise SymgenError(f"gravity='symbol': g is another constant of {robot.name}; write its gravity with a symbol in the robot file")
+        raise SymgenError(
+            f"gravity='symbol': g is another constant of {robot.name}; write its gravity with a "
+            "symbol in the robot file"
+        )
     unit = exact(size).inverse()
     x, y, z = (e * unit * Expression.symbol("g") for e in robot.gravity)
     return replace(robot, gravity=(x, y, z), constants={**robot.constants, "g": size})

@@ -1,92 +1,78 @@
-r"""LaTeX of models: closed forms and listings in `align*` with lines broken before + and -, and a document with frame table and conventions.
+r"""LaTeX of models: closed forms and recursions in `align*` with lines broken before + and -, and a
+document with frame table and conventions.
 
-Uses amsmath alone; velocities are \dot{q}, accelerations \ddot{q}, torques \Gamma; intermediates of a recursion keep the names of SYMORO.
+Uses amsmath alone; velocities are \dot{q}, accelerations \ddot{q}, torques \Gamma; intermediates of
+a recursion keep the names of SYMORO.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from fractions import Fraction
+from collections.abc import Iterable, Mapping, Sequence
 
-from symgen.derive.graph import COS, INV, SIGN, SIN, SQRT, Scalar
+from sympy.printing.latex import LatexPrinter
+
 from symgen.description.expression import Expression
 from symgen.description.robot import Robot
 from symgen.emit.header import informative_columns
-from symgen.emit.printers import Text
-from symgen.regroup.latex import Latex
+from symgen.regroup.formula import Formula
+from symgen.symbols import trees
 from symgen.symbols.breaking import lines
+from symgen.symbols.letters import DOTS, GREEK, letter
+from symgen.symbols.text import Ordered
+from symgen.symbols.trees import Tree
 
 WIDTH = 76  # characters of a line as they are printed
-STATES = {"QP": r"\dot{q}", "QDP": r"\ddot{q}", "GAM": r"\Gamma", "th": r"\theta"}
-_WORD = re.compile(r"^([A-Za-z]{2,})(?=_|$)")  # several letters, one name
-HEADINGS = {"ant": "a(j)", "mu": r"\mu", "sigma": r"\sigma", "gamma": r"\gamma", "alpha": r"\alpha", "theta": r"\theta"}
-_INDEXED = re.compile(r"([A-Za-z]+?)(\d+(?:_\d+)*)")
-_ANGLE = re.compile(r"(C|S|th)(\d[\d_mx]*)(b*)")  # of a sum of angles: 23, 5m2 for q5 - q2; b with another constant
-_SPECIAL = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", **{c: "\\" + c for c in "&%$#_{}"}}
+HEADINGS = {
+    "ant": "a(j)",
+    "mu": r"\mu",
+    "sigma": r"\sigma",
+    "gamma": r"\gamma",
+    "alpha": r"\alpha",
+    "theta": r"\theta",
+}
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{c: "\\" + c for c in "&%$#_{}"},
+}
 
 
-class ModelLatex(Latex):
-    """Symbols of models; brackets that a line may be broken in."""
+class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
+    """SymPy's LaTeX with the subscripts of the literature."""
 
-    def parameter(self, name: str) -> str:
-        if match := _ANGLE.fullmatch(name):
-            letter = STATES.get(match[1], match[1]) + "'" * len(match[3])
-            return f"{letter}_{{{match[2].replace('m', '-').replace('_', ',')}}}"
-        match = _INDEXED.fullmatch(name)
-        if match and (match[1] in STATES or "_" in name):
-            return f"{STATES.get(match[1], match[1])}_{{{match[2].replace('_', ',')}}}"
-        return _WORD.sub(r"\\mathit{\1}", super().parameter(name))
+    times = r"\,"
 
-    def call(self, function: str, argument: Expression, n: int) -> str:
-        if function not in ("sign", "Abs"):
-            return super().call(function, argument, n)
-        inside = self.expression(argument)
-        text = rf"\left|{inside}\right|" if function == "Abs" else rf"\operatorname{{sign}}({inside})"
-        return text if n == 1 else self.raised(text, n)
-
-    def bracketed(self, inside: str) -> str:
-        return f"({inside})"
+    def _print_Symbol(self, x: Tree) -> str:
+        return symbol(x.name)
 
 
-LATEX = ModelLatex()
+_PRINTER = Latex({"order": "none", "mul_symbol": Latex.times})
 
 
-class LatexText(Text):
-    """The lines of a listing."""
+def latex(x: Tree) -> str:
+    """An expression."""
+    return str(_PRINTER.doprint(x))
 
-    calls = {COS: r"\cos", SIN: r"\sin", SIGN: r"\operatorname{sign}"}  # noqa: RUF012
-    pi = "pi"
 
-    def _number(self, c: Fraction) -> str:
-        return str(c) if c.denominator == 1 else rf"\frac{{{c.numerator}}}{{{c.denominator}}}"
+def symbol(name: str) -> str:
+    """A name with its subscript."""
+    stem, subscript = letter(name)
+    if stem in DOTS:
+        text = rf"\{DOTS[stem]}{{q}}"
+    else:
+        base, primes = stem.rstrip("'"), "'" * stem.count("'")
+        word = base.replace("_", r"\_")
+        plain = rf"\mathit{{{word}}}" if len(base) > 2 else word
+        text = (rf"\{base}" if base in GREEK else plain) + primes
+    return f"{text}_{{{subscript}}}" if subscript else text
 
-    def _square(self, factor: str) -> str:
-        return f"{{{factor}}}^{{2}}"
 
-    def _clipped(self, x: str, bound: str) -> str:
-        return rf"\{bound[:3]}({x}, 0)"
-
-    def _line(self, node: object) -> str:
-        name, _, body = super()._line(node).partition(" = ")  # type: ignore[arg-type]
-        return f"{LATEX.parameter(name)} &= {body}"
-
-    def _operand(self, s: Scalar) -> str:
-        if s.node.index not in self.called:
-            return self._body(s)
-        sign = "-" if s.sign * self._name_sign(s.node) < 0 else ""
-        return sign + LATEX.symbol(self.called[s.node.index])
-
-    def _product(self, s: Scalar) -> str:
-        return super()._product(s).replace("*", r"\,")
-
-    def _body(self, s: Scalar) -> str:
-        sign = "-" if s.sign < 0 else ""
-        if s.node.op == SQRT:
-            return rf"{sign}\sqrt{{{self._operand(s.node.operands[0])}}}"
-        if s.node.op == INV:
-            return rf"{sign}\frac{{1}}{{{self._operand(s.node.operands[0])}}}"
-        return super()._body(s)
+def formulas(definitions: Mapping[str, Formula]) -> str:
+    r"""Regrouping formulas in an `aligned` environment: ZZ_{1R} &= ZZ_{1} + I_{a1} + ..."""
+    rows = (f"{symbol(name)} &= {latex(trees.formula(f))}" for name, f in definitions.items())
+    return aligned(rows, "aligned")
 
 
 def aligned(equations: Iterable[str], environment: str = "align*") -> str:
@@ -98,12 +84,16 @@ def aligned(equations: Iterable[str], environment: str = "align*") -> str:
 def broken(line: str) -> list[str]:
     """`left &= right` on as many lines as it needs."""
     left, _, right = line.partition(" &= ")
+    if width(line) > WIDTH:  # brackets that grow cannot be broken
+        right = re.sub(r"\\(left|right)\b", "", right)
     return lines(f"{left} &= ", right, WIDTH, r"&\quad ", width)
 
 
 def width(text: str) -> int:
     """Characters as they are printed, about."""
-    return len(re.sub(r"\\(mathit|mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text))
+    return len(
+        re.sub(r"\\(mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text)
+    )
 
 
 def escaped(text: str) -> str:
@@ -116,7 +106,7 @@ def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body:
     kept = informative_columns(robot)
     head = " & ".join(f"${HEADINGS.get(c, c)}$" for c in kept)
     rows = [" & ".join(f"${cell(getattr(f, c))}$" for c in kept) + r" \\" for f in robot.frames]
-    gravity = ",\\ ".join(LATEX.expression(e) for e in robot.gravity)
+    gravity = ",\\ ".join(map(cell, robot.gravity))
     return "\n".join(
         [
             r"\documentclass[a4paper,10pt]{article}",
@@ -133,7 +123,11 @@ def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body:
             head + r" \\ \hline",
             *rows,
             r"\end{tabular}\par\medskip",
-            rf"Acceleration of gravity in frame 0: $({gravity})$. Torques $\Gamma$ are those of the actuators, so friction enters with a plus.\par",
+            (
+                rf"Acceleration of gravity in frame 0: $({gravity})$. Torques $\Gamma$ are those "
+                r"of "
+                r"the actuators, so friction enters with a plus.\par"
+            ),
             *(rf"{escaped(note)}\par" for note in notes),
             body,
             r"\end{document}",
@@ -144,4 +138,4 @@ def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body:
 
 def cell(value: object) -> str:
     """A cell of the frame table."""
-    return LATEX.expression(value) if isinstance(value, Expression) else str(value)
+    return latex(trees.expression(value)) if isinstance(value, Expression) else str(value)

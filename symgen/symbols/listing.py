@@ -1,34 +1,20 @@
-"""The recursion of a model as equations: every intermediate in the order in which it is computed, under the names of SYMORO.
+"""The recursion of a model as equations: every intermediate in the order in which it is computed,
+under the names of SYMORO.
 
-What has a name of its own, and what is used more than once, has a line; everything else stands inside its only user: the rules of emitted code.
+What has a name of its own, and what is used more than once, has a line; everything else stands
+inside its only user: the rules of emitted code.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import Any, TypeVar
+from typing import Any
 
-from symgen.derive.graph import COS, SIGN, SIN, SQRT, SYM, Node, Scalar
+from symgen.derive.graph import SYM, Node, Scalar
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.description.expression import decimal
-from symgen.emit.printers import Text
-
-T = TypeVar("T", bound=Text)
-
-
-class PlainText(Text):
-    """Equations in the grammar of robot files, numbers exact."""
-
-    calls = {COS: "cos", SIN: "sin", SIGN: "sign", SQRT: "sqrt"}  # noqa: RUF012
-    pi = "pi"
-
-    def _number(self, c: Fraction) -> str:
-        return decimal(c)
-
-    def _clipped(self, x: str, bound: str) -> str:
-        return f"{'max' if bound == 'maximum' else 'min'}({x}, 0)"
+from symgen.description.namespace import Namespace
+from symgen.emit.printers import PLAIN, Text
 
 
 @dataclass(frozen=True)
@@ -51,47 +37,61 @@ class Listing:
         Value of each entry, by its label.
     places : sequence of tuple
         Place of each entry in the model.
+    parameters : iterable of str
+        Their names, which no step may have.
     """
 
-    def __init__(self, algebra: GraphAlgebra, outputs: Mapping[str, Scalar | int], places: Sequence[tuple[int, ...]]) -> None:
-        self.outputs, self.places, self.algebra = dict(outputs), list(places), algebra
-        self.text = self.written(PlainText)
-
-    def written(self, language: type[T]) -> T:
-        """The steps in a language."""
-        return language(list(self.outputs.values()), self.algebra.sections, self.algebra.robot.constants)
+    def __init__(
+        self,
+        algebra: GraphAlgebra,
+        outputs: Mapping[str, Scalar | int],
+        places: Sequence[tuple[int, ...]],
+        parameters: Iterable[str],
+    ) -> None:
+        self.outputs, self.places = dict(outputs), list(places)
+        values = list(self.outputs.values())
+        names = Namespace((*algebra.robot.constants, *parameters))
+        labels = [x.replace("(", "").replace(")", "").replace(",", "") for x in self.outputs]
+        self.text = Text(values, algebra.sections, names, labels, PLAIN)
 
     @property
     def lines(self) -> list[Equation]:
         """Every step, then every output that is not zero."""
-        equations = []
-        for section in self.text.sections:
-            for line in section.lines:
-                name, _, expression = line.partition(" = ")
-                equations.append(Equation(section.title, name, expression))
+        steps = [
+            Equation(section.title, *line.split(" = ", 1))
+            for section in self.text.sections
+            for line in section.lines
+        ]
         results = [
             Equation("Result", label, str(x) if isinstance(x, int) else self.text.expression(x))
             for label, x in self.outputs.items()
-            if not (isinstance(x, int) and x == 0)
+            if isinstance(x, Scalar) or x
         ]
-        return equations + results
+        return steps + results
 
-    def steps(self, operate: Callable[[Node, list[Any]], Any], symbol: Callable[[str], Any]) -> tuple[list[tuple[str, Any]], list[Any]]:
-        """The same in other objects: (name, value) of every step, and the outputs.
+    def steps(
+        self, operate: Callable[[Node, list[Any]], Any], symbol: Callable[[str], Any]
+    ) -> tuple[dict[str, Any], list[Any]]:
+        """The same in other objects: {name: value} of every step, and the outputs.
 
-        operate : makes a value from a node and the values of its operands. symbol : makes one from a name.
+        operate : makes a value from a node and the values of its operands. symbol : makes one from
+        a name.
         """
         text = self.text
         value: dict[int, Any] = {}
-        steps: list[tuple[str, Any]] = []
+        steps: dict[str, Any] = {}
+
+        def signed(x: Scalar | int) -> Any:
+            return x if isinstance(x, int) else x.sign * value[x.node.index]
+
         for node in text.nodes:
-            made = symbol(str(node.value)) if node.op == SYM else operate(node, [self._signed(x, value) for x in node.operands])
+            if node.op == SYM:
+                made = symbol(text.called[node.index])
+            else:
+                made = operate(node, [signed(x) for x in node.operands])
             if node.index in text.named:
                 name = text.called[node.index]
-                steps.append((name, made if node.name_sign > 0 else -made))
-                made = symbol(name) if node.name_sign > 0 else -symbol(name)
+                steps[name] = text.sign[node.index] * made
+                made = text.sign[node.index] * symbol(name)
             value[node.index] = made
-        return steps, [x if isinstance(x, int) else self._signed(x, value) for x in self.outputs.values()]
-
-    def _signed(self, x: Scalar, value: Mapping[int, Any]) -> Any:
-        return value[x.node.index] if x.sign > 0 else -value[x.node.index]
+        return steps, [signed(x) for x in self.outputs.values()]

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from symgen.derive.models import MODELS as ALL_MODELS
 from symgen.derive.names import Names
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.symbols.derivation import Source, source_of
-from symgen.symbols.models import MODELS, Request
 from symgen.symbols.printing import Formulas, printed
 from symgen.symbols.symbolic_model import LARGEST, SymbolicModel
+from symgen.symbols.sympy_objects import of_listing, of_model
+from symgen.symbols.trees import symbol
 
 
 def symbolic(
@@ -27,7 +29,8 @@ def symbolic(
     passive: str | None = None,
     limit: int = LARGEST,
 ) -> SymbolicRobot:
-    """The models of a robot as exact SymPy objects: closed forms by method, recursions by `equations`.
+    """The models of a robot as exact SymPy objects: closed forms by method, recursions by
+    `equations`.
 
     Parameters
     ----------
@@ -36,14 +39,18 @@ def symbolic(
     parameters : str
         "base": the dynamics in base parameters; "standard": in XX1, ..., M1, Ia1, ...
     gravity : str, optional
-        "number" puts the value of the robot file in the place of its symbol, "symbol" the symbol g in the place of a number; as in the file where left out.
+        "number" puts the value of the robot file in the place of its symbol, "symbol" the symbol g
+        in the place of a number; as in the file where left out.
     values : mapping, optional
-        Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as in robot files ("pi/2"). Zeros leave the recursion.
+        Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as
+        in robot files ("pi/2"). Zeros leave the recursion.
     passive : str, optional
-        Of closed loops. "functions": passive joints in terms of the actuated ones, where the relation is linear. "symbols": all of them stay
+        Of closed loops. "functions": passive joints in terms of the actuated ones, where the
+        relation is linear. "symbols": all of them stay
         symbols, with `closure` zero. Left out: functions where there are any, symbols for the rest.
     limit : int
-        Terms that a closed form may have, multiplied out; a longer one is refused, its recursion never.
+        Terms that a closed form may have, multiplied out; a longer one is refused, its recursion
+        never.
 
     Returns
     -------
@@ -59,42 +66,61 @@ def symbolic(
     return SymbolicRobot(source_of(described, parameters, gravity, values, passive), limit)
 
 
+MODELS = {name: model for name, model in ALL_MODELS.items() if model.symbolic}
+
+
 @dataclass(frozen=True)
 class SymbolicRobot:
-    """The models of a robot. Frames are numbered as in the robot file, 0 is the base; `of` is the last frame where left out.
+    """The models of a robot, each a method of its name: `arm.inertia_matrix()` is a SymPy Matrix.
 
-    Twists (velocity, acceleration, rows of the Jacobian) are those of the origin of frame `of`, then angular, in components of frame `frame`.
+    Frames are numbered as in the robot file, 0 is the base. Twists (velocity, acceleration, rows of
+    the Jacobian) are those of the origin of frame `of` (default: the last frame), then angular, in
+    components of frame `frame` (default: 0).
     """
 
     source: Source
     limit: int = LARGEST
 
-    def model(self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None) -> SymbolicModel:
-        """A model in both its forms. Raises SymgenError for a model or a frame that there is none of."""
+    def model(
+        self, name: str, *, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
+    ) -> SymbolicModel:
+        """A model in both its forms.
+
+        Raises
+        ------
+        SymgenError
+            If the model or the frame does not exist.
+        """
         if name not in MODELS:
             raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(MODELS)}")
         robot = self.source.robot
         if (of is not None or frame) and not MODELS[name].of_frames:
             raise SymgenError(
-                f"{name} is of no frame; leave out of and frame (they are for {', '.join(m for m in MODELS if MODELS[m].of_frames)})"
+                f"{name} is of no frame; leave out of and frame (they are for "
+                f"{', '.join(m for m in MODELS if MODELS[m].of_frames)})"
             )
         if rows is not None and name != "determinant":
             raise SymgenError(f"rows are for the determinant; leave them out of {name}")
         of = robot.frames[-1].j if of is None else of
         for j in (of, frame):
             if j != 0 and j not in {f.j for f in robot.frames}:
-                raise SymgenError(f"frame {j} does not exist; {robot.name} has frames 0 to {robot.frames[-1].j}")
-        return SymbolicModel(MODELS[name], self.source, Request(of, frame), None if rows is None else tuple(rows), self.limit)
+                raise SymgenError(
+                    f"frame {j} does not exist; {robot.name} has frames 0 to {robot.frames[-1].j}"
+                )
+        return SymbolicModel(
+            MODELS[name],
+            self.source,
+            self.source.request(of, frame),
+            None if rows is None else tuple(rows),
+            self.limit,
+        )
 
-    def _sympy(self, name: str, **request: Any) -> Any:
-        from symgen.symbols.sympy_objects import of_model
-
-        return of_model(self.model(name, **request))
-
-    def equations(self, name: str, *, of: int | None = None, frame: int = 0) -> tuple[list[tuple[Any, Any]], Any]:
-        """The recursion of a model: [(symbol, expression)] in order, under the names of SYMORO, and the model in these symbols (as `sympy.cse`)."""
-        from symgen.symbols.sympy_objects import of_listing
-
+    def equations(
+        self, name: str, *, of: int | None = None, frame: int = 0
+    ) -> tuple[list[tuple[Any, Any]], Any]:
+        """The recursion of a model: [(symbol, expression)] in order, under the names of SYMORO, and
+        the model in these symbols (as `sympy.cse`).
+        """
         return of_listing(self.model(name, of=of, frame=frame))
 
     def show(
@@ -107,14 +133,21 @@ class SymbolicRobot:
         frame: int = 0,
         rows: Sequence[int] | None = None,
     ) -> str:
-        """A model as `symgen show --model` prints it; it needs no sympy but for format="sympy".
+        """A model as `symgen show --model` prints it.
 
-        form : closed or recursive. format : text, latex (a document that compiles), latex-fragment (its formulas alone), sympy (Python), json.
+        form : closed or recursive. format : text, latex (a document that compiles), latex-fragment
+        (its formulas alone), sympy (Python), json.
         """
         return printed(self.model(name, of=of, frame=frame, rows=rows), form, format)
 
     def formulas(
-        self, name: str, *, form: str = "closed", of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
+        self,
+        name: str,
+        *,
+        form: str = "closed",
+        of: int | None = None,
+        frame: int = 0,
+        rows: Sequence[int] | None = None,
     ) -> Formulas:
         """A model as formulas: typeset in a notebook, text where it is printed."""
         return Formulas(self.model(name, of=of, frame=frame, rows=rows), form)
@@ -123,13 +156,20 @@ class SymbolicRobot:
 
     @cached_property
     def symbols(self) -> dict[str, Any]:
-        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G of tied joints, parameters."""
-        from symgen.symbols.sympy_objects import symbol
-
+        """Every symbol by name: constants, positions, velocities, accelerations, torques, rates G
+        of tied joints, parameters.
+        """
         robot = self.source.robot
         joints = [f"{state}{j}" for state in ("q", "QP", "QDP", "GAM") for j in robot.moving]
-        rates = [Names(len(robot.frames))("G", u, i) for u in self.source.relations.tied for i in robot.joints]
-        return {name: symbol(name) for name in (*robot.constants, *joints, *rates, *self.source.parameters)}
+        rates = [
+            Names(len(robot.frames))("G", u, i)
+            for u in self.source.relations.tied
+            for i in robot.joints
+        ]
+        return {
+            name: symbol(name)
+            for name in (*robot.constants, *joints, *rates, *self.source.parameters)
+        }
 
     @property
     def q(self) -> tuple[Any, ...]:
@@ -151,86 +191,30 @@ class SymbolicRobot:
         """Base or standard parameters, in the order of the columns of the regressor."""
         return tuple(self.symbols[name] for name in self.source.parameters)
 
-    # --- geometry and kinematics ---
+    # --- models ---
 
-    def pose(self, of: int | None = None, frame: int = 0) -> Any:
-        """Homogeneous transform (4, 4): axes and origin of frame `of` in frame `frame`, any two frames."""
-        return self._sympy("pose", of=of, frame=frame)
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """A model of the table as SymPy object: arm.inertia_matrix(), arm.pose(of=6, frame=4)."""
+        if name not in MODELS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return partial(self._sympy, name)
 
-    def jacobian(self, of: int | None = None, frame: int = 0) -> Any:
-        """Jacobian (6, n) of frame `of`, in components of frame `frame`."""
-        return self._sympy("jacobian", of=of, frame=frame)
-
-    def determinant(self, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None) -> Any:
-        """Determinant of the Jacobian with six joints, or of as many of its rows (from 1) as there are joints; rows that are not zero if left out.
-
-        Factored over the rationals, cosines and sines as symbols: the factors are the singularities.
-        """
-        return self._sympy("determinant", of=of, frame=frame, rows=rows)
-
-    def jacobian_rate(self, of: int | None = None, frame: int = 0) -> Any:
-        """Jd qd (6, 1): the acceleration twist at qdd = 0, derivative in space."""
-        return self._sympy("jacobian_rate", of=of, frame=frame)
-
-    def velocity(self, of: int | None = None, frame: int = 0) -> Any:
-        """Velocity twist (6, 1) of frame `of`."""
-        return self._sympy("velocity", of=of, frame=frame)
-
-    def acceleration(self, of: int | None = None, frame: int = 0) -> Any:
-        """Acceleration twist (6, 1) of frame `of`, without gravity, derivative in space."""
-        return self._sympy("acceleration", of=of, frame=frame)
-
-    # --- dynamics ---
-
-    def inverse_dynamics(self) -> Any:
-        """Gamma (n, 1) = A qdd + C qd + Q + friction."""
-        return self._sympy("inverse_dynamics")
-
-    def inertia_matrix(self) -> Any:
-        """A(q), (n, n), actuators included."""
-        return self._sympy("inertia_matrix")
+    def _sympy(
+        self, name: str, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
+    ) -> Any:
+        return of_model(self.model(name, of=of, frame=frame, rows=rows))
 
     def coriolis(self, by: str = "christoffel") -> Any:
-        """C(q, qd), (n, n): by the Christoffel symbols of A, or by "recursion" over the links; both are the same matrix, Ad - 2C is skew symmetric."""
+        """C(q, qd), (n, n): by the Christoffel symbols of A, or by "recursion" over the links; both
+        are the same matrix, Ad - 2C is skew symmetric.
+        """
         if by not in ("christoffel", "recursion"):
             raise SymgenError(f"by={by!r}; expected christoffel or recursion")
-        from symgen.symbols.sympy_objects import of_model
-
         model = self.model("coriolis")
-        return of_model(model if by == "christoffel" else replace(model, model=replace(model.model, name="coriolis by recursion")))
-
-    def bias(self) -> Any:
-        """H(q, qd), (n, 1): Gamma at qdd = 0, friction included."""
-        return self._sympy("bias")
-
-    def gravity(self) -> Any:
-        """Q(q), (n, 1): Gamma at rest without friction."""
-        return self._sympy("gravity")
-
-    def friction(self) -> Any:
-        """Viscous and Coulomb friction, (n, 1)."""
-        return self._sympy("friction")
-
-    def kinetic_energy(self) -> Any:
-        """E(q, qd), actuators included: qd' A qd / 2."""
-        return self._sympy("kinetic_energy")
-
-    def potential_energy(self) -> Any:
-        """U(q) of gravity, springs and offsets: dU/dq = Q. In base parameters up to a constant."""
-        return self._sympy("potential_energy")
-
-    def forward_dynamics(self) -> Any:
-        """qdd (n, 1) = A**-1 (Gamma - H), up to three joints; Gamma is GAM1 ..."""
-        return self._sympy("forward_dynamics")
-
-    def regressor(self) -> Any:
-        """D of Gamma = D chi, (n, number of parameters): D_s with standard parameters, D with base parameters."""
-        return self._sympy("regressor")
+        if by == "recursion":
+            model = replace(model, model=replace(model.model, name="coriolis by recursion"))
+        return of_model(model)
 
     def base_parameters(self) -> dict[Any, Any]:
         """What each parameter is made of: {ZZ1R: ZZ1 + Ia1 + ...}."""
         return dict(zip(self.parameters, self._sympy("base_parameters"), strict=True))
-
-    def closure(self) -> Any:
-        """Residuals of the loops (m, 1) in the joints that stay symbols: zero where the loops close."""
-        return self._sympy("closure")

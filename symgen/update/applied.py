@@ -13,7 +13,7 @@ from runtime.result_files import write_all
 from runtime.table import Table, notebook
 
 NOTHING = 1e-12  # SI; smaller numbers are rounding
-TOLD = {"record": "the record", "sum": "the record, in sums", "file": "feasibility"}
+SOURCES = {"record": "the record", "sum": "the record, in sums", "file": "feasibility"}
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,11 @@ class Change:
     before, after : float
         In the file, and in the new text.
     sigma : float
-        Standard deviation that the record leaves, of the part that it tells; conditions of a physical robot aside.
+        Standard deviation that the record leaves, of the part that it tells; conditions of a
+        physical robot aside.
     told_by : str
-        record: determined; sum: only together with other numbers, this is the value nearest to the file; file: no torque depends on it,
+        record: determined; sum: only together with other numbers, this is the value nearest to the
+        file; file: no torque depends on it,
         and it changes only where no physical robot is left otherwise.
     """
 
@@ -65,7 +67,8 @@ class Applied:
     spread : tuple of str
         Links on fixed joints that changed too, since no physical link was left otherwise.
     undetermined : tuple of str
-        Numbers of links on which no torque of a motion depends; the file's, as far as a physical robot allows.
+        Numbers of links on which no torque of a motion depends; the file's, as far as a physical
+        robot allows.
     lost : tuple of str
         Base parameters that the estimate does not hold or the record does not show; the file's.
     """
@@ -95,7 +98,10 @@ class Applied:
 
     def diff(self) -> str:
         """Lines that differ, as `diff -u` shows them."""
-        old, new = (text.decode("utf-8", "replace").splitlines(keepends=True) for text in (self.before, self.content))
+        old, new = (
+            text.decode("utf-8", "replace").splitlines(keepends=True)
+            for text in (self.before, self.content)
+        )
         return "".join(difflib.unified_diff(old, new, self.file, f"{self.file} (identified)", n=0))
 
     def table(self) -> Table:
@@ -109,37 +115,58 @@ class Applied:
                 _percent(c),
                 number(c.sigma, ".2g"),
                 c.unit,
-                TOLD[c.told_by],
+                SOURCES[c.told_by],
             )
             for c in self.changes
         ]
-        return Table("changes", ("where", "number", "from", "to", "change %", "sigma", "unit", "told by"), rows, wide=(1, 6, 7))
+        return Table(
+            "changes",
+            ("where", "number", "from", "to", "change %", "sigma", "unit", "told by"),
+            rows,
+            wide=(1, 6, 7),
+        )
 
     def notes(self) -> list[str]:
         """What a reader should know besides."""
         notes = [f"added: {'; '.join(self.added)}"] if self.added else []
         if self.placeless:
             listed = ", ".join(
-                f"{name} = {x:.4g} ± {self.placeless_sigma[name]:.2g}" + (f" ({self.joints[name]})" if name in self.joints else "")
+                f"{name} = {x:.4g} ± {self.placeless_sigma[name]:.2g}"
+                + (f" ({self.joints[name]})" if name in self.joints else "")
                 for name, x in self.placeless.items()
             )
             notes.append(f"no place in a {self.format}, set these in your program: {listed}")
         if self.spread:
-            notes.append(f"links on fixed joints that changed too, no physical link was left otherwise: {', '.join(self.spread)}")
+            notes.append(
+                "links on fixed joints that changed too, no physical link was left otherwise: "
+                f"{', '.join(self.spread)}"
+            )
         if self.lost:
-            notes.append(f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the values of the file stay")
+            notes.append(
+                f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the "
+                "values of the file stay"
+            )
         if self.undetermined:
-            notes.append(f"on which no torque of this robot depends, hence of the file: {_by_place(self.undetermined)}")
+            notes.append(
+                "on which no torque of this robot depends, hence of the file: "
+                f"{_by_place(self.undetermined)}"
+            )
         return notes
 
     def __str__(self) -> str:
         if not self.changes:
-            return "\n".join([f"{self.file}: no number changes", *(f"- {note}" for note in self.notes())])
+            return "\n".join(
+                [f"{self.file}: no number changes", *(f"- {note}" for note in self.notes())]
+            )
         head = f"{self.file}: {len(self.changes)} numbers change"
-        return "\n".join([head, "", self.table().to_text(), "", *(f"- {note}" for note in self.notes())])
+        return "\n".join(
+            [head, "", self.table().to_text(), "", *(f"- {note}" for note in self.notes())]
+        )
 
     def _repr_html_(self) -> str:
-        return notebook([f"{self.file}: {len(self.changes)} numbers change", *self.notes()], self.table())
+        return notebook(
+            [f"{self.file}: {len(self.changes)} numbers change", *self.notes()], self.table()
+        )
 
     def to_json(self) -> str:
         """JSON text: file, format, changes, and what the notes say."""

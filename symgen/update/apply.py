@@ -1,11 +1,14 @@
-"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other byte stays.
+"""Identified values into the URDF or MJCF file of a robot, in place: numbers change, every other
+byte stays.
 
     applied = symgen.apply("results", "arm.urdf")        # or an Estimate, an Identification
     print(applied)                                       # what changes, from, to, deviation
     applied.write("arm_identified.urdf")
 
-The estimate knows base parameters, sums of the parameters of several links. Of all physical robots that have these sums, the one nearest to the file is
-written (`symgen.update.nearest`). Before anything is returned the new text is read again: it must say what was to be written.
+The estimate knows base parameters, sums of the parameters of several links. Of all physical robots
+that have these sums, the one nearest to the file is
+written (`symgen.update.nearest`). Before anything is returned the new text is read again: it must
+say what was to be written.
 """
 
 from __future__ import annotations
@@ -19,19 +22,22 @@ import numpy as np
 from runtime.estimators.estimate import Estimate, load_estimate
 from runtime.model.generated import load_model
 from runtime.model.inertia import PhysicalModel, physical_model
-from symgen.description.files import SNAP, content_of, read_robot
+from symgen.certify.modules import model as emitted
+from symgen.description.files import content_of, read_robot
 from symgen.description.robot import Robot, one_joint_parameters, parameter
 from symgen.description.tree import Array
-from symgen.description.tree_parts import Part
-from symgen.emit.certified import model as emitted
+from symgen.description.tree_parts import TreePart
 from symgen.errors import DescriptionError
 from symgen.update.applied import Applied
 from symgen.update.nearest import NONE, nearest
 from symgen.update.robot_text import read_text, require_same_frames
 from symgen.update.writing import UNITS, Writing
-from symgen.update.xml_edits import Source, same
+from symgen.update.xml_edits import XmlEdits, same
 
-FEASIBLE = "; set estimate: {method: feasible} in the study (study.yaml lies among the results) and identify again"
+FEASIBLE = (
+    "; set estimate: {method: feasible} in the study (study.yaml lies among the results) "
+    "and identify again"
+)
 
 
 def apply(
@@ -41,61 +47,78 @@ def apply(
     robot: str | Path | None = None,
     lock: Mapping[str, float] | None = None,
     chain: tuple[str, str] | None = None,
-    nearly: float = SNAP,
+    exact: bool = False,
 ) -> Applied:
-    """The text of a URDF or MJCF file with identified values in it, and what changed; nothing is written yet.
+    """The text of a URDF or MJCF file with identified values in it, and what changed; nothing is
+    written yet.
 
     Parameters
     ----------
     estimate : Estimate, Identification, str or Path
-        Result, its estimate.json, or the folder that `symgen identify -o` wrote. All base parameters, not the essential ones alone.
+        Result, its estimate.json, or the folder that `symgen identify -o` wrote. All base
+        parameters, not the essential ones alone.
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str or Path, optional
-        Robot file that was identified, where it is not `model` itself: converted from it, perhaps with other elements or drives.
-    lock, chain, nearly
+        Robot file that was identified, where it is not `model` itself: converted from it, perhaps
+        with other elements or drives.
+    lock, chain, exact
         As of `read_robot`, and as when the robot was identified or converted.
 
     Raises
     ------
     DescriptionError
-        The estimate is one of another robot, no physical robot has it, or the file has no place for it.
+        The estimate is one of another robot, no physical robot has it, or the file has no place for
+        it.
     """
     path = Path(model)
     content = content_of(path)
-    part = Part(lock or {}, chain)
-    text = read_text(content, path, nearly, part)
-    described, of = (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
+    part = TreePart(lock or {}, chain)
+    text = read_text(content, path, exact, part)
+    described, of = (
+        (text.robot, text.file) if robot is None else (read_robot(robot)[0], Path(robot).name)
+    )
     require_same_frames(text, described, of)
     result = _estimate(estimate)
     _require_same_joints(result, described, of)
     physical = physical_model(load_model(emitted(described)))
-    names, X, lost = _known(result, physical, of)
+    names, X, lost = _determined(result, physical, of)
     links = text.links
     if not links:
-        raise DescriptionError("no link that moves has an inertial; values need one to go into", file=path.name)
+        raise DescriptionError(
+            "no link that moves has an inertial; values need one to go into", file=path.name
+        )
     families = one_joint_parameters(described, UNITS)
-    own = {parameter(family, j): (family, j) for j in text.table.joint for family in UNITS if parameter(family, j) in families}
+    own = {
+        parameter(family, j): (family, j)
+        for j in text.table.joint
+        for family in UNITS
+        if parameter(family, j) in families
+    }
     stated = {name: text.joint_values(j)[family] for name, (family, j) in own.items()}
-    others = [name for name in physical.standard if name not in own and name not in _inertial(physical)]
+    others = [
+        name for name in physical.standard if name not in own and name not in _inertial(physical)
+    ]
     try:
         absent = [*others, *(name for name, x in stated.items() if not x)]
         closest = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
-        writing, source = Writing(text, closest, own, _root(result, names)), Source(content)
-        rows = [*writing.links(source), *writing.joints(source)]
-        new = source.edited()
-        writing.require_read_back(read_text(new, path, nearly, part))
+        writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)
+        rows = [*writing.links(edits), *writing.joints(edits)]
+        new = edits.edited()
+        writing.require_read_back(read_text(new, path, exact, part))
     except DescriptionError as error:
         again = FEASIBLE if error.message.startswith(NONE) and result.method != "feasible" else ""
-        raise DescriptionError(error.message + again, file=error.file or path.name, line=error.line) from error
+        raise DescriptionError(
+            error.message + again, file=error.file or path.name, line=error.line
+        ) from error
     placeless = writing.placeless
     return Applied(
         file=path.name,
-        format=text.elements.format,
+        format=text.places.attributes.format,
         before=content,
         content=new,
         changes=tuple(row for row in rows if not same(row.before, row.after)),
-        added=tuple(source.added),
+        added=tuple(edits.added),
         placeless=placeless,
         placeless_sigma={name: writing.sigma(closest.elements[name]) for name in placeless},
         joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
@@ -111,22 +134,35 @@ def _estimate(given: Any) -> Estimate:
         return load_estimate(path / "estimate.json" if path.is_dir() else path)
     given = getattr(given, "estimate", given)
     if not isinstance(given, Estimate):
-        raise DescriptionError(f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, or their estimate.json")
+        raise DescriptionError(
+            f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, "
+            "or their estimate.json"
+        )
     return given
 
 
 def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
-    """Raise DescriptionError where the estimate tells names of joints, and they are not those of the robot."""
+    """Raise DescriptionError where the estimate tells names of joints, and they are not those of
+    the robot.
+    """
     theirs = result.provenance.get("labels")
     if not isinstance(theirs, Mapping):
         return
-    numbers = {f"q{j}" for j in robot.moving} | {q for q in theirs if q not in {f"q{f.j}" for f in robot.frames}}
-    different = sorted(q for q in numbers if theirs.get(q) != robot.labels.get(int(q[1:]) if q[1:].isdigit() else 0))
+    numbers = {f"q{j}" for j in robot.moving} | {
+        q for q in theirs if q not in {f"q{f.j}" for f in robot.frames}
+    }
+    different = sorted(
+        q
+        for q in numbers
+        if theirs.get(q) != robot.labels.get(int(q[1:]) if q[1:].isdigit() else 0)
+    )
     if different:
         q = different[0]
         ours = robot.labels.get(int(q[1:])) if q[1:].isdigit() else None
         raise DescriptionError(
-            f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} {ours or 'no joint with a name'}: say --chain and --lock as when the robot was converted, "
+            f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} "
+            f"{ours or 'no joint with a name'}: say --chain and --lock as when the robot was "
+            "converted, "
             "or name the robot file that was identified (--robot)"
         )
 
@@ -135,26 +171,35 @@ def _inertial(physical: PhysicalModel) -> set[str]:
     return {physical.standard[k] for j in physical.links for k in physical.link(j)}
 
 
-def _known(result: Estimate, physical: PhysicalModel, of: str) -> tuple[list[str], Array, list[str]]:
+def _determined(
+    result: Estimate, physical: PhysicalModel, of: str
+) -> tuple[list[str], Array, list[str]]:
     """Names and values of the base parameters that the record tells, and names of the others."""
     if unknown := [name for name in result.names if name not in physical.base]:
         raise DescriptionError(
-            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the robot file that was identified (--robot), and --chain, "
+            f"{', '.join(unknown[:8])} of the estimate are no base parameters of {of}; name the "
+            "robot file that was identified (--robot), and --chain, "
             "--lock as when it was converted"
         )
     silent = {group[0] for group in result.groups if len(group) == 1}
-    known = [k for k, name in enumerate(result.names) if np.isfinite(result.X[k]) and name not in silent]
-    if not known:
+    places = [
+        k for k, name in enumerate(result.names) if np.isfinite(result.X[k]) and name not in silent
+    ]
+    if not places:
         raise DescriptionError("the estimate determines no parameter")
-    names = [result.names[k] for k in known]
-    return names, result.X[known], [name for name in physical.base if name not in names]
+    names = [result.names[k] for k in places]
+    return names, result.X[places], [name for name in physical.base if name not in names]
 
 
 def _root(result: Estimate, names: Sequence[str]) -> Array:
-    """A root of the covariance of the known base parameters, (b, b), deviations corrected where they are; zero where there is none."""
+    """A root of the covariance of the known base parameters, (b, b), deviations corrected where
+    they are; zero where there is none.
+    """
     at = [result.names.index(name) for name in names]
     C = np.nan_to_num(result.covariance[np.ix_(at, at)])
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.nan_to_num(np.fmax(result.sigma_corrected[at] / result.sigma[at], 1.0), nan=1.0, posinf=1.0)
+        factor = np.nan_to_num(
+            np.fmax(result.sigma_corrected[at] / result.sigma[at], 1.0), nan=1.0, posinf=1.0
+        )
     values, V = np.linalg.eigh(C * np.outer(factor, factor))
     return np.asarray(V * np.sqrt(np.maximum(values, 0.0)))

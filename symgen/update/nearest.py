@@ -1,10 +1,14 @@
-"""Parameters of the links of a file that give the identified base parameters, as near to the file's as physics allows.
+"""Parameters of the links of a file that give the identified base parameters, as near to the file's
+as physics allows.
 
     min ||S^-1 (chi - chi0)||     subject to  K chi = X,  every condition of `runtime.model.inertia`
 
-chi are ten parameters for each link of the file that has inertia, in the frame of the body it belongs to, and those of the elements on the joints;
-chi0 are the values of the file, S their sizes. A body may be several links, held together by fixed joints: the record knows their sum. First the link that
-the joint carries changes alone; only where no physical link is left, the others change with it. So with a motor inertia that the file does not have: what
+chi are ten parameters for each link of the file that has inertia, in the frame of the body it
+belongs to, and those of the elements on the joints;
+chi0 are the values of the file, S their sizes. A body may be several links, held together by fixed
+joints: the record knows their sum. First the link that
+the joint carries changes alone; only where no physical link is left, the others change with it. So
+with a motor inertia that the file does not have: what
 links can take in stays with them. Without conditions chi = chi0 + G (X - K chi0),
 G = S (K S)^+; the semidefinite program is solved where that is no physical robot.
 """
@@ -16,8 +20,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.estimators.feasibility import LEAST, ROUNDING, feasibility, limit_rows, scales
+from runtime.estimators.feasibility import feasibility, limit_rows, scales
 from runtime.estimators.semidefinite import closest, solutions
+from runtime.limits import LIMIT
 from runtime.model.inertia import INERTIAL, Condition, PhysicalModel
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
@@ -96,7 +101,7 @@ def nearest(
     values : mapping, SI
         Of the elements on the joints, by name.
     names : sequence of str
-        Base parameters that are known.
+        Base parameters with values.
     X : ndarray, shape (len(names),), SI
         Their values.
     absent : collection of str
@@ -117,41 +122,68 @@ def nearest(
             break
     else:
         raise DescriptionError(f"{NONE}: {answer.replace('NOT physically feasible: ', '')}")
-    known = K[:, :count]
-    G = _gain(known, scales(part))
-    found, gain, free = chi0.copy(), np.zeros((len(chi0), len(X))), np.zeros((len(chi0), len(chi0)))
-    found[:count], gain[:count], free[:count, :count] = chi, G, np.eye(count) - G @ known
-    moved = [name for name, at in places.items() if at[0] >= counts[-2] and not _unmoved(found, chi0, whole, at)]
-    return Nearest(found, chi0, gain, free, places, elements, tuple(moved))
+    K_part = K[:, :count]
+    G = _gain(K_part, scales(part))
+    solution, gain, free = (
+        chi0.copy(),
+        np.zeros((len(chi0), len(X))),
+        np.zeros((len(chi0), len(chi0))),
+    )
+    solution[:count], gain[:count], free[:count, :count] = chi, G, np.eye(count) - G @ K_part
+    moved = [
+        name
+        for name, at in places.items()
+        if at[0] >= counts[-2] and not _unmoved(solution, chi0, whole, at)
+    ]
+    return Nearest(solution, chi0, gain, free, places, elements, tuple(moved))
 
 
 def _of_file(
-    physical: PhysicalModel, links: Sequence[FileLink], values: Mapping[str, float], absent: Collection[str]
+    physical: PhysicalModel,
+    links: Sequence[FileLink],
+    values: Mapping[str, float],
+    absent: Collection[str],
 ) -> tuple[PhysicalModel, dict[str, list[int]], dict[str, int], list[int]]:
-    """The model with ten parameters by link of the file, their places, those of elements, and how many parameters may change, try by try.
+    """The model with ten parameters by link of the file, their places, those of elements, and how
+    many parameters may change, try by try.
 
-    First links that lead a body, and elements; then elements that the file does not have and the links can take in; then the other links.
+    First links that lead a body, and elements; then elements that the file does not have and the
+    links can take in; then the other links.
     """
     leading = {link.j: link for link in reversed(links)}
     inertial = {f"{family}{j}": (j, k) for j in physical.links for k, family in enumerate(INERTIAL)}
-    kept = [name for name in physical.standard if name not in inertial or inertial[name][0] in leading]
-    spare = _spare(physical, kept, [name for name in absent if name in kept])
-    kept = [*(name for name in kept if name not in spare), *spare]
-    counts = [len(kept) - len(spare), len(kept)]
-    of = {name: float(leading[inertial[name][0]].ten[inertial[name][1]]) if name in inertial else values.get(name, 0.0) for name in kept}
-    columns = [physical.standard.index(name) for name in kept]
-    standard, conditions = list(kept), []
-    elements = {name: k for k, name in enumerate(kept) if name not in inertial}
+    own = [
+        name for name in physical.standard if name not in inertial or inertial[name][0] in leading
+    ]
+    spare = _spare(physical, own, [name for name in absent if name in own])
+    own = [*(name for name in own if name not in spare), *spare]
+    counts = [len(own) - len(spare), len(own)]
+    of = {
+        name: float(leading[inertial[name][0]].ten[inertial[name][1]])
+        if name in inertial
+        else values.get(name, 0.0)
+        for name in own
+    }
+    columns = [physical.standard.index(name) for name in own]
+    standard, conditions = list(own), []
+    elements = {name: k for k, name in enumerate(own) if name not in inertial}
     places: dict[str, list[int]] = {}
     for condition in physical.conditions:
         named = [physical.standard[k] for k in condition.numbers]
-        if all(name in kept for name in named):
+        if all(name in own for name in named):
             j = inertial[named[0]][0] if named[0] in inertial else 0
-            numbers = tuple(kept.index(name) for name in named)
-            conditions.append(Condition(f"link {leading[j].name!a:.60}" if j else condition.name, numbers, condition.B))
+            numbers = tuple(own.index(name) for name in named)
+            conditions.append(
+                Condition(
+                    f"link {leading[j].name!a:.60}" if j else condition.name, numbers, condition.B
+                )
+            )
             if j:
                 places[leading[j].name] = list(numbers)
-    for v, link in enumerate((link for link in links if link is not leading[link.j]), start=max(physical.links, default=0) + 1):
+    for v, link in enumerate(
+        (link for link in links if link is not leading[link.j]),
+        start=max(physical.links, default=0) + 1,
+    ):
         at = list(range(len(standard), len(standard) + 10))
         standard += [f"{family}{v}" for family in INERTIAL]
         of |= dict(zip(standard[-10:], map(float, link.ten), strict=True))
@@ -159,12 +191,18 @@ def _of_file(
         B = next(c.B for c in physical.conditions if c.name == f"link {link.j}")
         conditions.append(Condition(f"link {link.name!a:.60}", tuple(at), B))
         places[link.name] = at
-    whole = replace(physical, standard=tuple(standard), K=physical.K[:, columns], conditions=tuple(conditions), values=of)
+    whole = replace(
+        physical,
+        standard=tuple(standard),
+        K=physical.K[:, columns],
+        conditions=tuple(conditions),
+        values=of,
+    )
     return whole, places, elements, [*counts, len(standard)]
 
 
-def _spare(physical: PhysicalModel, kept: Sequence[str], absent: Sequence[str]) -> list[str]:
-    """Parameters among `absent` whose effect those that are kept have too."""
+def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
+    """Absent parameters that the own ones can stand in for."""
     spare: list[str] = []
 
     def rank(names: Sequence[str]) -> int:
@@ -173,7 +211,7 @@ def _spare(physical: PhysicalModel, kept: Sequence[str], absent: Sequence[str]) 
         return int(np.linalg.matrix_rank(columns[:, sizes > 0] / sizes[sizes > 0], tol=MISSED))
 
     for name in absent:
-        others = [other for other in kept if other not in (*spare, name)]
+        others = [other for other in own if other not in (*spare, name)]
         if rank(others) == rank([*others, name]):
             spare.append(name)
     return spare
@@ -182,27 +220,48 @@ def _spare(physical: PhysicalModel, kept: Sequence[str], absent: Sequence[str]) 
 def _head(whole: PhysicalModel, count: int) -> PhysicalModel:
     """The model with its first `count` parameters alone."""
     conditions = tuple(c for c in whole.conditions if max(c.numbers) < count)
-    return replace(whole, standard=whole.standard[:count], K=whole.K[:, :count], conditions=conditions)
+    return replace(
+        whole, standard=whole.standard[:count], K=whole.K[:, :count], conditions=conditions
+    )
 
 
-def _within(part: PhysicalModel, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
-    """chi of the parameters of `part` with K chi = rest; None, and why, where no physical robot has them."""
-    K, S, chi0 = part.rows(names), scales(part), np.array([part.values[name] for name in part.standard])
+def _within(
+    part: PhysicalModel, names: Sequence[str], rest: Array, X: Array
+) -> tuple[Array | None, str]:
+    """chi of the parameters of `part` with K chi = rest; None, and why, where no physical robot has
+    them.
+    """
+    K, S, chi0 = (
+        part.rows(names),
+        scales(part),
+        np.array([part.values[name] for name in part.standard]),
+    )
     chi = chi0 + _gain(K, S) @ (rest - K @ chi0)
     sizes = np.maximum(np.abs(X), np.abs(K) @ S)
     missed = np.abs(K @ chi - rest) > MISSED * np.maximum(sizes, MISSED)
     if missed.any():
-        lost = ", ".join(f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out)
+        lost = ", ".join(
+            f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out
+        )
         raise DescriptionError(
-            f"the links of this file cannot have {lost}: a body without inertial has no place for it; add an inertial to the link that moves"
+            f"the links of this file cannot have {lost}: a body without inertial has no place for "
+            "it; add an inertial to the link that moves"
         )
     moved = [c for c in part.conditions if not _unmoved(chi, chi0, part, list(c.numbers))]
     if all(c.smallest(chi) >= -TINY for c in moved):
         return chi, ""
     free = np.abs(np.eye(len(chi)) - _gain(K, S) @ K) @ S / S
-    still = [c for c in part.conditions if free[list(c.numbers)].max() < MISSED]  # X tells all of it
-    if broken := [c.name for c in still if c in moved and c.smallest(chi) < -ROUNDING]:
-        return None, f"no positive mass density and friction gives these parameters; in the way: {', '.join(broken)}"
+    still = [
+        c for c in part.conditions if free[list(c.numbers)].max() < MISSED
+    ]  # X tells all of it
+    if broken := [c.name for c in still if c in moved and c.smallest(chi) < -LIMIT.MARGIN_ROUNDING]:
+        return (
+            None,
+            (
+                "no positive mass density and friction gives these parameters; in the way: "
+                f"{', '.join(broken)}"
+            ),
+        )
     part = replace(part, conditions=tuple(c for c in part.conditions if c not in still))
     answer = feasibility(part, names, rest)
     return (_solved(part, K, S, rest, answer.chi), "") if answer.feasible else (None, answer.text)
@@ -211,19 +270,37 @@ def _within(part: PhysicalModel, names: Sequence[str], rest: Array, X: Array) ->
 def _solved(part: PhysicalModel, K: Array, S: Array, rest: Array, start: Array) -> Array:
     """The nearest chi with K chi = rest that fulfils every condition, `start` one that does."""
     chi0 = np.array([part.values[name] for name in part.standard])
-    own = [x for c in part.conditions if (x := c.smallest(chi0)) > 0]  # small links have small eigenvalues
-    least = max(min([LEAST, min(part.smallest(start).values()) / 2, *(x / 2 for x in own)]), LEAST**2)
-    optimum = closest(np.diag(1 / S), chi0 / S, part.conditions, limit_rows(part, None), solutions(K, rest, S), least=least)
+    own = [
+        x for c in part.conditions if (x := c.smallest(chi0)) > 0
+    ]  # small links have small eigenvalues
+    least = max(
+        min(
+            [LIMIT.LEAST_EIGENVALUE, min(part.smallest(start).values()) / 2, *(x / 2 for x in own)]
+        ),
+        LIMIT.LEAST_EIGENVALUE**2,
+    )
+    optimum = closest(
+        np.diag(1 / S),
+        chi0 / S,
+        part.conditions,
+        limit_rows(part, None),
+        solutions(K, rest, S),
+        least=least,
+    )
     near = ACCURACY * S
     near[[c.numbers[0] for c in part.conditions if len(c.numbers) == 1]] += 2 * least
-    for chi in (_as_it_was(K, S, rest, optimum.chi, chi0, near), optimum.chi) if optimum.solved else ():
+    for chi in (
+        (_as_it_was(K, S, rest, optimum.chi, chi0, near), optimum.chi) if optimum.solved else ()
+    ):
         if min(part.smallest(chi).values()) >= 0:
             return chi
     return start
 
 
 def _as_it_was(K: Array, S: Array, rest: Array, chi: Array, chi0: Array, near: Array) -> Array:
-    """chi with the parameters that differ from those of the file by `near`, the accuracy of the solver, set to these."""
+    """chi with the parameters that differ from those of the file by `near`, the accuracy of the
+    solver, set to these.
+    """
     moved = np.abs(chi - chi0) > near
     chi = np.where(moved, chi, chi0)
     chi[moved] += _gain(K[:, moved], S[moved]) @ (rest - K @ chi)

@@ -1,27 +1,31 @@
 """Numbers of an XML text replaced where they stand: every other byte stays.
 
-`symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each element starts. Here the start tag is read again, as
-bytes: an edit is a span of bytes and what stands there instead. What has no place yet (an attribute, an element) is inserted and counted as such.
+`symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each
+element starts. Here the start tag is read again, as
+bytes: an edit is a span of bytes and what stands there instead. What has no place yet (an
+attribute, an element) is inserted and counted as such.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from symgen.description.xml_text import Element
+from symgen.description.xml_text import XmlElement
 from symgen.errors import DescriptionError
 
-SAME = 1e-12  # a number that changes by less, relative above 1, stays as it is written
+UNCHANGED = 1e-12  # a number that changes by less, relative above 1, stays as it is written
 NAME = rb"[^\s=/>\"']+"
-TAG = re.compile(rb"<(?P<tag>" + NAME + rb")(?:\s+" + NAME + rb"\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(?P<end>/?>)")
+TAG = re.compile(
+    rb"<(?P<tag>" + NAME + rb")(?:\s+" + NAME + rb"\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(?P<end>/?>)"
+)
 ATTRIBUTE = re.compile(rb"\s+(?P<name>" + NAME + rb")\s*=\s*(?P<quoted>\"[^\"]*\"|'[^']*')")
-WORD = re.compile(rb"\S+")
+FIGURES = re.compile(rb"\S+")
 
 
 @dataclass
-class Source:
+class XmlEdits:
     """A text and its edits.
 
     Attributes
@@ -46,40 +50,53 @@ class Source:
             last = end
         return b"".join([*parts, self.content[last:]])
 
-    def set_numbers(self, e: Element, name: str, values: Sequence[float], default: Sequence[float] | None = None) -> None:
-        """The numbers of an attribute, the first ones where it has more; those that stay are not touched.
+    def set_numbers(
+        self,
+        e: XmlElement,
+        name: str,
+        values: Sequence[float],
+        default: Sequence[float] | None = None,
+    ) -> None:
+        """The numbers of an attribute, the first ones where it has more; those that stay are not
+        touched.
 
         Parameters
         ----------
         default : sequence of float
-            What a missing attribute means; it is added where the values differ. None: it is added in any case.
+            What a missing attribute means; it is added where the values differ. None: it is added
+            in any case.
         """
         span = self._value(e, name)
         if span is None:
             if default is None or not all(same(x, y) for x, y in zip(values, default, strict=True)):
                 self._add(e, name, values)
             return
-        words = list(WORD.finditer(self.content, *span))
-        if [word[0].decode("ascii", "replace") for word in words] != e.attributes[name].split() or len(words) < len(values):
-            raise DescriptionError(f"<{e.tag} {name}>: its numbers are written by character references; write digits", line=e.line)
+        words = list(FIGURES.finditer(self.content, *span))
+        if [word[0].decode("ascii", "replace") for word in words] != e.attributes[
+            name
+        ].split() or len(words) < len(values):
+            raise DescriptionError(
+                f"<{e.tag} {name}>: its numbers are written by character references; write digits",
+                line=e.line,
+            )
         for word, x in zip(words, values, strict=False):
             if not same(float(word[0]), x):
                 self.edits.append((word.start(), word.end(), number(x).encode()))
 
-    def set_word(self, e: Element, name: str, word: str) -> None:
+    def set_word(self, e: XmlElement, name: str, word: str) -> None:
         """Another word as the value of an attribute."""
         span = self._value(e, name)
         if span is not None:
             self.edits.append((*span, word.encode()))
             self.added.append(f"line {e.line}: {name}={word} in <{e.tag}>")
 
-    def replace_attribute(self, e: Element, old: str, new: str, values: Sequence[float]) -> None:
+    def replace_attribute(self, e: XmlElement, old: str, new: str, values: Sequence[float]) -> None:
         """Another attribute in the place of one."""
         match = self._attributes(e)[old.encode()]
         self.edits.append((match.start("name"), match.end(), f'{new}="{numbers(values)}"'.encode()))
         self.added.append(f"line {e.line}: {new} in place of {old} of <{e.tag}>")
 
-    def insert_child(self, parent: Element, text: str) -> None:
+    def insert_child(self, parent: XmlElement, text: str) -> None:
         """An element before the first child of `parent`, indented as that is."""
         tag = self._tag(parent)
         end = tag.end()
@@ -94,31 +111,37 @@ class Source:
         line = b"\r" + line if b"\r\n" in space else line
         self.edits.append((end, end, line + text.encode()))
 
-    def _add(self, e: Element, name: str, values: Sequence[float]) -> None:
+    def _add(self, e: XmlElement, name: str, values: Sequence[float]) -> None:
         tag, attributes = self._tag(e), self._attributes(e)
         at = max((match.end() for match in attributes.values()), default=tag.end("tag"))
         self.edits.append((at, at, f' {name}="{numbers(values)}"'.encode()))
         self.added.append(f"line {e.line}: {name} of <{e.tag}>")
 
-    def _value(self, e: Element, name: str) -> tuple[int, int] | None:
+    def _value(self, e: XmlElement, name: str) -> tuple[int, int] | None:
         """Where the value of an attribute stands, without its quotes."""
         match = self._attributes(e).get(name.encode())
         return None if match is None else (match.start("quoted") + 1, match.end("quoted") - 1)
 
-    def _attributes(self, e: Element) -> dict[bytes, re.Match[bytes]]:
+    def _attributes(self, e: XmlElement) -> dict[bytes, re.Match[bytes]]:
         tag = self._tag(e)
-        return {match["name"]: match for match in ATTRIBUTE.finditer(self.content, tag.end("tag"), tag.start("end"))}
+        return {
+            match["name"]: match
+            for match in ATTRIBUTE.finditer(self.content, tag.end("tag"), tag.start("end"))
+        }
 
-    def _tag(self, e: Element) -> re.Match[bytes]:
+    def _tag(self, e: XmlElement) -> re.Match[bytes]:
         match = TAG.match(self.content, e.byte)
         if match is None or match["tag"] != e.tag.encode():
-            raise DescriptionError(f"<{e.tag[:40]}> is not found in the bytes of the file; save it as UTF-8", line=e.line)
+            raise DescriptionError(
+                f"<{e.tag[:40]}> is not found in the bytes of the file; save it as UTF-8",
+                line=e.line,
+            )
         return match
 
 
 def same(x: float, y: float) -> bool:
-    """Whether two numbers differ by no more than SAME."""
-    return abs(x - y) <= SAME * max(1.0, abs(x), abs(y))
+    """Whether two numbers differ by no more than UNCHANGED."""
+    return abs(x - y) <= UNCHANGED * max(1.0, abs(x), abs(y))
 
 
 def number(x: float) -> str:
@@ -126,5 +149,5 @@ def number(x: float) -> str:
     return repr(float(x) + 0.0)
 
 
-def numbers(values: Sequence[float]) -> str:
+def numbers(values: Iterable[float]) -> str:
     return " ".join(map(number, values))

@@ -12,7 +12,7 @@ from runtime.resolution.checkpoint import Checkpoint
 from symgen.cli.cestac import cestac
 
 FILES = {"report.html", "study.yaml", "resolution.png", "resolution.svg"} | {
-    f"cestac.{kind}" for kind in ("json", "csv", "tex", "mat", "npz")
+    f"cestac.{kind}" for kind in ("json", "csv", "mat", "npz")
 }
 
 
@@ -30,7 +30,21 @@ def test_fine_encoder_is_unbiased(emps_data, tmp_path):
 
 
 def test_coarse_encoder_is_biased(emps_data):
-    result = run("emps", "emps", "--delta", "1e-4", "--delta", "2e-5", "--runs", 2, "--rounding", "uniform", "--seed", 7, "--json")
+    result = run(
+        "emps",
+        "emps",
+        "--delta",
+        "1e-4",
+        "--delta",
+        "2e-5",
+        "--runs",
+        2,
+        "--rounding",
+        "uniform",
+        "--seed",
+        7,
+        "--json",
+    )
     assert result.exit_code == 1
     found = json.loads(result.stdout)
     assert [level["level"]["delta"] for level in found["levels"]] == [1e-4, 2e-5]
@@ -40,12 +54,29 @@ def test_coarse_encoder_is_biased(emps_data):
 
 @campaign
 def test_workers_give_the_same_bits(emps_data):
-    one, two = (json.loads(run("emps", "emps", "--delta", "1e-6", "--runs", 2, "--workers", w, "--json").stdout) for w in (1, 2))
+    one, two = (
+        json.loads(
+            run("emps", "emps", "--delta", "1e-6", "--runs", 2, "--workers", w, "--json").stdout
+        )
+        for w in (1, 2)
+    )
     assert one["levels"] == two["levels"]
 
 
 def test_torque_steps_and_named_columns(emps_data):
-    result = run("emps", "emps", "--delta", "1e-6", "--torque", "0.01", "--runs", 2, "--columns", "M1R,FV1", "--json")
+    result = run(
+        "emps",
+        "emps",
+        "--delta",
+        "1e-6",
+        "--torque",
+        "0.01",
+        "--runs",
+        2,
+        "--columns",
+        "M1R,FV1",
+        "--json",
+    )
     found = json.loads(result.stdout)
     assert found["names"] == ["M1R", "FV1"] and len(found["levels"]) == 3
 
@@ -77,14 +108,36 @@ def test_bad_options(emps_data, options, words):
 def test_advice(emps_data, tmp_path):
     result = run("emps", "emps", "--advise", "--rounding", "two-point", "--runs", 4, "-o", tmp_path)
     assert result.exit_code == 0, result.output
-    assert "least squares changes by less than 1 % up to Delta = 4.59e-06 m at the joints (M1R first; 4 runs there gave" in result.stdout
-    assert {p.name for p in tmp_path.iterdir()} == {"report.html", "advice.json", "study.yaml", "advice.png", "advice.svg"}
+    assert (
+        "least squares changes by less than 1 % up to Delta = 4.59e-06 m at the joints (M1R "
+        "first; "
+        "4 runs there gave"
+    ) in result.stdout
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "report.html",
+        "advice.json",
+        "study.yaml",
+        "advice.png",
+        "advice.svg",
+    }
     assert "Resolution advice" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_advice_judges_the_steps_asked_for(emps_data):
     fine, coarse = (
-        run("emps", "emps", "--advise", "--rounding", "two-point", "--runs", 4, "--delta", step, "--json") for step in ("1e-6", "1e-4")
+        run(
+            "emps",
+            "emps",
+            "--advise",
+            "--rounding",
+            "two-point",
+            "--runs",
+            4,
+            "--delta",
+            step,
+            "--json",
+        )
+        for step in ("1e-6", "1e-4")
     )
     assert (fine.exit_code, coarse.exit_code) == (0, 1)
     assert json.loads(coarse.stdout)["asked"][0]["worst"][0] == "M1R"
@@ -113,13 +166,29 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
     assert other.exit_code == 2 and "another study, cestac.seed differ" in other.stderr
     whole = run(*arguments)
     assert whole.exit_code == 0 and {p.name for p in tmp_path.iterdir()} == FILES
-    assert json.loads((tmp_path / "cestac.json").read_text())["levels"] == json.loads(run(*arguments[:-2], "--json").stdout)["levels"]
+    assert (
+        json.loads((tmp_path / "cestac.json").read_text())["levels"]
+        == json.loads(run(*arguments[:-2], "--json").stdout)["levels"]
+    )
 
 
 @campaign
 def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
     """2 steps of 501 runs: more than cestac.json lists."""
-    result = run("emps", "emps", "--delta", "1e-6", "--delta", "1e-7", "--runs", 501, "--columns", "M1R", "-o", tmp_path)
+    result = run(
+        "emps",
+        "emps",
+        "--delta",
+        "1e-6",
+        "--delta",
+        "1e-7",
+        "--runs",
+        501,
+        "--columns",
+        "M1R",
+        "-o",
+        tmp_path,
+    )
     assert result.exit_code == 0
     assert {p.name for p in tmp_path.iterdir()} == FILES | {"runs"}
     assert json.loads((tmp_path / "cestac.json").read_text())["levels"][1]["runs"] is None

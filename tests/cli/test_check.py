@@ -34,7 +34,12 @@ def test_json():
 def mutated(robot):
     """The regrouping of `robot` with the sign of D3**2*M3 in XX2R flipped."""
     found = regroup(robot)
-    base = [replace(b, combination={**b.combination, "M3": -b.combination["M3"]}) if b.name == "XX2R" else b for b in found.base]
+    base = [
+        replace(b, combination={**b.combination, "M3": -b.combination["M3"]})
+        if b.name == "XX2R"
+        else b
+        for b in found.base
+    ]
     return replace(found, base=tuple(base))
 
 
@@ -50,11 +55,15 @@ def test_a_flipped_coefficient_is_caught_twice(monkeypatch):
 
 
 def test_a_missing_parameter_is_caught(monkeypatch):
-    monkeypatch.setattr(module, "regroup", lambda robot: replace(regroup(robot), base=regroup(robot).base[:-1]))
+    monkeypatch.setattr(
+        module, "regroup", lambda robot: replace(regroup(robot), base=regroup(robot).base[:-1])
+    )
     result = run("planar_2r")
     assert result.exit_code == 1 and "FALSE" in result.stdout
 
 
 def test_bad_input_is_exit_2():
     result = run("planar_3r")
-    assert result.exit_code == 2 and "planar_2r" in result.stderr and "Traceback" not in result.output
+    assert (
+        result.exit_code == 2 and "planar_2r" in result.stderr and "Traceback" not in result.output
+    )

@@ -17,7 +17,9 @@ def test_nothing_here(tmp_path, monkeypatch):
     monkeypatch.setattr("pooch.os_cache", lambda name: tmp_path / "cache")
     result = run()
     assert result.exit_code == 0
-    assert all(sha in result.stdout for dataset in DATASETS.values() for sha in dataset.files.values())
+    assert all(
+        sha in result.stdout for dataset in DATASETS.values() for sha in dataset.files.values()
+    )
     assert "not here" in result.stdout and list(tmp_path.iterdir()) == []
     rows = json.loads(run("--json").stdout)
     assert [row["name"] for row in rows] == list(DATASETS)
@@ -26,4 +28,6 @@ def test_nothing_here(tmp_path, monkeypatch):
 
 def test_found(emps_data):
     rows = {row["name"]: row for row in json.loads(run("--json").stdout)}
-    assert {file["name"]: file["path"] for file in rows["emps"]["files"]} == {name: str(path) for name, path in emps_data.items()}
+    assert {file["name"]: file["path"] for file in rows["emps"]["files"]} == {
+        name: str(path) for name, path in emps_data.items()
+    }

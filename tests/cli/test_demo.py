@@ -1,4 +1,6 @@
-"""The demo: labelled as simulated without data; with it, within the stated tolerances of the chapter's Tables 2 and 3."""
+"""The demo: labelled as simulated without data; with it, within the stated tolerances of the
+chapter's Tables 2 and 3.
+"""
 
 import json
 
@@ -9,12 +11,12 @@ from campaign import campaign
 from typer.testing import CliRunner
 
 import symgen
-from runtime.motion.reference import point_to_point
+from runtime.loop.reference import point_to_point
 from runtime.settings.controller import Points
 from symgen.cli.demo import demo
 from symgen.demo import simulated_record as simulated
 from symgen.demo import tx40, tx40_tables
-from symgen.demo.tx40 import differences
+from symgen.demo.tx40_page import differences
 
 
 def run(*arguments):
@@ -45,8 +47,16 @@ def test_offline_is_labelled_everywhere(offline):
     assert result.exit_code == 0, result.output
     assert "SIMULATED" in result.stdout and "No measured record" in result.stderr
     html = (out / "report.html").read_text(encoding="utf-8")
-    assert "SIMULATED" in html[html.index("<h1>") : html.index("</h1>")] and 'class="warning"' in html
-    assert {"estimate.mat", "cestac.csv", "cestac.tex", "cestac.mat", "cestac.npz", "resolution.png"} <= {p.name for p in out.iterdir()}
+    assert (
+        "SIMULATED" in html[html.index("<h1>") : html.index("</h1>")] and 'class="warning"' in html
+    )
+    assert {
+        "estimate.mat",
+        "cestac.csv",
+        "cestac.mat",
+        "cestac.npz",
+        "resolution.png",
+    } <= {p.name for p in out.iterdir()}
     for name in ("estimate.json", "cestac.json"):
         provenance = json.loads((out / name).read_text())["provenance"]
         assert provenance["simulated"] is True and "SIMULATED" in provenance["note"]
@@ -83,7 +93,9 @@ def test_simulated_trajectory_keeps_the_limits():
 
 @campaign
 def test_measured_record(tx40_data, tmp_path):
-    """Tables 2 and 3 within their tolerances, and every table of the report; one test, since the demo runs once."""
+    """Tables 2 and 3 within their tolerances, and every table of the report; one test, since the
+    demo runs once.
+    """
     shown = tx40.demonstrate(tx40.prepare(quick=False), quick=False)
     check_table_2(shown)
     check_table_3(shown)
@@ -103,17 +115,24 @@ def check_table_2(shown):
 
 def check_table_3(shown):
     i = shown.resolution.names.index("ZZ1R")
-    assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(tx40_tables.TABLE_3["ZZ1R"], abs=0.07)
+    assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(
+        tx40_tables.TABLE_3["ZZ1R"], abs=0.07
+    )
     assert len(shown.combinations) == 8
     assert len(shown.torque.levels) == 1 + 2 * len(tx40_tables.PHI)
 
 
 def check_coupling(shown):
     """Leaving it out ruins joint 5, which the total hides."""
-    error = {key: [joint.relative_error for joint in fit.per_joint] for key, fit in shown.result.coupling.items()}
+    error = {
+        key: [joint.relative_error for joint in fit.per_joint]
+        for key, fit in shown.result.coupling.items()
+    }
     assert set(error) == {"both", "position", "torque", "none"}
     assert all(error[key][4] > 1.25 * error["both"][4] for key in ("position", "torque", "none"))
-    assert shown.result.coupling["none"].relative_error < shown.result.coupling["both"].relative_error
+    assert (
+        shown.result.coupling["none"].relative_error < shown.result.coupling["both"].relative_error
+    )
 
 
 def check_slow_rows(shown):

@@ -1,4 +1,6 @@
-"""Notes on robots that are valid but probably not what was meant, and the relations that `show` prints."""
+"""Notes on robots that are valid but probably not what was meant, and the relations that `show`
+prints.
+"""
 
 import pytest
 from typer.testing import CliRunner
@@ -46,8 +48,16 @@ def test_packaged_robots_raise_no_doubt(name):
     [
         ("g: 9.81", "g: 981", "gravity is 981 m/s^2"),
         ("L1: 0.4", "L1: 400", "frame 2: d holds a length of 400 m; lengths are in m, not mm"),
-        ("gravity:", "drives: {ratio: [[100]], offset: [-90]}\ngravity:", "drives.offset of joint 1: -90 rad are 14.3 turns"),
-        ("gravity:", "limits: {q: [[-170, 180]]}\ngravity:", "limits.q of joint 1: 180 rad are 28.6 turns"),
+        (
+            "gravity:",
+            "drives: {ratio: [[100]], offset: [-90]}\ngravity:",
+            "drives.offset of joint 1: -90 rad are 14.3 turns",
+        ),
+        (
+            "gravity:",
+            "limits: {q: [[-170, 180]]}\ngravity:",
+            "limits.q of joint 1: 180 rad are 28.6 turns",
+        ),
     ],
 )
 def test_other_units_are_told(old, new, words):
@@ -64,31 +74,74 @@ def test_other_units_are_told(old, new, words):
 
 
 def test_large_and_small_robots_and_free_joints_are_left_alone():
-    crane = TWO_BARS.split("  3:", maxsplit=1)[0].replace(" mu: 0,", "").replace("L1: 0.4", "L1: 80").replace("d: 0,", "d: 12,")
+    crane = (
+        TWO_BARS.split("  3:", maxsplit=1)[0]
+        .replace(" mu: 0,", "")
+        .replace("L1: 0.4", "L1: 80")
+        .replace("d: 0,", "d: 12,")
+    )
     assert other_units(robot(crane + "limits: {q: [1e16, 25]}\n")) == []
-    assert other_units(robot(crane.replace("80", "0.002").replace("d: 12,", "d: 0,").replace("g: 9.81", "g: 1.62"))) == []
+    assert (
+        other_units(
+            robot(
+                crane.replace("80", "0.002")
+                .replace("d: 12,", "d: 0,")
+                .replace("g: 9.81", "g: 1.62")
+            )
+        )
+        == []
+    )
 
 
-@pytest.mark.parametrize(("angle", "meant"), [("1.5708", "pi/2"), ("-1.5707963", "-pi/2"), ("0.7854", "pi/4"), ("0.0001", "0")])
+@pytest.mark.parametrize(
+    ("angle", "meant"),
+    [("1.5708", "pi/2"), ("-1.5707963", "-pi/2"), ("0.7854", "pi/4"), ("0.0001", "0")],
+)
 def test_decimals_for_round_angles_are_told(tmp_path, angle, meant):
-    (tmp_path / "bars.yaml").write_text(TWO_BARS[: TWO_BARS.index("  2:")].replace("alpha: 0", f"alpha: {angle}"))
+    (tmp_path / "bars.yaml").write_text(
+        TWO_BARS[: TWO_BARS.index("  2:")].replace("alpha: 0", f"alpha: {angle}")
+    )
     for verb in ("show", "check", "generate"):
-        result = CliRunner().invoke(app, [verb, str(tmp_path / "bars.yaml"), *(["-o", str(tmp_path)] if verb == "generate" else [])])
+        result = CliRunner().invoke(
+            app,
+            [
+                verb,
+                str(tmp_path / "bars.yaml"),
+                *(["-o", str(tmp_path)] if verb == "generate" else []),
+            ],
+        )
         assert result.exit_code == 0
-        assert result.stderr.startswith("note: frame 1: alpha has") and f", not {meant}: another robot" in result.stderr
+        assert (
+            result.stderr.startswith("note: frame 1: alpha has")
+            and f", not {meant}: another robot" in result.stderr
+        )
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("2: {ant: 1, sigma: 0, mu: 0,", "2: {ant: 1, sigma: 0,", ["2 joints are actuated ([1, 2])", "joints without a motor have mu: 0"]),
-        ("1: {ant: 0, sigma: 0,        alpha: 0", "1: {ant: 0, sigma: 0, alpha: pi/2", ["cannot coincide", "check the lengths, alpha"]),
-        ("loops:", "  6: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q6, r: 0}\nloops:", ["joint 6 has no relation", "declare q6"]),
+        (
+            "2: {ant: 1, sigma: 0, mu: 0,",
+            "2: {ant: 1, sigma: 0,",
+            ["2 joints are actuated ([1, 2])", "joints without a motor have mu: 0"],
+        ),
+        (
+            "1: {ant: 0, sigma: 0,        alpha: 0",
+            "1: {ant: 0, sigma: 0, alpha: pi/2",
+            ["cannot coincide", "check the lengths, alpha"],
+        ),
+        (
+            "loops:",
+            "  6: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q6, r: 0}\nloops:",
+            ["joint 6 has no relation", "declare q6"],
+        ),
     ],
 )
 def test_a_loop_that_does_not_close_is_told_with_its_file(tmp_path, old, new, words):
     assert TWO_BARS.count(old) == 1
-    (tmp_path / "bars.yaml").write_text(TWO_BARS.replace(old, new).replace("d: L3", "d: L1").replace("d: L4", "d: L2"))
+    (tmp_path / "bars.yaml").write_text(
+        TWO_BARS.replace(old, new).replace("d: L3", "d: L1").replace("d: L4", "d: L2")
+    )
     result = CliRunner().invoke(app, ["show", str(tmp_path / "bars.yaml")])
     assert result.exit_code == 2 and result.stderr.endswith("(bars.yaml)\n"), result.stderr
     assert all(word in result.stderr for word in words), result.stderr

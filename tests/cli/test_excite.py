@@ -1,4 +1,6 @@
-"""`symgen excite`: files that simulate and identify read, a better motion than the record's, bad input as one line."""
+"""`symgen excite`: files that simulate and identify read, a better motion than the record's, bad
+input as one line.
+"""
 
 import json
 from pathlib import Path
@@ -33,8 +35,20 @@ def study(tmp_path: Path) -> Path:
     t = np.arange(4000) / 1000
     q = 0.05 * (1 - np.cos(2 * np.pi * t / 2))
     qd, qdd = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
-    tau = 95.0 * qdd + 200.0 * qd + 20.0 * np.sign(qd) - 3.0 + np.random.default_rng(0).normal(0, 2.0, len(t))
-    np.savetxt(tmp_path / "slow.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,tau1", comments="")
+    tau = (
+        95.0 * qdd
+        + 200.0 * qd
+        + 20.0 * np.sign(qd)
+        - 3.0
+        + np.random.default_rng(0).normal(0, 2.0, len(t))
+    )
+    np.savetxt(
+        tmp_path / "slow.csv",
+        np.column_stack([t, q, tau]),
+        delimiter=",",
+        header="t,q1,tau1",
+        comments="",
+    )
     path = tmp_path / "study.yaml"
     path.write_text(STUDY + "record: {files: [slow.csv]}\n", encoding="utf-8")
     return path
@@ -48,7 +62,9 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
     assert json.loads(done.stdout) == summary
     before = summary["relative_sigma_of_record"]
     assert summary["worse_than_record"] == {
-        k: x / before[k] for k, x in sorted(summary["relative_sigma"].items(), key=lambda i: -i[1] / before[i[0]]) if x > before[k]
+        k: x / before[k]
+        for k, x in sorted(summary["relative_sigma"].items(), key=lambda i: -i[1] / before[i[0]])
+        if x > before[k]
     }
     assert summary["settings"]["criterion"] == "record"
     assert max(max(x) for x in summary["limits_used"].values()) <= 1
@@ -73,16 +89,26 @@ def test_motion_from_a_record(study: Path, tmp_path: Path) -> None:
 @campaign
 def test_the_trajectory_is_a_reference(study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert run("excite", "emps", study, "-o", out, "--starts", 1, "--criterion", "sigma").exit_code == 0
+    assert (
+        run("excite", "emps", study, "-o", out, "--starts", 1, "--criterion", "sigma").exit_code
+        == 0
+    )
     summary = json.loads((out / "excitation.json").read_text())
-    assert max(summary["relative_sigma"].values()) < max(summary["relative_sigma_of_record"].values())
-    loop = "controller: {law: {kind: cascade, kp: 160, kv: 243, gain: 35}, rate: 1000, reference: {file: trajectory.csv, limits: ignore}}\n"
+    assert max(summary["relative_sigma"].values()) < max(
+        summary["relative_sigma_of_record"].values()
+    )
+    loop = (
+        "controller: {law: {kind: cascade, kp: 160, kv: 243, gain: 35}, rate: 1000, reference: "
+        "{file: trajectory.csv, limits: ignore}}\n"
+    )
     (out / "loop.yaml").write_text("symgen: 1\n" + loop, encoding="utf-8")
     done = run("simulate", "emps", out / "loop.yaml", "-o", tmp_path / "record")
     assert done.exit_code == 0, done.output
     done = run("identify", "emps", tmp_path / "record" / "study.yaml", "--json")
     assert done.exit_code == 0, done.output
-    assert dict(zip(*(json.loads(done.stdout)[key] for key in ("names", "X")), strict=True))["M1R"] == pytest.approx(95.1, rel=0.01)
+    assert dict(zip(*(json.loads(done.stdout)[key] for key in ("names", "X")), strict=True))[
+        "M1R"
+    ] == pytest.approx(95.1, rel=0.01)
 
 
 def test_bad_input_is_one_line(study: Path, tmp_path: Path) -> None:
@@ -106,4 +132,7 @@ def test_settings_without_a_record_use_the_values_of_the_robot(tmp_path: Path) -
     study.write_text(STUDY, encoding="utf-8")
     done = run("excite", "emps", study, "--starts", 1, "--rate", 200, "-o", tmp_path / "out")
     assert done.exit_code == 0, done.output
-    assert json.loads((tmp_path / "out" / "excitation.json").read_text())["parameters_from"] == "values of the robot file"
+    assert (
+        json.loads((tmp_path / "out" / "excitation.json").read_text())["parameters_from"]
+        == "values of the robot file"
+    )

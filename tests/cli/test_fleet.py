@@ -37,10 +37,20 @@ def simulated(folder, moving=(1.0, 1.0)):
     w = 2 * np.pi * np.array([[0.3, 0.4], [0.7, 0.9], [1.6, 1.3]])[:, None]
     amplitude = np.array([[0.8, 0.9], [0.4, 0.3], [0.1, 0.15]])[:, None] * moving
     phase = w * t + np.array([0.4, 1.0])
-    q, qd, qdd = (amplitude * np.sin(phase)).sum(0), (amplitude * w * np.cos(phase)).sum(0), -(amplitude * w**2 * np.sin(phase)).sum(0)
+    q, qd, qdd = (
+        (amplitude * np.sin(phase)).sum(0),
+        (amplitude * w * np.cos(phase)).sum(0),
+        -(amplitude * w**2 * np.sin(phase)).sum(0),
+    )
     tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES))
     tau += 0.05 * np.random.default_rng(0).standard_normal(q.shape)
-    np.savetxt(folder / "run.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+    np.savetxt(
+        folder / "run.csv",
+        np.column_stack([t, q, tau]),
+        delimiter=",",
+        header="t,q1,q2,tau1,tau2",
+        comments="",
+    )
     (folder / "run.yaml").write_text("record: {files: run.csv}\nsignals: {lowpass: {cutoff: 20}}\n")
 
 
@@ -61,7 +71,13 @@ def test_one_job_fails_and_the_others_go_on(shown):
     assert shown.exit_code == 1, shown.output
     assert "5 of 5" in shown.stderr
     lines = shown.stdout.splitlines()
-    assert [line.split()[0] for line in lines[1:6]] == ["emps-emps", "no_such_record", "planar_2r-run", "emps-emps-2", "other-run"]
+    assert [line.split()[0] for line in lines[1:6]] == [
+        "emps-emps",
+        "no_such_record",
+        "planar_2r-run",
+        "emps-emps-2",
+        "other-run",
+    ]
     assert [line.split()[-1] for line in lines[1:6]] == ["ok", "failed", "ok", "ok", "failed"]
     assert any(line.startswith("no_such_record: ") and "missing.csv" in line for line in lines)
     assert any(line.startswith("other-run: ") and "other.yaml" in line for line in lines)
@@ -76,7 +92,11 @@ def test_one_folder_per_job_and_the_table(shown, folder):
     assert [row["name"] for row in rows] == [row["name"] for row in found]
     assert (out / "summary.txt").read_text() == shown.stdout
     emps = found[0]
-    assert (emps["rows"], emps["parameters"], emps["worst_joint"]) == (2480, 4, "1")  # EMPS_Description.pdf, section 3.4: 4.0834 %, 25.9883
+    assert (emps["rows"], emps["parameters"], emps["worst_joint"]) == (
+        2480,
+        4,
+        "1",
+    )  # EMPS_Description.pdf, section 3.4: 4.0834 %, 25.9883
     assert (round(emps["relative_error"], 4), round(emps["cond"], 4)) == (4.0834, 25.9883)
     for name in folders:
         own = json.loads((out / name / "estimate.json").read_text())

@@ -22,20 +22,33 @@ def test_help_lists_every_verb():
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_help(verb):
     result = run(verb, "--help")
-    assert result.exit_code == 0 and f" {verb} [OPTIONS]" in result.stdout and "--help" in result.stdout
+    assert (
+        result.exit_code == 0
+        and f" {verb} [OPTIONS]" in result.stdout
+        and "--help" in result.stdout
+    )
 
 
 def test_version():
     assert run("--version").stdout.strip() == f"symgen {VERSION}"
 
 
-@pytest.mark.parametrize("arguments", [["shwo", "tx40"], ["show"], ["show", "tx40", "--formt", "json"], ["--nothing"]])
+@pytest.mark.parametrize(
+    "arguments", [["shwo", "tx40"], ["show"], ["show", "tx40", "--formt", "json"], ["--nothing"]]
+)
 def test_misspelt_is_exit_2(arguments):
     result = run(*arguments)
     assert result.exit_code == 2 and "Traceback" not in result.output
 
 
 def test_the_installed_entry_point_ends_without_traceback():
-    code = "from symgen.cli.main import main; import sys; sys.argv = ['symgen', 'show', 'nothing.yaml']; main()"
+    code = (
+        "from symgen.cli.main import main; import sys; sys.argv = ['symgen', 'show', "
+        "'nothing.yaml']; main()"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert result.returncode == 2 and result.stderr.startswith("error: ") and "Traceback" not in result.stderr
+    assert (
+        result.returncode == 2
+        and result.stderr.startswith("error: ")
+        and "Traceback" not in result.stderr
+    )

@@ -1,4 +1,6 @@
-"""Hostile files and arguments: no verb prints a traceback. Exit code 2, one line that names the thing, nothing written."""
+"""Hostile files and arguments: no verb prints a traceback. Exit code 2, one line that names the
+thing, nothing written.
+"""
 
 import os
 import subprocess
@@ -32,7 +34,10 @@ ENDINGS = (
     ".csv.gz",
     ".json",
 )
-ROBOT_ENDINGS, RECORD_ENDINGS = ("", ".yaml", ".par", ".urdf", ".xml"), ("", ".yaml", ".csv", ".npz", ".mat", ".bag", ".mcap", ".json")
+ROBOT_ENDINGS, RECORD_ENDINGS = (
+    ("", ".yaml", ".par", ".urdf", ".xml"),
+    ("", ".yaml", ".csv", ".npz", ".mat", ".bag", ".mcap", ".json"),
+)
 STRANGE = (
     "\x1b[2Jarm",
     "two\nlines",
@@ -49,12 +54,17 @@ STRANGE = (
     "..",
     "nothing/at/all",
 )
-STUDY = "symgen: 1\ncontroller:\n  law: {kind: pid, kp: [1, 1]}\n  rate: 100\n  reference: {points: {duration: 1}}\n"
+STUDY = (
+    "symgen: 1\ncontroller:\n  law: {kind: pid, kp: [1, 1]}\n  rate: 100\n  reference: "
+    "{points: {duration: 1}}\n"
+)
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder of things that are no robots, records or studies, a sound model and record, and what results may not replace."""
+    """A folder of things that are no robots, records or studies, a sound model and record, and what
+    results may not replace.
+    """
     folder = tmp_path_factory.mktemp("hostile")
     for ending in ENDINGS:
         os.mkfifo(folder / f"pipe{ending}")
@@ -83,7 +93,10 @@ def answered(*arguments):
     """Exit code and error stream of a command that changes nothing on disk, whatever it was given."""
     before = content(Path())
     result = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), (arguments, result.exception)
+    assert result.exception is None or isinstance(result.exception, SystemExit), (
+        arguments,
+        result.exception,
+    )
     assert content(Path()) == before, arguments
     assert "Traceback" not in result.output
     return result.exit_code, result.stderr
@@ -93,19 +106,24 @@ def refused(*arguments, named=""):
     code, said = answered(*arguments)
     assert code == 2, (arguments, said)
     said = said.removeprefix("\n")  # where a bar of progress was
-    assert said.startswith("error: ") and said.endswith("\n") and said[:-1].isprintable(), (arguments, said)
+    assert said.startswith("error: ") and said.endswith("\n") and said[:-1].isprintable(), (
+        arguments,
+        said,
+    )
     assert named in said, (arguments, said)
 
 
 def spelled(name):
     """As an error names it."""
-    return "".join(c if c.isprintable() else "\\n" if c == "\n" else f"\\x{ord(c):02x}" for c in name)
+    return "".join(
+        c if c.isprintable() else "\\n" if c == "\n" else f"\\x{ord(c):02x}" for c in name
+    )
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "empty", "binary", "loop", "missing"])
 def test_what_is_no_robot(kind):
     for ending in ROBOT_ENDINGS:
-        for verb in (("show",), ("generate", "-o", "out"), ("check",), ("snippet",)):
+        for verb in (("show",), ("generate", "-o", "out"), ("check",)):
             refused(*verb, kind + ending, named=kind + ending)
         refused("convert", kind + ending, "out.yaml", named=kind + ending)
     for ending in (".yaml", ".py"):
@@ -127,13 +145,14 @@ def test_what_is_no_record(kind):
     for ending in ("", ".csv", ".json"):
         refused("convert", "emps", "out.urdf", "--values", kind + ending, named=kind + ending)
         refused("convert", "emps", "out.urdf", "--estimate", kind + ending, named=kind + ending)
-    refused("snippet", "emps", "--estimate", kind + ".json", named=kind + ".json")
 
 
 @pytest.mark.parametrize("name", STRANGE, ids=ascii)
 def test_names(name):
     """A name may hold what a terminal obeys: it is spelled out, on one line."""
-    named = "" if len(name) > 200 or "\udce9" in name else spelled(name).rpartition("\\x202e")[2]  # which is also spelled \u202e
+    named = (
+        "" if len(name) > 200 or "\udce9" in name else spelled(name).rpartition("\\x202e")[2]
+    )  # which is also spelled \u202e
     for verb in ("show", "generate", "check", "fleet"):
         refused(verb, "--", name, named=named)
     refused("convert", "--", name, "out.yaml", named=named)
@@ -145,16 +164,20 @@ def test_names(name):
 @pytest.mark.parametrize("target", ["taken", "pipe", "taken/below"])
 def test_results_replace_no_file_by_a_folder(target):
     for command in (
-        ("generate", "emps"), ("snippet", "emps"), ("identify", "model.py", "record.csv"), ("cestac", "model.py", "record.csv", "--delta", "0.001"),
+        ("generate", "emps"), ("identify", "model.py", "record.csv"), ("cestac", "model.py", "record.csv", "--delta", "0.001"),
         ("report", "model.py", "record.csv"), ("excite", "model.py"), ("simulate", "model.py", "study.yaml"), ("fleet", "fleet.yaml"), ("demo", "--quick"),
     ):  # fmt: skip
         if command[0] == "fleet":
-            Path("fleet.yaml").write_text("symgen: 1\njobs: [{robot: model.py, record: record.csv}]\n")
+            Path("fleet.yaml").write_text(
+                "symgen: 1\njobs: [{robot: model.py, record: record.csv}]\n"
+            )
         refused(
             *command,
             "-o",
             target,
-            named="fleet.yaml" if command[0] == "fleet" and "limits" in answered(*command, "-o", target)[1] else target,
+            named="fleet.yaml"
+            if command[0] == "fleet" and "limits" in answered(*command, "-o", target)[1]
+            else target,
         )
 
 
@@ -179,12 +202,14 @@ def test_results_replace_no_pipe_and_no_folder(target):
 )  # fmt: skip
 def test_values_of_options(arguments):
     verb, *options = arguments
-    refused(verb, "model.py", "record.csv", *options, *(("-o", "out") if verb != "identify" else ()))
+    refused(
+        verb, "model.py", "record.csv", *options, *(("-o", "out") if verb != "identify" else ())
+    )
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [("identify", "model.py", "record.csv", "--block", "\x1b[2J"), ("convert", "emps", "a.yaml", "--snap", "1e999"), ("\x1b[2J",), ("show", "--\x1b[2J"), ("demo", "\x1b[2J")],
+    [("identify", "model.py", "record.csv", "--block", "\x1b[2J"), ("convert", "emps", "a.yaml", "--constant", "1e999"), ("\x1b[2J",), ("show", "--\x1b[2J"), ("demo", "\x1b[2J")],
     ids=ascii,
 )  # fmt: skip
 def test_usage(arguments):
@@ -192,7 +217,12 @@ def test_usage(arguments):
     assert code == 2 and said.replace("\n", "").isprintable()
 
 
-ELSEWHERE = ("fleet", "checkpoint", "settings", "parquet")  # many jobs, folders of runs, processes of their own: tests/fuzz reads them
+ELSEWHERE = (
+    "fleet",
+    "checkpoint",
+    "settings",
+    "parquet",
+)  # many jobs, folders of runs, processes of their own: tests/fuzz reads them
 
 
 @pytest.mark.parametrize(
@@ -201,7 +231,9 @@ ELSEWHERE = ("fleet", "checkpoint", "settings", "parquet")  # many jobs, folders
     ids=lambda path: f"{path.parent.name}/{path.name}",
 )
 def test_corpus(path, tmp_path):
-    """What once failed when it was read, by the verb that reads it; some of it is sound and only strange."""
+    """What once failed when it was read, by the verb that reads it; some of it is sound and only
+    strange.
+    """
     from fuzz.formats import FORMATS
 
     file = tmp_path / f"case.{FORMATS[path.parent.name].ending}"
@@ -218,7 +250,9 @@ def test_corpus(path, tmp_path):
         case _:
             command = ("identify", "model.py", file)
     code, said = answered(*command)
-    refuted = code == 1 and "say --at-values" in said  # a valid file, at whose constants the generic formulas do not hold
+    refuted = (
+        code == 1 and "say --at-values" in said
+    )  # a valid file, at whose constants the generic formulas do not hold
     assert code == 0 or refuted or (code == 2 and said[:-1].isprintable()), said
 
 
@@ -236,8 +270,14 @@ def symgen(*arguments, **settings):
 def test_names_that_are_no_text():
     """Bytes that are no UTF-8 in an argument, and characters that the output cannot show."""
     ended = symgen("show", b"caf\xe9.yaml")
-    assert ended.returncode == 2 and ended.stderr.startswith(b"error: no file caf\\") and ended.stderr.count(b"\n") == 1
-    ended = symgen("convert", "emps", b"caf\xe9.yaml", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (
+        ended.returncode == 2
+        and ended.stderr.startswith(b"error: no file caf\\")
+        and ended.stderr.count(b"\n") == 1
+    )
+    ended = symgen(
+        "convert", "emps", b"caf\xe9.yaml", env={**os.environ, "PYTHONIOENCODING": "ascii"}
+    )
     assert (ended.returncode, ended.stderr) == (0, b"") and b"caf" in ended.stdout
     Path("caf\udce9.yaml").unlink()
 

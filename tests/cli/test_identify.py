@@ -1,4 +1,6 @@
-"""`symgen identify`: published digits through the command line, its files, and every kind of bad input."""
+"""`symgen identify`: published digits through the command line, its files, and every kind of bad
+input.
+"""
 
 import json
 from pathlib import Path
@@ -17,7 +19,14 @@ from symgen.cli.identify import identify
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-FILES = {"report.html", "estimate.json", "estimate.mat", "estimate.npz", "parameters.csv", "parameters.tex"}
+FILES = {
+    "report.html",
+    "estimate.json",
+    "estimate.mat",
+    "estimate.npz",
+    "parameters.csv",
+    "parameters.tex",
+}
 FILES |= {"study.yaml", "torques.png", "torques.svg", "residuals.png", "residuals.svg"}
 
 
@@ -40,23 +49,33 @@ def test_emps_digits(emps):
     estimate = json.loads(result.stdout)
     assert np.round(estimate["X"], 4).tolist() == [95.1089, 203.5034, 20.3935, -3.1648]
     assert round(estimate["cond"], 4) == 25.9883
-    assert (round(estimate["residual_norm"], 4), round(estimate["relative_error"], 4)) == (108.7569, 4.0834)
+    assert (round(estimate["residual_norm"], 4), round(estimate["relative_error"], 4)) == (
+        108.7569,
+        4.0834,
+    )
     validation = estimate["validation"][1]["predictions"]
-    assert [(p["part"], round(p["relative_error"], 4)) for p in validation if p["columns"] == "all"] == [
+    assert [
+        (p["part"], round(p["relative_error"], 4)) for p in validation if p["columns"] == "all"
+    ] == [
         ("emps", 4.0834),
         ("emps_pulses", 5.9824),
     ]
 
 
 def test_arguments_exchanged_or_no_record_at_all(tmp_path):
-    """The robot comes first; a folder of results is no bag; a header of other names asks for a study file."""
+    """The robot comes first; a folder of results is no bag; a header of other names asks for a
+    study file.
+    """
     for name, text in (("log.csv", "time,a,b\n0,1,2\n"), ("robot.yaml", "symgen: 1\n")):
         (tmp_path / name).write_text(text)
     (tmp_path / "results").mkdir()
     for arguments, said in (
         ((tmp_path / "log.csv", tmp_path / "robot.yaml"), "the robot comes first, then the record"),
         (("emps", tmp_path / "results"), "no ROS 2 bag; name the measured or study file in it"),
-        (("emps", tmp_path / "log.csv"), "no columns q1, q2 ... among time, a, b; name them in a study file, record.columns.q"),
+        (
+            ("emps", tmp_path / "log.csv"),
+            "no columns q1, q2 ... among time, a, b; name them in a study file, record.columns.q",
+        ),
     ):
         result = run(*arguments)
         assert result.exit_code == 2 and said in result.stderr
@@ -65,9 +84,16 @@ def test_arguments_exchanged_or_no_record_at_all(tmp_path):
 def test_files_are_complete_and_readable(emps):
     _, folder = emps
     assert {path.name for path in folder.iterdir()} == FILES
-    assert Estimate.from_json((folder / "estimate.json").read_text()).names == ("M1R", "FV1", "FS1", "OFFSET1")
+    assert Estimate.from_json((folder / "estimate.json").read_text()).names == (
+        "M1R",
+        "FV1",
+        "FS1",
+        "OFFSET1",
+    )
     written = json.loads((folder / "estimate.json").read_text())
-    jsonschema.validate(written, json.loads(CliRunner().invoke(app, ["schema", "--of", "estimate"]).stdout))
+    jsonschema.validate(
+        written, json.loads(CliRunner().invoke(app, ["schema", "--of", "estimate"]).stdout)
+    )
     assert written["warnings"] == [] and written["weak_directions"]["groups"] == []
     assert load_study(folder / "study.yaml").signals.lowpass.cutoff == 100
     assert "95.109" in (folder / "report.html").read_text(encoding="utf-8")
@@ -88,13 +114,17 @@ def plain_csv(path, q=None, tau=None, header="t,q1,q2,tau1,tau2", N=4000):
     t = np.arange(N) / 1000
     q = np.column_stack([np.sin(5 * t), np.cos(7 * t) + 0.3 * np.sin(3 * t)]) if q is None else q
     tau = rng.normal(size=(N, 2)) if tau is None else tau
-    np.savetxt(path, np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", fmt="%.9g")
+    np.savetxt(
+        path, np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", fmt="%.9g"
+    )
     return path
 
 
 def test_generated_module_and_plain_record(tmp_path):
     record = plain_csv(tmp_path / "record.csv")
-    by_name, by_module = (run(robot, record, "--json") for robot in ("planar_2r", GENERATED / "planar_2r.py"))
+    by_name, by_module = (
+        run(robot, record, "--json") for robot in ("planar_2r", GENERATED / "planar_2r.py")
+    )
     assert by_name.exit_code == by_module.exit_code == 0, by_name.output
     assert json.loads(by_name.stdout)["X"] == json.loads(by_module.stdout)["X"]
     assert "The model of planar_2r with " in run("planar_2r", record).stdout
@@ -105,18 +135,30 @@ def test_rank_deficient_record_names_the_parameters(tmp_path):
     q[:, 0] = np.sin(5 * np.arange(4000) / 1000)
     result = run("planar_2r", plain_csv(tmp_path / "record.csv", q=q), "-o", tmp_path / "out")
     assert result.exit_code == 1, result.output
-    assert json.loads((tmp_path / "out" / "estimate.json").read_text())["status"] == "rank-deficient"
-    assert "rank-deficient" in result.stdout and "cannot be told apart" in result.stdout and "FV2" in result.stdout
+    assert (
+        json.loads((tmp_path / "out" / "estimate.json").read_text())["status"] == "rank-deficient"
+    )
+    assert (
+        "rank-deficient" in result.stdout
+        and "cannot be told apart" in result.stdout
+        and "FV2" in result.stdout
+    )
 
 
 def test_hostile_record_name_is_escaped(tmp_path):
     plain_csv(tmp_path / "record.csv")
     study = tmp_path / "study.yaml"
-    study.write_text("symgen: 1\nrecord: {files: [record.csv], name: '<script>alert(1)</script>'}\n")
+    study.write_text(
+        "symgen: 1\nrecord: {files: [record.csv], name: '<script>alert(1)</script>'}\n"
+    )
     result = run("planar_2r", study, "-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "<script>alert" not in html and html.count("<script") == 2 and "&lt;script&gt;alert(1)" in html
+    assert (
+        "<script>alert" not in html
+        and html.count("<script") == 2
+        and "&lt;script&gt;alert(1)" in html
+    )
 
 
 def nan_record(folder):
@@ -136,10 +178,18 @@ BAD = {
     "nan": (nan_record, ["nan.csv", "tau2", "nan"]),
     "short": (lambda f: plain_csv(f / "short.csv", N=20), ["short", "3 rows", "longer record"]),
     "columns": (lambda f: plain_csv(f / "names.csv", header="t,a,b,c,d"), ["names.csv", "q1"]),
-    "joints": (lambda f: plain_csv(f / "three.csv", q=np.zeros((4000, 1)), tau=np.zeros((4000, 1)), header="t,q1,tau1"), ["2"]),
+    "joints": (
+        lambda f: plain_csv(
+            f / "three.csv", q=np.zeros((4000, 1)), tau=np.zeros((4000, 1)), header="t,q1,tau1"
+        ),
+        ["2"],
+    ),
     "dataset": (lambda f: "nothing", ["nothing", "tx40, emps"]),
     "missing file": (lambda f: f / "gone.csv", ["gone.csv"]),
-    "nyquist": (lambda f: study_file(f, "signals: {lowpass: {cutoff: 900}}"), ["900 Hz", "Nyquist", "500"]),
+    "nyquist": (
+        lambda f: study_file(f, "signals: {lowpass: {cutoff: 900}}"),
+        ["900 Hz", "Nyquist", "500"],
+    ),
     "window": (lambda f: study_file(f, "rows: {window: [50, 60]}"), ["window", "50"]),
     "key": (lambda f: study_file(f, "sginals: {}"), ["study.yaml", "line 3", "sginals"]),
 }
@@ -180,26 +230,43 @@ def whole(tx40_data):
 
 
 @campaign
-@pytest.mark.parametrize("held", [pytest.param(100e6, marks=campaign), 0], ids=["rows held", "rows reduced"])
+@pytest.mark.parametrize(
+    "held", [pytest.param(100e6, marks=campaign), 0], ids=["rows held", "rows reduced"]
+)
 def test_blocks_give_the_same_result(whole, monkeypatch, held):
     """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""
-    monkeypatch.setattr("runtime.observation.observation.HELD", held)
-    whole, blocks = json.loads(whole), json.loads(run("tx40", "tx40", "--json", "--block", 10000).stdout)
+    monkeypatch.setattr("runtime.rows.observe.HELD", held)
+    whole, blocks = (
+        json.loads(whole),
+        json.loads(run("tx40", "tx40", "--json", "--block", 10000).stdout),
+    )
     assert blocks["settings"].pop("stream") == {"block": 10000}
     for key in ("X", "sigma", "sigma_corrected"):
-        np.testing.assert_allclose(blocks[key], whole[key], rtol=0, atol=1e-9 * np.abs(whole[key]).max())
+        np.testing.assert_allclose(
+            blocks[key], whole[key], rtol=0, atol=1e-9 * np.abs(whole[key]).max()
+        )
     assert blocks["settings"] == whole["settings"] and blocks["verdict"] == whole["verdict"]
     assert blocks["essential"]["names"] == whole["essential"]["names"]
     for key, fit in whole["coupling"].items():
-        np.testing.assert_allclose(blocks["coupling"][key]["relative_error"], fit["relative_error"], rtol=1e-9)
+        np.testing.assert_allclose(
+            blocks["coupling"][key]["relative_error"], fit["relative_error"], rtol=1e-9
+        )
 
 
 @campaign
 def test_workers_give_the_same_bytes(tmp_path):
     """The plausibility checks, which another process makes meanwhile, included."""
     t = np.arange(20_000) / 1000
-    np.savez(tmp_path / "axis.npz", t=t, q1=0.2 * np.sin(6 * t) + 0.1 * np.sin(17 * t), tau1=20 * np.cos(6 * t))
-    one, two = (run("emps", tmp_path / "axis.npz", "--json", "--block", 5000, "--workers", count).stdout for count in (1, 2))
+    np.savez(
+        tmp_path / "axis.npz",
+        t=t,
+        q1=0.2 * np.sin(6 * t) + 0.1 * np.sin(17 * t),
+        tau1=20 * np.cos(6 * t),
+    )
+    one, two = (
+        run("emps", tmp_path / "axis.npz", "--json", "--block", 5000, "--workers", count).stdout
+        for count in (1, 2)
+    )
     assert one == two and json.loads(one)["plausibility"]["checks"]
 
 
@@ -211,13 +278,18 @@ def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
     settings = json.loads(run("emps", tmp_path / "axis.npz", "--json").stdout)["settings"]
     assert settings["stream"] == {"block": 65536}
     (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: off\n")
-    assert "stream" not in json.loads(run("emps", tmp_path / "study.yaml", "--json").stdout)["settings"]
+    assert (
+        "stream"
+        not in json.loads(run("emps", tmp_path / "study.yaml", "--json").stdout)["settings"]
+    )
     assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
 
 
 @campaign
 def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
-    monkeypatch.setattr("runtime.observation.by_blocks.SHOWN", 300)
-    monkeypatch.setattr("runtime.observation.observation.HELD", 0)
+    monkeypatch.setattr("runtime.rows.by_blocks.SHOWN", 300)
+    monkeypatch.setattr("runtime.rows.observe.HELD", 0)
     assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0
-    assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(encoding="utf-8")  # 6 (300 - 3), 6 (938 - 6)
+    assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(
+        encoding="utf-8"
+    )  # 6 (300 - 3), 6 (938 - 6)

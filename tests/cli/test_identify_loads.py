@@ -1,4 +1,6 @@
-"""`symgen identify` with a load, and by feasible least squares, on simulated records of the planar arm with known truth."""
+"""`symgen identify` with a load, and by feasible least squares, on simulated records of the planar
+arm with known truth.
+"""
 
 from __future__ import annotations
 
@@ -25,19 +27,32 @@ LOAD = "payload: {record: {files: [loaded.csv]}, known: {M: 2.0}, gains: true}\n
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Two records of the arm, 2 kg at (0.3, 0, 0) on link 2 in the second; the torques are told 20 % too small."""
+    """Two records of the arm, 2 kg at (0.3, 0, 0) on link 2 in the second; the torques are told 20
+    % too small.
+    """
     place = tmp_path_factory.mktemp("loads")
     (place / "arm.py").write_text(generate_module(load_robot("planar_2r")), encoding="utf-8")
-    arm = load_model(place / "arm.py")
+    arm = load_model(place / "arm.py", trust=True)
     t = np.arange(N) / RATE
-    for k, (name, load) in enumerate((("empty.csv", {}), ("loaded.csv", {"M2": 2.0, "MX2": 0.6, "ZZ2": 0.18, "YY2": 0.18}))):
+    for k, (name, load) in enumerate(
+        (("empty.csv", {}), ("loaded.csv", {"M2": 2.0, "MX2": 0.6, "ZZ2": 0.18, "YY2": 0.18}))
+    ):
         w = np.array([[0.9, 2.3, 5.1], [1.1, 2.9, 6.3]])[:, :, None] + 0.1 * k
         a = np.array([1.2, 0.6, 0.2])[:, None]
-        q, qd, qdd = ((a * f).sum(axis=1).T for f in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)))
+        q, qd, qdd = (
+            (a * f).sum(axis=1).T
+            for f in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
+        )
         value = {name: arm.VALUES[name] + load.get(name, 0.0) for name in arm.STANDARD_PARAMETERS}
         tau = arm.inverse_dynamics(q, qd, qdd, arm.base_parameters(value))
         tau = (tau + 0.1 * np.random.default_rng(k).standard_normal(tau.shape)) / 1.25
-        np.savetxt(place / name, np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+        np.savetxt(
+            place / name,
+            np.column_stack([t, q, tau]),
+            delimiter=",",
+            header="t,q1,q2,tau1,tau2",
+            comments="",
+        )
     return place
 
 
@@ -50,13 +65,22 @@ def run(folder, text: str, *options: str):
 def test_load_and_torque_constants(folder, tmp_path) -> None:
     result = run(folder, LOAD, "-o", str(tmp_path / "out"))
     assert result.exit_code == 0, result.output
-    assert "load on link 2" in result.output and "every gain is determined by the load" in result.output
+    assert (
+        "load on link 2" in result.output
+        and "every gain is determined by the load" in result.output
+    )
     found = json.loads((tmp_path / "out" / "estimate.json").read_text())
     np.testing.assert_allclose(found["drive_gains"]["together"], 1.25, rtol=0.01)
-    assert found["payload"]["known"] == {"M": 2.0} and set(found["payload"]["parameters"]) == {"ZZ", "MX", "MY"}
+    assert found["payload"]["known"] == {"M": 2.0} and set(found["payload"]["parameters"]) == {
+        "ZZ",
+        "MX",
+        "MY",
+    }
     report = (tmp_path / "out" / "report.html").read_text()
     assert "Load on link 2" in report and "Factors on the torque constants" in report
-    again = CliRunner().invoke(app, ["identify", "planar_2r", str(tmp_path / "out" / "study.yaml"), "--json"])
+    again = CliRunner().invoke(
+        app, ["identify", "planar_2r", str(tmp_path / "out" / "study.yaml"), "--json"]
+    )
     assert again.exit_code == 0 and json.loads(again.stdout)["payload"] == found["payload"]
 
 
@@ -66,8 +90,13 @@ def test_feasible(folder, tmp_path) -> None:
     assert result.exit_code == 0, result.output
     assert "smallest eigenvalue" in result.output and "physically feasible" in result.output
     found = json.loads((tmp_path / "out" / "estimate.json").read_text())
-    assert found["method"] == "feasible" and min(found["details"]["smallest_eigenvalues"].values()) > 0
-    standard = dict(line.split(",")[:2] for line in (tmp_path / "out" / "standard_parameters.csv").read_text().splitlines()[1:])
+    assert (
+        found["method"] == "feasible" and min(found["details"]["smallest_eigenvalues"].values()) > 0
+    )
+    standard = dict(
+        line.split(",")[:2]
+        for line in (tmp_path / "out" / "standard_parameters.csv").read_text().splitlines()[1:]
+    )
     assert float(standard["M1"]) + float(standard["M2"]) == pytest.approx(4.0)
     assert "Physical consistency" in (tmp_path / "out" / "report.html").read_text()
 
@@ -89,10 +118,14 @@ def test_bad_input_is_one_line_and_exit_code_2(folder, text: str, said: str) -> 
 def test_friction_and_physical_options(folder, tmp_path) -> None:
     result = run(folder, "", "-o", str(tmp_path / "out"), "--friction", "--physical")
     assert result.exit_code == 0, result.output
-    assert "The parameters are physically feasible" in result.output and "held out %" in result.output
+    assert (
+        "The parameters are physically feasible" in result.output and "held out %" in result.output
+    )
     found = json.loads((tmp_path / "out" / "estimate.json").read_text())
     assert found["feasibility"]["feasible"] and found["feasibility"]["margin"] > 0
-    assert [curve["joint"] for curve in found["friction"]] == ["1", "2"] and len(found["friction"][0]["laws"]) == 5
+    assert [curve["joint"] for curve in found["friction"]] == ["1", "2"] and len(
+        found["friction"][0]["laws"]
+    ) == 5
     assert (tmp_path / "out" / "friction.png").read_bytes()[:4] == b"\x89PNG"
     report = (tmp_path / "out" / "report.html").read_text()
     assert "Friction curves" in report and "Physical consistency" in report

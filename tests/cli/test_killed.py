@@ -1,4 +1,6 @@
-"""Results in a folder: killed before every act on the file system, two commands at once, full disks."""
+"""Results in a folder: killed before every act on the file system, two commands at once, full
+disks.
+"""
 
 import os
 import resource
@@ -27,7 +29,11 @@ def forked(work):
 
 
 def texts(folder):
-    return {path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name != LOCK}
+    return {
+        path.name: path.read_text()
+        for path in folder.iterdir()
+        if path.is_file() and path.name != LOCK
+    }
 
 
 def killed_before(act, folder):
@@ -67,7 +73,9 @@ def test_killed_before_every_act(tmp_path):
             assert found in (OLD, NEW)
             seen.add(found["a.txt"])
         write_all(folder, {"d.txt": "another"})
-        assert texts(folder) in ({**state, "d.txt": "another", "notes.txt": "of the user"} for state in (OLD, NEW))
+        assert texts(folder) in (
+            {**state, "d.txt": "another", "notes.txt": "of the user"} for state in (OLD, NEW)
+        )
         assert not [name for name in (LOCK, UNFINISHED, FINISHED) if (folder / name).exists()]
         act += 1
     assert seen == {"old", "new", "to complete"} and act > 8
@@ -84,7 +92,10 @@ def test_second_command_is_told_who_writes_and_a_killed_one_is_no_obstacle(tmp_p
         os._exit(0)
     try:
         assert os.read(read, 4) == b"held"
-        with pytest.raises(OutputError, match=f"process {child} on .* since .* UTC"), reserved(tmp_path / "out"):
+        with (
+            pytest.raises(OutputError, match=f"process {child} on .* since .* UTC"),
+            reserved(tmp_path / "out"),
+        ):
             pass
     finally:
         os.kill(child, signal.SIGKILL)
@@ -110,7 +121,9 @@ def test_two_at_once_do_not_mix(tmp_path):
             os._exit(0)
         children.append(child)
     assert [os.waitpid(child, 0)[1] for child in children] == [0, 0]
-    assert len(set(texts(tmp_path).values())) == 1 and sorted(p.name for p in tmp_path.iterdir()) == list(NAMES)
+    assert len(set(texts(tmp_path).values())) == 1 and sorted(
+        p.name for p in tmp_path.iterdir()
+    ) == list(NAMES)
 
 
 def test_a_limit_of_file_sizes_leaves_the_old_files(tmp_path):
@@ -128,7 +141,12 @@ def test_a_limit_of_file_sizes_leaves_the_old_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("place", "words"), [("file/out", "a file is where a folder"), ("file", "a file is where a folder"), ("x" * 300, "shorter name")]
+    ("place", "words"),
+    [
+        ("file/out", "a file is where a folder"),
+        ("file", "a file is where a folder"),
+        ("x" * 300, "shorter name"),
+    ],
 )
 def test_places_that_cannot_be_written(place, words, tmp_path):
     (tmp_path / "file").write_text("mine")
@@ -166,7 +184,16 @@ for verb, arguments in {LONG}.items():
     assert done.exit_code == 2 and done.stderr.startswith("error: file: cannot be written: File exists") and done.stderr.count("\\n") == 1, done.output
 print(*sys.modules)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
-    assert not {name.partition(".")[0] for name in done.stdout.split()} & {"numpy", "scipy", "casadi", "matplotlib"}
-    assert [path.name for path in tmp_path.iterdir()] == ["file"] and (tmp_path / "file").read_text() == "mine"
+    assert not {name.partition(".")[0] for name in done.stdout.split()} & {
+        "numpy",
+        "scipy",
+        "casadi",
+        "matplotlib",
+    }
+    assert [path.name for path in tmp_path.iterdir()] == ["file"] and (
+        tmp_path / "file"
+    ).read_text() == "mine"

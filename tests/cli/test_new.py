@@ -22,11 +22,19 @@ def test_never_overwrites(tmp_path):
     file = tmp_path / "my_arm.yaml"
     file.write_text("mine")
     result = run("new", file)
-    assert result.exit_code == 2 and "exists already" in result.stderr and file.read_text() == "mine"
+    assert (
+        result.exit_code == 2 and "exists already" in result.stderr and file.read_text() == "mine"
+    )
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("2arm.yaml", "letter"), ("my arm.yaml", "letter"), ("arm.txt", ".yaml"), ("class.yaml", "word of Python")]
+    ("name", "words"),
+    [
+        ("2arm.yaml", "letter"),
+        ("my arm.yaml", "letter"),
+        ("arm.txt", ".yaml"),
+        ("class.yaml", "word of Python"),
+    ],
 )
 def test_bad_names(name, words, tmp_path):
     result = run("new", tmp_path / name)

@@ -1,4 +1,6 @@
-"""`symgen report`: every part in one folder, parts that cannot be done named with their reason, exit codes."""
+"""`symgen report`: every part in one folder, parts that cannot be done named with their reason,
+exit codes.
+"""
 
 import json
 
@@ -10,7 +12,16 @@ from typer.testing import CliRunner
 from runtime.settings.files import load_study
 from symgen.cli.main import app
 
-FILES = {"report.html", "estimate.json", "parameters.csv", "study.yaml", "torques.png", "friction.png", "advice.json", "cestac.json"}
+FILES = {
+    "report.html",
+    "estimate.json",
+    "parameters.csv",
+    "study.yaml",
+    "torques.png",
+    "friction.png",
+    "advice.json",
+    "cestac.json",
+}
 
 
 def run(*arguments):
@@ -23,7 +34,11 @@ def record(tmp_path):
     rng, t = np.random.default_rng(3), np.arange(3000) / 1000
     q = np.column_stack([np.sin(5 * t), np.cos(7 * t) + 0.3 * np.sin(3 * t)])
     np.savetxt(
-        tmp_path / "record.csv", np.column_stack([t, q, rng.normal(size=(3000, 2))]), delimiter=",", header="t,q1,q2,tau1,tau2", comments=""
+        tmp_path / "record.csv",
+        np.column_stack([t, q, rng.normal(size=(3000, 2))]),
+        delimiter=",",
+        header="t,q1,q2,tau1,tau2",
+        comments="",
     )
     return tmp_path / "record.csv"
 
@@ -35,14 +50,23 @@ def test_measured_record_of_one_joint(emps_data, tmp_path):
     assert result.stdout.startswith("Yes. The model of emps with 4 of 4 parameters leaves")
     assert {path.name for path in (tmp_path / "out").iterdir()} >= FILES
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    for words in ("physically feasible", "Friction curves", "Resolution advice", "Resolution study", "95.109", "SHA-256"):
+    for words in (
+        "physically feasible",
+        "Friction curves",
+        "Resolution advice",
+        "Resolution study",
+        "95.109",
+        "SHA-256",
+    ):
         assert words in html
     assert "Not done" not in html
 
 
 def test_noise_is_not_for_use(record, tmp_path):
     """With a method that no prediction of the resolution knows: it is said, the rest is there."""
-    (tmp_path / "study.yaml").write_text("symgen: 1\nrecord: {files: [record.csv]}\nestimate: {method: irls}\n")
+    (tmp_path / "study.yaml").write_text(
+        "symgen: 1\nrecord: {files: [record.csv]}\nestimate: {method: irls}\n"
+    )
     result = run("planar_2r", tmp_path / "study.yaml", "-o", tmp_path / "out", "--json")
     assert result.exit_code == 1, result.output
     judgement = json.loads(result.stdout)
@@ -57,13 +81,19 @@ def test_record_that_determines_nothing(record, tmp_path):
     table[:, 2] = 0
     np.savetxt(record, table, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
     result = run("planar_2r", record, "-o", tmp_path / "out")
-    assert result.exit_code == 1 and "not told apart" in result.stdout and "does not determine" in result.stderr
+    assert (
+        result.exit_code == 1
+        and "not told apart" in result.stdout
+        and "does not determine" in result.stderr
+    )
     assert "✕</span> No" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 @campaign
 def test_encoders_at_the_motors(emps_data, tmp_path):
-    """The step of --encoder is one of the motors where --side says so, in the words of the verdict and in study.yaml."""
+    """The step of --encoder is one of the motors where --side says so, in the words of the verdict
+    and in study.yaml.
+    """
     result = run("emps", "emps", "-o", tmp_path / "out", "--encoder", "1e-6", "--side", "motor")
     assert result.exit_code in (0, 1), result.output
     assert "at the motors" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -82,4 +112,8 @@ def test_read_by_blocks(record, tmp_path):
 
 def test_bad_step_is_told(record, tmp_path):
     result = run("planar_2r", record, "-o", tmp_path / "out", "--encoder", "-1")
-    assert result.exit_code == 2 and "expected more than 0" in result.stderr and not (tmp_path / "out").exists()
+    assert (
+        result.exit_code == 2
+        and "expected more than 0" in result.stderr
+        and not (tmp_path / "out").exists()
+    )

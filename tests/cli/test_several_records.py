@@ -1,4 +1,6 @@
-"""Several records fitted together: by the command line, by `also`, by a list; the same numbers each way, and the error of each."""
+"""Several records fitted together: by the command line, by `also`, by a list; the same numbers each
+way, and the error of each.
+"""
 
 import json
 
@@ -11,8 +13,8 @@ from runtime import load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.identification.record_errors import record_errors
-from runtime.observation.observation import observe
 from runtime.records.reading_by_blocks import open_streams
+from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 
@@ -26,21 +28,36 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("records")
     result = CliRunner().invoke(app, ["generate", "planar_2r", "-o", str(folder)])
     assert result.exit_code == 0, result.output
-    model = load_model(folder / "planar_2r.py")
+    model = load_model(folder / "planar_2r.py", trust=True)
     X = 1 + np.arange(len(model.BASE_PARAMETERS)) / 10
     rng = np.random.default_rng(0)
     for name, (a, b), wrong in zip("abc", PARTS, (1, 1.1, 1), strict=True):
         t = np.arange(a, b, 1 / RATE)
         w = np.array([2.1, 5.3, 9.7])
         phase = np.multiply.outer(t, w)[:, None] + np.array([[0.1, 1, 2], [0.7, 2, 0.4]])
-        q, qd, qdd = (f(phase) @ (0.5 * w**k) for k, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x))))
+        q, qd, qdd = (
+            f(phase) @ (0.5 * w**k) for k, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x)))
+        )
         tau = wrong * model.inverse_dynamics(q, qd, qdd, X) + rng.normal(0, 0.05, q.shape)
         table = np.column_stack([t - a, np.degrees(q), tau])
-        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.17g")
+        np.savetxt(
+            folder / f"{name}.csv",
+            table,
+            delimiter=",",
+            header="t,q1,q2,tau1,tau2",
+            comments="",
+            fmt="%.17g",
+        )
     record = {"files": ["a.csv"], "units": {"q": "deg"}}
     lists = [{**record, "files": [f"{name}.csv"]} for name in "abc"]
-    for name, content in (("one", record), ("also", {**record, "also": ["b.csv", "c.csv"]}), ("list", lists)):
-        (folder / f"{name}.yaml").write_text(json.dumps({"record": content, "signals": {"lowpass": {"cutoff": 20}}}))
+    for name, content in (
+        ("one", record),
+        ("also", {**record, "also": ["b.csv", "c.csv"]}),
+        ("list", lists),
+    ):
+        (folder / f"{name}.yaml").write_text(
+            json.dumps({"record": content, "signals": {"lowpass": {"cutoff": 20}}})
+        )
     return folder
 
 
@@ -56,51 +73,90 @@ def test_every_way_gives_the_same_numbers(folder):
     for study in ("also", "list"):
         found = identified(folder / f"{study}.yaml")
         assert (found["X"], found["by_record"]) == (by_line["X"], by_line["by_record"])
-    assert by_line["provenance"]["records"] == ["a", "b", "c"] and set(by_line["provenance"]["files"]) == {"a.csv", "b.csv", "c.csv"}
+    assert by_line["provenance"]["records"] == ["a", "b", "c"] and set(
+        by_line["provenance"]["files"]
+    ) == {"a.csv", "b.csv", "c.csv"}
     assert "2000 samples, median step 0.002 s" in by_line["provenance"]["time"]["a"]
     assert sum(record["rows"] for record in by_line["by_record"]) == by_line["rows"]
 
 
 def test_the_record_that_does_not_fit_is_seen(folder, tmp_path):
     result = CliRunner().invoke(
-        app, ["identify", "planar_2r", *(str(folder / x) for x in ("one.yaml", "b.csv", "c.csv")), "-o", str(tmp_path)]
+        app,
+        [
+            "identify",
+            "planar_2r",
+            *(str(folder / x) for x in ("one.yaml", "b.csv", "c.csv")),
+            "-o",
+            str(tmp_path),
+        ],
     )
     assert result.exit_code == 0, result.output
-    a, b, c = (record["relative_error"] for record in json.loads((tmp_path / "estimate.json").read_text())["by_record"])
+    a, b, c = (
+        record["relative_error"]
+        for record in json.loads((tmp_path / "estimate.json").read_text())["by_record"]
+    )
     assert b > 1.3 * max(a, c)
     assert "error in b: " in result.output and "Time stamps of c: 2000 samples" in result.output
-    assert "Relative error by record and joint" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Relative error by record and joint" in (tmp_path / "report.html").read_text(
+        encoding="utf-8"
+    )
     again = identified(tmp_path / "study.yaml")
     assert [record["name"] for record in again["by_record"]] == ["a", "b", "c"]
 
 
 def test_errors_by_blocks_are_those_in_memory(folder):
-    whole, blocks = identified(folder / "also.yaml"), identified(folder / "also.yaml", "--block", 300)
+    whole, blocks = (
+        identified(folder / "also.yaml"),
+        identified(folder / "also.yaml", "--block", 300),
+    )
     for one, other in zip(whole["by_record"], blocks["by_record"], strict=True):
         assert (one["name"], one["rows"]) == (other["name"], other["rows"])
-        np.testing.assert_allclose([one["relative_error"], *one["per_joint"]], [other["relative_error"], *other["per_joint"]], rtol=1e-7)
+        np.testing.assert_allclose(
+            [one["relative_error"], *one["per_joint"]],
+            [other["relative_error"], *other["per_joint"]],
+            rtol=1e-7,
+        )
 
 
 def test_errors_of_records_add_up(folder, monkeypatch):
     """Squares of the residuals of the records are that of all."""
-    model = load_model(folder / "planar_2r.py")
+    model = load_model(folder / "planar_2r.py", trust=True)
     record = {"files": ["a.csv"], "also": ["b.csv", "c.csv"], "units": {"q": "deg"}}
     study = study_from_mapping({"record": record, "stream": 1000})
     streams = open_streams(study.record, model, folder=folder)
-    monkeypatch.setattr("runtime.observation.observation.HELD", 0)
+    monkeypatch.setattr("runtime.rows.observe.HELD", 0)
     reduction = observe(model, streams, study)
     fit = essential_of(reduction, study.essential, study.estimate, model=model).all_parameters
     parts = record_errors(reduction, fit, [stream.name for stream in streams])
     sizes = [
-        np.linalg.norm(np.concatenate([j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints]))
+        np.linalg.norm(
+            np.concatenate(
+                [j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints]
+            )
+        )
         for k in range(3)
     ]
-    total = np.sqrt(sum((part.relative_error / 100 * size) ** 2 for part, size in zip(parts, sizes, strict=True)))
+    total = np.sqrt(
+        sum(
+            (part.relative_error / 100 * size) ** 2 for part, size in zip(parts, sizes, strict=True)
+        )
+    )
     assert total == pytest.approx(fit.residual_norm, rel=1e-10)
 
 
 def test_cestac_takes_several(folder):
-    arguments = ["cestac", "planar_2r", str(folder / "one.yaml"), str(folder / "c.csv"), "--runs", "2", "--delta", "1e-6", "--json"]
+    arguments = [
+        "cestac",
+        "planar_2r",
+        str(folder / "one.yaml"),
+        str(folder / "c.csv"),
+        "--runs",
+        "2",
+        "--delta",
+        "1e-6",
+        "--json",
+    ]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["provenance"]["records"] == ["a", "c"]
@@ -115,20 +171,33 @@ def test_cestac_takes_several(folder):
     ],
 )
 def test_refused(folder, arguments, said):
-    result = CliRunner().invoke(app, ["identify", "planar_2r", *(str(folder / x) for x in arguments)])
+    result = CliRunner().invoke(
+        app, ["identify", "planar_2r", *(str(folder / x) for x in arguments)]
+    )
     assert result.exit_code == 2 and said in " ".join(result.output.split()).lower()
 
 
 def test_pairs_of_files():
-    given = {"files": ["q1.csv", "tau1.csv"], "also": [["q2.csv", "tau2.csv"], ["q3.csv", "tau3.csv"]], "name": "first", "side": "motor"}
+    given = {
+        "files": ["q1.csv", "tau1.csv"],
+        "also": [["q2.csv", "tau2.csv"], ["q3.csv", "tau3.csv"]],
+        "name": "first",
+        "side": "motor",
+    }
     records = study_from_mapping({"record": given}).record
     assert [(r.files, r.name, r.side, r.also) for r in records] == [
         (("q1.csv", "tau1.csv"), "first", "motor", ()),
         (("q2.csv", "tau2.csv"), None, "motor", ()),
         (("q3.csv", "tau3.csv"), None, "motor", ()),
     ]
-    with pytest.raises(SettingsError, match=r"record\[0\]\.also\[1\]: 1 files; expected 2|record\.also\[1\]: 1 files; expected 2"):
+    with pytest.raises(
+        SettingsError,
+        match=r"record\[0\]\.also\[1\]: 1 files; expected 2|record\.also\[1\]: 1 files; expected 2",
+    ):
         study_from_mapping({"record": {**given, "also": [["q2.csv", "tau2.csv"], "q3.csv"]}})
     for section in ("validate", "payload"):
-        found = getattr(study_from_mapping({section: {"record": {"files": "a.csv", "also": ["b.csv"]}}}), section)
+        found = getattr(
+            study_from_mapping({section: {"record": {"files": "a.csv", "also": ["b.csv"]}}}),
+            section,
+        )
         assert [r.files for r in found.record] == [("a.csv",), ("b.csv",)]

@@ -1,17 +1,25 @@
-"""The `values` of the packaged haptic interface: a consistent branch whose base parameters are those of Table 6 of the chapter.
+"""The `values` of the packaged haptic interface: a consistent branch whose base parameters are
+those of Table 6 of the chapter.
 
-Run `python tests/description/make_haptic_values.py` (pip install cvxpy) and paste its output into `symgen/description/robots/haptic.yaml`.
+Run `python tests/description/make_haptic_values.py` (pip install cvxpy) and paste its output into
+`symgen/description/robots/haptic.yaml`.
 
-Table 6 fixes fourteen base parameters; infinitely many branches have them. This one is nearest to a prior of six homogeneous boxes, in the
+Table 6 fixes fourteen base parameters; infinitely many branches have them. This one is nearest to a
+prior of six homogeneous boxes, in the
 coordinate-free distance of their pseudo-inertias P_j (4x4, about the link frame origin):
 
     min  sum_j ||P0_j^-1/2 (P_j - P0_j) P0_j^-1/2||^2 + sum_k (Ia_k/Ia0_k - 1)^2
-    s.t. P_j - P0_j/4 psd,  the nine inertial base parameters of Table 6 as printed,  those it leaves out at most LEFT_OUT .
+    s.t. P_j - P0_j/4 psd,  the nine inertial base parameters of Table 6 as printed,  those it
+    leaves out at most LEFT_OUT .
 
-Lengths, sizes and masses are guesses: an arm of 0.2 m, balanced by a mass behind the shoulder (MX2R < 0), a forearm of 0.22 m, balanced by a
-mass on the crank (MX5R > MX3R), no handle. Friction of the pivots is split by guess. The chapter says that what it left out perturbs nothing when it
-is removed: LEFT_OUT, FV and OFFSET1 are so small that this holds in the simulated record of the demonstration (1e-5 kg m weighs 1e-4 N m).
-After rounding, the parameter that gives each base parameter its name is set so that the equalities hold in exact arithmetic.
+Lengths, sizes and masses are guesses: an arm of 0.2 m, balanced by a mass behind the shoulder (MX2R
+< 0), a forearm of 0.22 m, balanced by a
+mass on the crank (MX5R > MX3R), no handle. Friction of the pivots is split by guess. The chapter
+says that what it left out perturbs nothing when it
+is removed: LEFT_OUT, FV and OFFSET1 are so small that this holds in the simulated record of the
+demonstration (1e-5 kg m weighs 1e-4 N m).
+After rounding, the parameter that gives each base parameter its name is set so that the equalities
+hold in exact arithmetic.
 """
 
 from __future__ import annotations
@@ -25,7 +33,8 @@ D3, D4, D6 = Fraction("0.2"), Fraction("0.22"), Fraction("0.1")  # m
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 MASSES = {f"M{j}" for j in range(1, 7)}
 TABLE_6 = {
-    "ZZ1R": "0.051", "MY1R": "0.024", "XX2R": "-0.023", "ZZ2R": "0.029", "MX2R": "-0.019", "XX3R": "-0.011", "ZZ3R": "0.014",
+    "ZZ1R": "0.051", "MY1R": "0.024", "XX2R": "-0.023", "ZZ2R": "0.029", "MX2R": "-0.019",
+    "XX3R": "-0.011", "ZZ3R": "0.014",
     "MX3R": "0.039", "MX5R": "0.068",
 }  # fmt: skip
 PRIOR = {  # link: mass kg, centre m, edges m, in the link frame
@@ -37,7 +46,8 @@ PRIOR = {  # link: mass kg, centre m, edges m, in the link frame
     6: (0.1, (0.1000, 0.0003, -0.0020), (0.20, 0.02, 0.02)),
 }
 ACTUATORS = {"Ia1": 0.004, "Ia2": 0.004, "Ia5": 0.0015}  # priors, kg m^2
-LEFT_OUT = 1e-5  # largest absolute value of an inertial base parameter that Table 6 leaves out, kg m^2 or kg m
+# largest absolute value of an inertial base parameter that Table 6 leaves out, kg m^2 or kg m
+LEFT_OUT = 1e-5
 GIVEN = {  # Table 6: FS1, FS2R, FS5R, OFFSET2, OFFSET5; the rest assumed
     "FS1": 0.12, "FS2": 0.09, "FSP2": 0.02, "FS4": 0.005, "FS5": 0.085, "FSP5": 0.02,
     "FV1": 0.0002, "FV2": 0.0001, "FVP2": 0.00002, "FV4": 0.00001, "FV5": 0.0001, "FVP5": 0.00002,
@@ -46,7 +56,9 @@ GIVEN = {  # Table 6: FS1, FS2R, FS5R, OFFSET2, OFFSET5; the rest assumed
 
 
 def box(mass, centre, edges):
-    """Pseudo-inertia about the frame origin of a homogeneous box: second moments S, first moments, mass."""
+    """Pseudo-inertia about the frame origin of a homogeneous box: second moments S, first moments,
+    mass.
+    """
     c = np.array(centre)
     S = mass * (np.diag(np.square(edges)) / 12 + np.outer(c, c))
     return np.block([[S, mass * c[:, None]], [mass * c[None, :], np.array([[mass]])]])
@@ -54,11 +66,24 @@ def box(mass, centre, edges):
 
 def parameters(P):
     """XX .. M of a pseudo-inertia: I = tr(S) 1 - S."""
-    return [P[1, 1] + P[2, 2], -P[0, 1], -P[0, 2], P[0, 0] + P[2, 2], -P[1, 2], P[0, 0] + P[1, 1], P[0, 3], P[1, 3], P[2, 3], P[3, 3]]
+    return [
+        P[1, 1] + P[2, 2],
+        -P[0, 1],
+        -P[0, 2],
+        P[0, 0] + P[2, 2],
+        -P[1, 2],
+        P[0, 0] + P[1, 1],
+        P[0, 3],
+        P[1, 3],
+        P[2, 3],
+        P[3, 3],
+    ]
 
 
 def regrouped(p, d3, d4, d6):
-    """The inertial base parameters for q4 = -q5 (c = 0), from symgen's own formulas; the test evaluates those afresh."""
+    """The inertial base parameters for q4 = -q5 (c = 0), from symgen's own formulas; the test
+    evaluates those afresh.
+    """
     M34 = p["M3"] + p["M4"]
     return {
         "ZZ1R": p["ZZ1"]
@@ -115,15 +140,21 @@ def solve():
         cost += cp.square(factor - 1)
     base = regrouped(chi, float(D3), float(D4), float(D6))
     constraints += [1e3 * base[name] == 1e3 * float(value) for name, value in TABLE_6.items()]
-    constraints += [1e3 * cp.abs(base[name]) <= 1e3 * LEFT_OUT for name in base.keys() - TABLE_6.keys()]
+    constraints += [
+        1e3 * cp.abs(base[name]) <= 1e3 * LEFT_OUT for name in base.keys() - TABLE_6.keys()
+    ]
     problem = cp.Problem(cp.Minimize(cost), constraints)
     problem.solve(solver=cp.CLARABEL)
     return {name: float(value.value) for name, value in chi.items()}
 
 
 def rounded(chi):
-    """Few digits, and the equalities exact: each parameter that is changed occurs in one of them only."""
-    exact = {name: Fraction(f"{value:.{4 if name in MASSES else 7}f}") for name, value in chi.items()}
+    """Few digits, and the equalities exact: each parameter that is changed occurs in one of them
+    only.
+    """
+    exact = {
+        name: Fraction(f"{value:.{4 if name in MASSES else 7}f}") for name, value in chi.items()
+    }
     rest = regrouped(exact, D3, D4, D6)
     for base, printed in TABLE_6.items():
         exact[base.removesuffix("R")] += Fraction(printed) - rest[base]
@@ -134,10 +165,18 @@ def main():
     values = rounded(solve())
     for j in PRIOR:
         for k, families in enumerate((INERTIAL[:6], INERTIAL[6:], ("Ia", "FV", "FS", "OFFSET"))):
-            row = ", ".join(f"{name}: {values[name]!r}" for name in (f"{family}{j}" for family in families) if name in values)
+            row = ", ".join(
+                f"{name}: {values[name]!r}"
+                for name in (f"{family}{j}" for family in families)
+                if name in values
+            )
             if row:
                 print(("  {" if (j, k) == (1, 0) else "   ") + row + ",")
-    print("   " + ", ".join(f"{name}: {values[name]!r}" for name in ("FVP2", "FVP5", "FSP2", "FSP5")) + "}")
+    print(
+        "   "
+        + ", ".join(f"{name}: {values[name]!r}" for name in ("FVP2", "FVP5", "FSP2", "FSP5"))
+        + "}"
+    )
 
 
 if __name__ == "__main__":

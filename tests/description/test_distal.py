@@ -1,4 +1,6 @@
-"""Distal (classic) tables: the converted robot has the poses of the classic matrix product, and the torques that go with them."""
+"""Distal (classic) tables: the converted robot has the poses of the classic matrix product, and the
+torques that go with them.
+"""
 
 import numpy as np
 import pytest
@@ -10,31 +12,52 @@ from symgen.description import parse_robot, write_yaml
 from symgen.errors import DescriptionError
 
 # PUMA 560 in the classic convention, as printed in textbooks: alpha, a, d; a and d in m
-PUMA = ((90, 0, 0), (0, 0.4318, 0), (-90, 0.0203, 0.15005), (90, 0, 0.4318), (-90, 0, 0), (0, 0, 0.05625))
+PUMA = (
+    (90, 0, 0),
+    (0, 0.4318, 0),
+    (-90, 0.0203, 0.15005),
+    (90, 0, 0.4318),
+    (-90, 0, 0),
+    (0, 0, 0.05625),
+)
 
 
 def table(rows, sigma=(), ant=(), head="convention: distal"):
-    """Text of a robot file from rows of alpha (degrees), a, d; theta offsets 0.1 j on prismatic joints."""
+    """Text of a robot file from rows of alpha (degrees), a, d; theta offsets 0.1 j on prismatic
+    joints.
+    """
     lines = ["symgen: 1", "name: arm", head, "gravity: [0, 0, -9.81]", "frames:"]
     for j, (alpha, a, d) in enumerate(rows, start=1):
         prismatic = bool(sigma) and sigma[j - 1] == 1
         theta, r = (f"0.1*{j}", f"q{j} + {d}") if prismatic else (f"q{j}", d)
         i = ant[j - 1] if ant else j - 1
-        lines.append(f"  {j}: {{ant: {i}, sigma: {int(prismatic)}, alpha: {alpha}*pi/180, d: {a}, theta: {theta}, r: {r}}}")
+        lines.append(
+            f"  {j}: {{ant: {i}, sigma: {int(prismatic)}, alpha: {alpha}*pi/180, d: {a}, theta: "
+            f"{theta}, r: {r}}}"
+        )
     return "\n".join(lines)
 
 
 def classic(alpha, a, d, theta):
     """Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), written out as in textbooks."""
     ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-    return np.array([[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]])
+    return np.array(
+        [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0, sa, ca, d],
+            [0, 0, 0, 1],
+        ]
+    )
 
 
 def product(rows, sigma, q):
     T = np.eye(4)
     for j, ((alpha, a, d), x) in enumerate(zip(rows, q, strict=True), start=1):
         prismatic = bool(sigma) and sigma[j - 1] == 1
-        T = T @ classic(np.radians(alpha), a, d + x if prismatic else d, 0.1 * j if prismatic else x)
+        T = T @ classic(
+            np.radians(alpha), a, d + x if prismatic else d, 0.1 * j if prismatic else x
+        )
     return T
 
 
@@ -42,34 +65,54 @@ def product(rows, sigma, q):
 def test_last_frame_is_that_of_the_classic_product(seed):
     rng = np.random.default_rng(seed)
     n = 6 if seed == 0 else int(rng.integers(2, 7))
-    rows = PUMA if seed == 0 else [(int(rng.integers(-180, 180)), *(rng.integers(-9, 9, 2) / 10)) for _ in range(n)]
+    rows = (
+        PUMA
+        if seed == 0
+        else [(int(rng.integers(-180, 180)), *(rng.integers(-9, 9, 2) / 10)) for _ in range(n)]
+    )
     sigma = (0,) * 6 if seed == 0 else tuple(rng.integers(0, 2, n))
     robot = parse_robot(table(rows, sigma).encode(), "arm.yaml")
     q = rng.uniform(-2, 2, n)
     assert len(robot.frames) == n + any(rows[-1][:2])
-    np.testing.assert_allclose(Lagrange(robot).poses(q[None])[0, -1], product(rows, sigma, q), atol=1e-13)
+    np.testing.assert_allclose(
+        Lagrange(robot).poses(q[None])[0, -1], product(rows, sigma, q), atol=1e-13
+    )
 
 
 def test_torques_of_the_puma():
-    """Weights of the links from the classic transformations, by the principle of virtual work; the whole model by pinocchio."""
+    """Weights of the links from the classic transformations, by the principle of virtual work; the
+    whole model by pinocchio.
+    """
     robot = parse_robot(table(PUMA).encode(), "puma.yaml")
     chi, model, oracle = random_parameters(robot, 3), Lagrange(robot), PinocchioModel(robot)
     rng = np.random.default_rng(4)
     q, qd, qdd = rng.standard_normal((3, 6))
-    np.testing.assert_allclose(model.torque(q[None], qd[None], qdd[None], chi)[0], oracle.torque(q, qd, qdd, chi), rtol=1e-10)
+    np.testing.assert_allclose(
+        model.torque(q[None], qd[None], qdd[None], chi)[0],
+        oracle.torque(q, qd, qdd, chi),
+        rtol=1e-10,
+    )
     value, h = dict(zip(robot.parameters, chi, strict=True)), 1e-6
 
     def potential(x):
-        """9.81 times the sum of M z + MS_z: Khalil's frame j before Trans(x, a) Rot(x, alpha) of the classic frame j."""
+        """9.81 times the sum of M z + MS_z: Khalil's frame j before Trans(x, a) Rot(x, alpha) of
+        the classic frame j.
+        """
         total = 0.0
         for j in range(1, 7):
             alpha, a, _ = PUMA[j - 1]
-            T = product(PUMA[:j], (), x[:j]) @ np.linalg.inv(classic(np.radians(alpha), a, 0.0, 0.0))
-            total += 9.81 * (T[2, :3] @ [value[f"{p}{j}"] for p in ("MX", "MY", "MZ")] + T[2, 3] * value[f"M{j}"])
+            T = product(PUMA[:j], (), x[:j]) @ np.linalg.inv(
+                classic(np.radians(alpha), a, 0.0, 0.0)
+            )
+            total += 9.81 * (
+                T[2, :3] @ [value[f"{p}{j}"] for p in ("MX", "MY", "MZ")] + T[2, 3] * value[f"M{j}"]
+            )
         return total
 
     slope = [(potential(q + h * e) - potential(q - h * e)) / (2 * h) for e in np.eye(6)]
-    np.testing.assert_allclose(model.gravity(q[None], chi)[0], slope, atol=1e-6)  # central differences
+    np.testing.assert_allclose(
+        model.gravity(q[None], chi)[0], slope, atol=1e-6
+    )  # central differences
 
 
 def test_branches_start_at_the_far_end():

@@ -94,16 +94,24 @@ def test_outside_the_grammar(text):
     with pytest.raises(ExpressionError) as caught:
         parse(text, set("abcdefg"))
     assert caught.value.column is not None
-    assert "found" in str(caught.value) or "expect" in str(caught.value) or len(str(caught.value)) > 20
+    assert (
+        "found" in str(caught.value) or "expect" in str(caught.value) or len(str(caught.value)) > 20
+    )
 
 
 def test_undeclared_symbol_lists_the_declared_ones():
-    with pytest.raises(ExpressionError, match=r"undeclared symbol 'L2'; declared here: D2, g at column 5"):
+    with pytest.raises(
+        ExpressionError, match=r"undeclared symbol 'L2'; declared here: D2, g at column 5"
+    ):
         parse("2 * L2", {"D2", "g"})
 
 
 SYMBOLS = {"a": 0.7, "b": -1.3, "D3": 0.225}
-ATOMS = st.sampled_from([*SYMBOLS, "pi"]) | st.integers(0, 9).map(str) | st.decimals(0, 9, places=2).map(str)
+ATOMS = (
+    st.sampled_from([*SYMBOLS, "pi"])
+    | st.integers(0, 9).map(str)
+    | st.decimals(0, 9, places=2).map(str)
+)
 TEXTS = st.recursive(
     ATOMS,
     lambda inner: st.one_of(
@@ -123,9 +131,15 @@ def test_value_and_round_trip(text):
     except ExpressionError as error:
         assert "expands" in str(error)
         return
-    expected = eval(text, {"__builtins__": {}, "sin": math.sin, "cos": math.cos, "pi": math.pi}, SYMBOLS)  # noqa: S307  the test's own text
-    scale = max(1.0, sum(abs(Expression({m: c}).value(SYMBOLS)) for m, c in e.terms.items()), abs(expected))
-    assert math.isclose(e.value(SYMBOLS), expected, abs_tol=1e-9 * scale)  # sums of a few dozen rounded terms
+    expected = eval(  # noqa: S307  the test's own text
+        text, {"__builtins__": {}, "sin": math.sin, "cos": math.cos, "pi": math.pi}, SYMBOLS
+    )
+    scale = max(
+        1.0, sum(abs(Expression({m: c}).value(SYMBOLS)) for m, c in e.terms.items()), abs(expected)
+    )
+    assert math.isclose(
+        e.value(SYMBOLS), expected, abs_tol=1e-9 * scale
+    )  # sums of a few dozen rounded terms
     assert parse(str(e)) == e
 
 

@@ -1,4 +1,6 @@
-"""The published JSON Schema: current, true of every robot file this package ships, and as strict as the reader on keys."""
+"""The published JSON Schema: current, true of every robot file this package ships, and as strict as
+the reader on keys.
+"""
 
 import json
 import re
@@ -27,7 +29,11 @@ def faults(data):
 
 def test_checked_in_file_is_current():
     """After a change: symgen schema > symgen/description/robot.schema.json."""
-    assert json.loads(schema_file().read_text(encoding="utf-8")) == json.loads(schema_text()) == json_schema()
+    assert (
+        json.loads(schema_file().read_text(encoding="utf-8"))
+        == json.loads(schema_text())
+        == json_schema()
+    )
     jsonschema.Draft202012Validator.check_schema(json_schema())
 
 
@@ -37,7 +43,16 @@ def test_schema_verb_prints_it():
 
 @pytest.mark.parametrize("name", packaged_robots())
 def test_packaged_robots_follow_it(name):
-    assert faults(plain((resources.files("symgen.description") / "robots" / f"{name}.yaml").read_text(encoding="utf-8"))) == []
+    assert (
+        faults(
+            plain(
+                (resources.files("symgen.description") / "robots" / f"{name}.yaml").read_text(
+                    encoding="utf-8"
+                )
+            )
+        )
+        == []
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""MJCF: what is not read is refused by name and line before MuJoCo sees it; no file that it names is opened; mangled files raise nothing else."""
+"""MJCF: what is not read is refused by name and line before MuJoCo sees it; no file that it names
+is opened; mangled files raise nothing else.
+"""
 
 import builtins
 import re
@@ -30,7 +32,9 @@ SMALL = """\
 
 def error_of(text):
     with pytest.raises(DescriptionError) as caught:
-        read_mjcf(text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"), "arm.xml")
+        read_mjcf(
+            text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"), "arm.xml"
+        )
     assert caught.value.file == "arm.xml" and caught.value.line is not None
     return caught.value
 
@@ -44,8 +48,18 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
     (WORLD, '<include file="/etc/passwd"/><worldbody>', 2, "<include> is not read"),
     (WORLD, '<worldbody><body><include file="../../x.xml"/></body>', 2, "<include> is not read"),
     (WORLD, '<extension><plugin plugin="a"/></extension><worldbody>', 2, "<extension> is not read"),
-    (WORLD, '<worldbody><replicate count="1000000000"><body/></replicate>', 2, "<replicate> is not read"),
-    (WORLD, '<worldbody><composite type="cable" count="1000000000 1 1"/>', 2, "<composite> is not read"),
+    (
+        WORLD,
+        '<worldbody><replicate count="1000000000"><body/></replicate>',
+        2,
+        "<replicate> is not read",
+    ),
+    (
+        WORLD,
+        '<worldbody><composite type="cable" count="1000000000 1 1"/>',
+        2,
+        "<composite> is not read",
+    ),
     (WORLD, '<worldbody><flexcomp file="/etc/passwd"/>', 2, "<flexcomp> is not read"),
     (WORLD, '<worldbody><attach model="m" body="b"/>', 2, "<attach> is not read"),
     (WORLD, '<compiler settotalmass="3"/><worldbody>', 2, "settotalmass is not read"),
@@ -58,11 +72,19 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
     ('pos="0.4 0 0"', 'pos="1e300 0 0"', 1, "larger than"),
     ('axis="0 1 0"', 'axis="0 0 0"', 1, "MuJoCo refuses"),
     ('axis="0 1 0"', 'axis="&quot;/&gt;"', 1, "MuJoCo refuses"),
-    ("</worldbody>", '</worldbody><equality><connect name="c" body1="a" anchor="0 0 0"/></equality>', 6, "<connect> 'c' in <equality>"),
+    (
+        "</worldbody>",
+        '</worldbody><equality><connect name="c" body1="a" anchor="0 0 0"/></equality>',
+        6,
+        "<connect> 'c' in <equality>",
+    ),
     ("</worldbody>", '</worldbody><equality><weld body1="a"/></equality>', 6, "<weld> ''"),
     (
         "</worldbody>",
-        '</worldbody><equality><joint name="p" joint1="s" joint2="e" polycoef="0 1 2 0 0"/></equality>',
+        (
+            '</worldbody><equality><joint name="p" joint1="s" joint2="e" polycoef="0 1 2 0 '
+            '0"/></equality>'
+        ),
         1,
         "linear relations",
     ),
@@ -74,7 +96,11 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
     ),
     (
         "</worldbody>",
-        '</worldbody><equality><joint name="p" joint1="s" joint2="e"/></equality><actuator><motor joint="s"/><motor joint="e"/></actuator>',
+        (
+            '</worldbody><equality><joint name="p" joint1="s" '
+            'joint2="e"/></equality><actuator><motor '
+            'joint="s"/><motor joint="e"/></actuator>'
+        ),
         1,
         "ties driven joints",
     ),
@@ -90,14 +116,23 @@ def test_faults_are_errors_with_their_line(old, new, line, words):
     assert words in error.message and error.line == line
 
 
-BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '"><!ENTITY c "' + "&b;" * 50 + '">]>'
+BOMB = (
+    '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "'
+    + "&a;" * 50
+    + '"><!ENTITY c "'
+    + "&b;" * 50
+    + '">]>'
+)
 HOSTILE = {
     "expanding entities": BOMB + SMALL.replace("small", "&c;"),
-    "external entity": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>' + SMALL.replace("small", "&a;"),
+    "external entity": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
+    + SMALL.replace("small", "&a;"),
     "nesting": "<mujoco><worldbody>" + "<body>" * 100_000,
     "nested bodies": SMALL.replace(WORLD, WORLD + "<body>" * 140 + "</body>" * 140),
     "many bodies": SMALL.replace(WORLD, WORLD + "<body/>" * 40_000),
-    "many joints": SMALL.replace("<joint", "".join(f'<joint name="x{k}"/>' for k in range(300)) + "<joint", 1),
+    "many joints": SMALL.replace(
+        "<joint", "".join(f'<joint name="x{k}"/>' for k in range(300)) + "<joint", 1
+    ),
     "size": SMALL + " " * MAX_BYTES,
     "bytes": bytes(range(256)) * 100,
     "nothing": b"",
@@ -116,7 +151,11 @@ def test_hostile_files_are_refused(kind):
 
 def test_no_file_reaches_mujoco(monkeypatch):
     """Names of files, materials and plugins are gone from the text; reading it opens nothing."""
-    text = ARM.replace("<worldbody>", '<size memory="900G"/><custom><numeric name="n" size="999999999"/></custom><worldbody>', 1)
+    text = ARM.replace(
+        "<worldbody>",
+        '<size memory="900G"/><custom><numeric name="n" size="999999999"/></custom><worldbody>',
+        1,
+    )
     kept = reduced(text.encode()).text
     assert not re.search(r"file|mesh|asset|memory|numeric|shell.stl|sensor|light ", kept)
     read_mjcf(SMALL.encode(), "small.xml")  # what MuJoCo opens when it loads
@@ -129,10 +168,15 @@ def test_no_file_reaches_mujoco(monkeypatch):
 
 def test_what_is_left_out_is_said():
     text = SMALL.replace('name="b"', 'name="b" gravcomp="0.5"').replace(
-        WORLD, '<option gravity="0 0 -9"><flag gravity="disable" contact="disable"/></option><worldbody>'
+        WORLD,
+        '<option gravity="0 0 -9"><flag gravity="disable" contact="disable"/></option><worldbody>',
     )
     robot, notes = read_mjcf(text.encode(), "small.xml")
-    assert "not read: flag contact" in notes and "gravcomp not read: 'b'" in notes and [str(g) for g in robot.gravity] == ["0", "0", "0"]
+    assert (
+        "not read: flag contact" in notes
+        and "gravcomp not read: 'b'" in notes
+        and [str(g) for g in robot.gravity] == ["0", "0", "0"]
+    )
     polynomial = SMALL.replace('axis="0 1 0"', 'axis="0 1 0" damping="1 0.5"')
     try:
         said = read_mjcf(polynomial.encode(), "small.xml")[1]
@@ -147,7 +191,9 @@ def test_convert_and_every_verb(tmp_path):
     file.write_text(GRIPPER)
     result = CliRunner().invoke(app, ["convert", str(file), str(table)])
     assert result.exit_code == 0 and "joints: q1 = 'wrist1'" in result.stdout
-    assert load_robot(table).frames == load_robot(file).frames and dict(load_robot(table).values) == dict(load_robot(file).values)
+    assert load_robot(table).frames == load_robot(file).frames and dict(
+        load_robot(table).values
+    ) == dict(load_robot(file).values)
     (tmp_path / "small.mjcf").write_text(SMALL)
     result = CliRunner().invoke(app, ["check", str(tmp_path / "small.mjcf")])
     assert result.exit_code == 0 and "certificate valid" in result.stdout
@@ -159,7 +205,11 @@ def test_mangled_files_raise_nothing_else(data):
     text = ARM if data.draw(st.booleans()) else GRIPPER
     for _ in range(data.draw(st.integers(1, 4))):
         at, length = data.draw(st.integers(0, len(text))), data.draw(st.integers(0, 12))
-        text = text[:at] + data.draw(st.text(alphabet="<>/=\"' 0123456789.e-&;!x\n\x00é", max_size=8)) + text[at + length :]
+        text = (
+            text[:at]
+            + data.draw(st.text(alphabet="<>/=\"' 0123456789.e-&;!x\n\x00é", max_size=8))
+            + text[at + length :]
+        )
     try:
         read_mjcf(text.encode("utf-8", "surrogatepass"), "arm.xml")
     except DescriptionError as error:
@@ -167,9 +217,14 @@ def test_mangled_files_raise_nothing_else(data):
 
 
 def test_nothing_is_said_or_written_beside_the_result(tmp_path, monkeypatch, capfd) -> None:
-    """Two hinges on one axis: MuJoCo cannot solve for their accelerations and would tell a file of the working folder."""
+    """Two hinges on one axis: MuJoCo cannot solve for their accelerations and would tell a file of
+    the working folder.
+    """
     hinge = '<joint type="hinge" axis="0 0 1"/>'
-    text = f'<mujoco><worldbody><body>{hinge * 2}<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>'
+    text = (
+        f'<mujoco><worldbody><body>{hinge * 2}<inertial pos="0 0 0" mass="1" diaginertia="1 1 '
+        '1"/></body></worldbody></mujoco>'
+    )
     monkeypatch.chdir(tmp_path)
     assert read_mjcf(text.encode(), "a.xml")[0].joints == (1, 2)
     assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")

@@ -1,4 +1,6 @@
-"""Every way a robot file can be wrong gives one DescriptionError: file, line, what was given, what was expected."""
+"""Every way a robot file can be wrong gives one DescriptionError: file, line, what was given, what
+was expected.
+"""
 
 import json
 import subprocess
@@ -35,7 +37,8 @@ def error_of(text, file="arm.yaml"):
     return caught.value
 
 
-# what is replaced, by what, line of the error, words the message must contain: what was given, then what was expected
+# what is replaced, by what, line of the error, words the message must contain: what was given, then
+# what was expected
 WRONG = [
     ("symgen: 1", "symgen: 2", 1, ["symgen: 2", "expected `symgen: 1`"]),
     ("symgen: 1", "symgen: yes", 1, ["'yes'", "expected `symgen: 1`"]),
@@ -45,7 +48,12 @@ WRONG = [
     ("name: arm", "name: a b", 2, ["'a b'", "letter"]),
     ("name: arm", "name: class", 2, ["name: 'class'", "word of Python"]),
     ("name: arm", "name: [a]", 2, ["['a']", "expected text"]),
-    ("title: Test arm", "record: {files: [a.csv]}", 3, ["'record'", "this is a study file: the robot comes first"]),
+    (
+        "title: Test arm",
+        "record: {files: [a.csv]}",
+        3,
+        ["'record'", "this is a study file: the robot comes first"],
+    ),
     ("title: Test arm", "titel: Test arm", 3, ["'titel'", "did you mean 'title'"]),
     ("title: Test arm", 'title: "a\\nb"', 3, ["expected one line"]),
     ("title: Test arm", 'title: \'a"""b\'', 3, ["expected one line", "quotes"]),
@@ -84,7 +92,12 @@ WRONG = [
     ("theta: q2", "theta: 2*q2", 8, ["theta = 2*q2", "expected q2 once"]),
     ("theta: q2", "theta: q2 + sin(q2)", 8, ["expected q2 once"]),
     ("theta: q2, r: 0", "theta: q2, r: q2", 8, ["r = q2", "in theta if sigma is 0"]),
-    ("inertia, along: all", "inertial, along: all", 10, ["'inertial'", "expected one of inertia, viscous"]),
+    (
+        "inertia, along: all",
+        "inertial, along: all",
+        10,
+        ["'inertial'", "expected one of inertia, viscous"],
+    ),
     ("inertia, along: all", "inertia", 10, ["acts along nothing", "give `along`"]),
     ("inertia, along: all", "inertia, along: most", 10, ["'most'", "expected `all` or a table"]),
     ("inertia, along: all", "inertia, along: {1: q1**2}", 10, ["q1**2", "such as q5 + q6"]),
@@ -92,7 +105,12 @@ WRONG = [
     ("inertia, along: all", "inertia, form: {1: q1}", 10, ["q1", "such as q6**2"]),
     ("inertia, along: all", "inertia, along: {5: q1}", 10, ["frame 5 does not exist"]),
     ("inertia, along: all", "inertia, along: {1: q7}", 10, ["'q7'", "declared here"]),
-    ("inertia, along: all", "inertia, along: all, when: positive", 10, ["'positive'", "viscous and coulomb"]),
+    (
+        "inertia, along: all",
+        "inertia, along: all, when: positive",
+        10,
+        ["'positive'", "viscous and coulomb"],
+    ),
     ("  Ia:", "  M:", 10, ["'M'", "not an inertial parameter's"]),
     ("  Ia:", "  Ia2:", 10, ["'Ia2'", "digit"]),
     ("viscous, along: all", "coulomb, form: {1: q1**2}", 11, ["no quadratic form", "use `along`"]),
@@ -101,7 +119,12 @@ WRONG = [
     ("[[100, 0], [0, 100]]", "[[100, 0], [0, x]]", 12, ["'x'", "expected a number"]),
     ("offset: [0, 0]", "offset: [0]", 12, ["1 entries", "expected 2"]),
     ("torque_constant: 2", "torque_constant: [2]", 12, ["1 entries", "expected 2"]),
-    ("torque_constant: 2", "torque_const: 2", 12, ["'torque_const'", "did you mean 'torque_constant'"]),
+    (
+        "torque_constant: 2",
+        "torque_const: 2",
+        12,
+        ["'torque_const'", "did you mean 'torque_constant'"],
+    ),
     ("[-pi/2, pi/2]", "[1, -1]", 13, ["(1.0, -1.0)", "lower < upper"]),
     ("[-pi/2, pi/2]", "[1]", 13, ["[1]", "[lower, upper]"]),
     ("qd: [3, 3]", "qd: [3]", 13, ["1 entries", "2 numbers each"]),
@@ -114,12 +137,27 @@ WRONG = [
     ("values:", "loops: [{cut: 2, twin: 9}]\nvalues:", 14, ["twin frame 9 does not exist"]),
     ("values:", "loops:\n  - {cut: 2, twin: 1}\nvalues:", 15, ["sigma 0", "expected 2"]),
     ("values:", "loops: [{cut: 2}]\nvalues:", 14, ["'twin' is missing"]),
-    ("values:", "loops: [{cut: 2, twin: 1, start: {x: 1}}]\nvalues:", 14, ["'x'", "expected q1, q2"]),
+    (
+        "values:",
+        "loops: [{cut: 2, twin: 1, start: {x: 1}}]\nvalues:",
+        14,
+        ["'x'", "expected q1, q2"],
+    ),
     ("values:", "constraints: {q2: q1}\nvalues:", 14, ["q2", "not a passive joint"]),
     ("values:", "constraints: {z2: q1}\nvalues:", 14, ["'z2'", "expected q1, q2"]),
     # what novices write, and what to write instead
-    ("theta: q2", "theta: q2 + 90", 8, ["frame 2: theta = q2 + 90", "14.3 turns", "90 degrees are pi/2"]),
-    ("2: {ant: 1, sigma: 0, alpha: 0", "2: {ant: 1, sigma: 0, alpha: -90", 8, ["alpha = -90", "angles are in rad"]),
+    (
+        "theta: q2",
+        "theta: q2 + 90",
+        8,
+        ["frame 2: theta = q2 + 90", "14.3 turns", "90 degrees are pi/2"],
+    ),
+    (
+        "2: {ant: 1, sigma: 0, alpha: 0",
+        "2: {ant: 1, sigma: 0, alpha: -90",
+        8,
+        ["alpha = -90", "angles are in rad"],
+    ),
     ("theta: q2", "theta: q2 + 90*D2", 8, ["45 rad", "angles are in rad"]),
     ("theta: q2", "theta: q2 + 90deg", 8, ["unexpected 'deg'", "90 degrees are pi/2"]),
     ("theta: q2", "theta: q2 + 90°", 8, ["unexpected '°'", "90 degrees are pi/2"]),
@@ -133,7 +171,11 @@ WRONG = [
         "theta: q2, r: 0",
         "theta: 0, r: q2",
         8,
-        ["expected q2 once", "a prismatic joint has sigma: 1 and r: q2", "a fixed frame (a tool) sigma: 2"],
+        [
+            "expected q2 once",
+            "a prismatic joint has sigma: 1 and r: q2",
+            "a fixed frame (a tool) sigma: 2",
+        ],
     ),
     ("1, sigma: 0", "1, sigma: 1", 8, ["theta = q2", "in r if sigma is 1"]),
     ("1, sigma: 0", "1, sigma: prismatic", 8, ["'prismatic'", "0 revolute, 1 prismatic, 2 fixed"]),
@@ -161,11 +203,16 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "line", "words"), WRONG, ids=[f"{new.strip()[:32]!r}" for _, new, _, _ in WRONG])
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"), WRONG, ids=[f"{new.strip()[:32]!r}" for _, new, _, _ in WRONG]
+)
 def test_error_names_line_given_and_expected(old, new, line, words):
     assert ARM.count(old) >= 1
     error = error_of(ARM.replace(old, new, 1))
-    assert error.line == line or (error.line, line) == (15, 14)  # an unclosed { is noticed at the end of the text
+    assert error.line == line or (error.line, line) == (
+        15,
+        14,
+    )  # an unclosed { is noticed at the end of the text
     assert str(error).endswith(f"(arm.yaml, line {error.line})")
     for word in words:
         assert word in str(error), str(error)
@@ -179,7 +226,10 @@ def test_cut_and_twin_exchanged():
 
 @pytest.mark.parametrize("theta", ["q2 + 3*pi", "q2 - 6.28", "q2 + 8*pi + D2"])
 def test_turns_written_with_pi_are_no_degrees(theta):
-    assert parse_robot(ARM.replace("theta: q2", f"theta: {theta}").encode(), "arm.yaml").joints == (1, 2)
+    assert parse_robot(ARM.replace("theta: q2", f"theta: {theta}").encode(), "arm.yaml").joints == (
+        1,
+        2,
+    )
 
 
 @pytest.mark.parametrize(
@@ -203,7 +253,10 @@ def test_files_that_are_no_robot_files(content, line, word):
 
 
 def test_alias_bomb_stops_at_its_first_anchor():
-    bomb = "a: &a [x, x]\n" + "".join(f"{b}: &{b} [{','.join(['*' + a] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True))
+    bomb = "a: &a [x, x]\n" + "".join(
+        f"{b}: &{b} [{','.join(['*' + a] * 9)}]\n"
+        for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+    )
     assert error_of(bomb).line == 1
 
 
@@ -228,10 +281,15 @@ def test_load_from_a_path(tmp_path):
 
 
 def test_bytes_are_hashed_as_they_are():
-    unix, windows = parse_robot(ARM.encode(), "a"), parse_robot(ARM.replace("\n", "\r\n").encode(), "a")
+    unix, windows = (
+        parse_robot(ARM.encode(), "a"),
+        parse_robot(ARM.replace("\n", "\r\n").encode(), "a"),
+    )
     assert unix.sha256 != windows.sha256
     assert (unix.frames, unix.values) == (windows.frames, windows.values)
-    assert parse_robot(b"\xef\xbb\xbf" + ARM.encode(), "a").frames == unix.frames  # a byte order mark is no error
+    assert (
+        parse_robot(b"\xef\xbb\xbf" + ARM.encode(), "a").frames == unix.frames
+    )  # a byte order mark is no error
 
 
 def test_defaults_and_expressions():
@@ -245,15 +303,25 @@ def test_defaults_and_expressions():
     assert robot.limits["q"][1] == (-1.5707963267948966, 1.5707963267948966)
     assert robot.limits["q"][0] == (-3.141592653589793, 3.141592653589793)
     assert robot.values == {"M1": 2.0}
-    fixed = ARM.replace("elements:", "  3: {ant: 2, sigma: 2, alpha: 0, d: 0, theta: pi/3, r: 0.1}\nelements:")
+    fixed = ARM.replace(
+        "elements:", "  3: {ant: 2, sigma: 2, alpha: 0, d: 0, theta: pi/3, r: 0.1}\nelements:"
+    )
     assert parse_robot(fixed.encode(), "a").frame(3).mu == 0
 
 
 def test_elements_along_rows_and_forms():
-    text = ARM.replace("viscous, along: all", "viscous, along: {1: q1}, form: {2: q2**2 + 2*D2*q1*q2}")
+    text = ARM.replace(
+        "viscous, along: all", "viscous, along: {1: q1}, form: {2: q2**2 + 2*D2*q1*q2}"
+    )
     element = parse_robot(text.encode(), "a").elements[1]
-    assert {j: {i: str(c) for i, c in row.items()} for j, row in element.along.items()} == {1: {1: "1"}}
-    assert {ij: str(c) for ij, c in element.form[2].items()} == {(2, 2): "1", (1, 2): "D2", (2, 1): "D2"}
+    assert {j: {i: str(c) for i, c in row.items()} for j, row in element.along.items()} == {
+        1: {1: "1"}
+    }
+    assert {ij: str(c) for ij, c in element.form[2].items()} == {
+        (2, 2): "1",
+        (1, 2): "D2",
+        (2, 1): "D2",
+    }
 
 
 def test_loops_and_constraints():
@@ -281,7 +349,11 @@ constraints: {q4: q3 - q1 - q2}
 def test_skeleton_is_a_robot_file():
     text = skeleton("my_arm")
     assert parse_robot(text.encode(), "my_arm.yaml").name == "my_arm"
-    every = text.replace("# drives", "drives").replace("# limits", "limits").replace("# values", "values")
+    every = (
+        text.replace("# drives", "drives")
+        .replace("# limits", "limits")
+        .replace("# values", "values")
+    )
     assert parse_robot(every.encode(), "my_arm.yaml").drives is not None
     with pytest.raises(DescriptionError, match="'my-arm' is no identifier"):
         skeleton("my-arm")
@@ -291,11 +363,20 @@ def test_json_schema_for_editors():
     schema = json.loads(json.dumps(json_schema()))
     assert {"symgen", "name", "gravity", "frames"} == set(schema["required"])
     assert schema["additionalProperties"] is False
-    assert set(schema["$defs"]) == {"FrameRow", "LoopRow", "ElementTable", "DrivesTable", "LimitsTable"}
+    assert set(schema["$defs"]) == {
+        "Frame",
+        "Loop",
+        "Element",
+        "Drives",
+        "LimitsTable",
+    }
 
 
 def test_import_is_light():
-    code = "import sys, symgen.description; print([m for m in ('numpy', 'sympy', 'casadi', 'scipy') if m in sys.modules])"
+    code = (
+        "import sys, symgen.description; print([m for m in ('numpy', 'sympy', 'casadi', "
+        "'scipy') if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -305,3 +386,10 @@ def test_public_names_exist():
 
     assert all(hasattr(description, name) for name in description.__all__)
     assert "tx40" in packaged_robots()
+
+
+def test_a_constant_that_is_a_number_is_refused_by_its_line() -> None:
+    """A key 3 beside names ended in a TypeError where an expression had an unknown symbol."""
+    text = ARM.replace("g: 9.81", "3: 1, g: 9.81").replace("alpha: 0", "alpha: D", 1)
+    with pytest.raises(DescriptionError, match=r"constants\.3: found 3; expected a name"):
+        parse_robot(text.encode(), "arm.yaml")

@@ -1,4 +1,6 @@
-"""Locked joints and chains of a URDF move as the whole robot does with the others at rest; labels go from file to file."""
+"""Locked joints and chains of a URDF move as the whole robot does with the others at rest; labels
+go from file to file.
+"""
 
 import numpy as np
 import pytest
@@ -8,9 +10,9 @@ from oracles.urdf_robots import joint, link, robot
 from symgen.derive.lagrange import Lagrange
 from symgen.description import parse_robot
 from symgen.description.robot import INERTIAL
-from symgen.description.tree_parts import Part
+from symgen.description.tree_parts import TreePart
 from symgen.description.urdf import read_urdf
-from symgen.description.yaml_write import write_yaml
+from symgen.description.yaml import write_yaml
 from symgen.errors import DescriptionError
 
 TEXT = robot(
@@ -27,7 +29,13 @@ TEXT = robot(
     joint("finger", "prismatic", "lower", "pad", "0.2 0 0", axis="0 1 0"),
     link("pad", 0.2, "0.01 0.02 0.03"),
     joint(
-        "twin", "prismatic", "lower", "pad2", "0.2 0 0.1", axis="0 -1 0", more='<mimic joint="finger" multiplier="0.7315" offset="0.01"/>'
+        "twin",
+        "prismatic",
+        "lower",
+        "pad2",
+        "0.2 0 0.1",
+        axis="0 -1 0",
+        more='<mimic joint="finger" multiplier="0.7315" offset="0.01"/>',
     ),
     link("pad2", 0.3, "0.01 0.02 0.03"),
 )
@@ -37,10 +45,22 @@ WHOLE = ("lift", "head", "shoulder", "elbow", "finger", "twin")
 @pytest.mark.parametrize(
     ("part", "moving", "at"),
     [
-        (Part({"elbow": 0.7, "lift": -0.2}), ["head", "shoulder", "finger", "twin"], {"elbow": 0.7, "lift": -0.2}),
-        (Part({"finger": 0.05}), ["lift", "head", "shoulder", "elbow"], {"finger": 0.05, "twin": 0.7315 * 0.05 + 0.01}),
-        (Part(chain=("torso", "lower")), ["shoulder", "elbow"], {"twin": 0.01}),
-        (Part({"elbow": 1.1}, ("world", "pad")), ["lift", "shoulder", "finger"], {"elbow": 1.1, "twin": 0.01}),
+        (
+            TreePart({"elbow": 0.7, "lift": -0.2}),
+            ["head", "shoulder", "finger", "twin"],
+            {"elbow": 0.7, "lift": -0.2},
+        ),
+        (
+            TreePart({"finger": 0.05}),
+            ["lift", "head", "shoulder", "elbow"],
+            {"finger": 0.05, "twin": 0.7315 * 0.05 + 0.01},
+        ),
+        (TreePart(chain=("torso", "lower")), ["shoulder", "elbow"], {"twin": 0.01}),
+        (
+            TreePart({"elbow": 1.1}, ("world", "pad")),
+            ["lift", "shoulder", "finger"],
+            {"elbow": 1.1, "twin": 0.01},
+        ),
     ],
 )
 def test_the_rest_stands_still(part, moving, at):
@@ -51,11 +71,17 @@ def test_the_rest_stands_still(part, moving, at):
         return  # the relation itself is that of the whole robot, tests/oracles/test_urdf_agrees.py
     n = len(moving)
     q, qd, qdd = np.random.default_rng(4).standard_normal((3, 1, n))
-    chi = np.array([found.values[p] if p.rstrip("0123456789") in INERTIAL else 0.0 for p in found.parameters])
+    chi = np.array(
+        [found.values[p] if p.rstrip("0123456789") in INERTIAL else 0.0 for p in found.parameters]
+    )
     ours = Lagrange(found).torque(q, qd, qdd, chi)[0]
     rows = []
     for x, known in zip((q, qd, qdd), (at, {}, {}), strict=True):
-        rows.append(np.array([{**known, **dict(zip(moving, x[0], strict=True))}.get(name, 0.0) for name in WHOLE]))
+        rows.append(
+            np.array(
+                [{**known, **dict(zip(moving, x[0], strict=True))}.get(name, 0.0) for name in WHOLE]
+            )
+        )
     theirs = Pinocchio(TEXT).torque(list(WHOLE), *rows)[[WHOLE.index(name) for name in moving]]
     np.testing.assert_allclose(ours, theirs, atol=1e-10 * np.abs(theirs).max())
 
@@ -63,10 +89,10 @@ def test_the_rest_stands_still(part, moving, at):
 @pytest.mark.parametrize(
     ("part", "words"),
     [
-        (Part({"twin": 0.0}), "'twin' to lock follows others; lock finger"),
-        (Part({"nose": 0.0}), "no moving joint of that name; the file has lift, head"),
-        (Part(chain=("eye", "pad")), "outward"),
-        (Part(chain=("torso", "nose")), "no link 'nose'"),
+        (TreePart({"twin": 0.0}), "'twin' to lock follows others; lock finger"),
+        (TreePart({"nose": 0.0}), "no moving joint of that name; the file has lift, head"),
+        (TreePart(chain=("eye", "pad")), "outward"),
+        (TreePart(chain=("torso", "nose")), "no link 'nose'"),
     ],
 )
 def test_what_cannot_be_held_is_refused(part, words):

@@ -1,4 +1,6 @@
-"""URDF: faults are errors with their line, hostile files are refused before they cost anything, mangled ones raise nothing else."""
+"""URDF: faults are errors with their line, hostile files are refused before they cost anything,
+mangled ones raise nothing else.
+"""
 
 import re
 import time
@@ -17,11 +19,13 @@ from symgen.errors import DescriptionError
 ARM = """\
 <robot name="my arm">
 <link name="base"/>
-<link name="a"><inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+<link name="a"><inertial><mass value="2"/>\
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
 <visual><geometry><mesh filename="package://../../../etc/passwd"/></geometry></visual></link>
 <link name="b"/>
 <joint name="s" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 2"/></joint>
-<joint name="e" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.4 0 0"/><axis xyz="1 0 0"/></joint>
+<joint name="e" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.4 0 0"/>\
+<axis xyz="1 0 0"/></joint>
 <gazebo/><transmission/>
 </robot>
 """
@@ -37,8 +41,15 @@ def error_of(text):
 def test_what_is_not_read_is_noted():
     robot, notes = read_urdf(ARM.encode(), "arm.urdf")
     assert robot.name == "my_arm" and [f.sigma for f in robot.frames] == [0, 1]
-    assert notes[0] == "joints: q1 = 's', q2 = 'e'" and notes[1] == "not read: 1 <gazebo>, 1 <transmission>, 1 <visual>"
-    assert any("values of link 2 are 0" in note for note in notes) and robot.values["ZZ1"] == 1 and robot.values["M2"] == 0
+    assert (
+        notes[0] == "joints: q1 = 's', q2 = 'e'"
+        and notes[1] == "not read: 1 <gazebo>, 1 <transmission>, 1 <visual>"
+    )
+    assert (
+        any("values of link 2 are 0" in note for note in notes)
+        and robot.values["ZZ1"] == 1
+        and robot.values["M2"] == 0
+    )
 
 
 WRONG = [
@@ -73,25 +84,50 @@ def test_faults_are_errors_with_their_line(old, new, line, words):
 
 
 def test_what_makers_leave_out():
-    """Limits that mean none, an inertia not given, the axis of a fixed joint: as files of makers have them."""
-    text = ARM.replace('<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>', '<origin xyz="0.5 0 0"/>')
-    text = text.replace('<axis xyz="0 0 2"/>', '<axis xyz="0 0 2"/><limit lower="-1e16" upper="1e16" velocity="1" effort="1"/>')
+    """Limits that mean none, an inertia not given, the axis of a fixed joint: as files of makers
+    have them.
+    """
+    text = ARM.replace(
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>', '<origin xyz="0.5 0 0"/>'
+    )
+    text = text.replace(
+        '<axis xyz="0 0 2"/>',
+        '<axis xyz="0 0 2"/><limit lower="-1e16" upper="1e16" velocity="1" effort="1"/>',
+    )
     text = text.replace('<link name="b"/>', '<link name="b"/><link name="c"/>')
-    fixed = '<joint name="f" type="fixed"><parent link="b"/><child link="c"/><axis xyz="0 0 0"/></joint></robot>'
+    fixed = (
+        '<joint name="f" type="fixed"><parent link="b"/><child link="c"/><axis xyz="0 0 '
+        '0"/></joint></robot>'
+    )
     robot, notes = read_urdf(text.replace("</robot>", fixed).encode(), "arm.urdf")
-    assert robot.values["ZZ1"] == 2 * 0.5**2 and "point masses: 'a'" in " ".join(notes) and "q" not in robot.limits
+    assert (
+        robot.values["ZZ1"] == 2 * 0.5**2
+        and "point masses: 'a'" in " ".join(notes)
+        and "q" not in robot.limits
+    )
 
 
-BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '"><!ENTITY c "' + "&b;" * 50 + '">]>'
+BOMB = (
+    '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "'
+    + "&a;" * 50
+    + '"><!ENTITY c "'
+    + "&b;" * 50
+    + '">]>'
+)
 HOSTILE = {
     "expanding entities": BOMB + ARM.replace("my arm", "&c;"),
-    "external entity": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>' + ARM.replace("my arm", "&a;"),
+    "external entity": '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
+    + ARM.replace("my arm", "&a;"),
     "external document type": '<!DOCTYPE x SYSTEM "http://localhost/x.dtd">' + ARM,
     "nesting": "<robot>" + "<a>" * 100_000,
     "many elements": "<robot>" + "<a/>" * 200_000 + "</robot>",
     "many joints": '<robot><link name="l0"/>'
     + "".join(
-        f'<link name="l{k}"/><joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child link="l{k}"/></joint>' for k in range(1, 300)
+        (
+            f'<link name="l{k}"/><joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child '
+            f'link="l{k}"/></joint>'
+        )
+        for k in range(1, 300)
     )
     + "</robot>",
     "size": " " * (MAX_BYTES + 1),
@@ -111,7 +147,9 @@ def test_hostile_names_become_an_identifier():
     for name in ("1;import os", "class", "é'\\\"*/", "x" * 500, ""):
         text = ARM.replace("my arm", name.replace('"', "&quot;"))
         robot, notes = read_urdf(text.encode(), "arm.urdf")
-        assert re.fullmatch(r"[A-Za-z]\w{0,39}", robot.name, re.ASCII) and "\n" not in "".join(notes)
+        assert re.fullmatch(r"[A-Za-z]\w{0,39}", robot.name, re.ASCII) and "\n" not in "".join(
+            notes
+        )
 
 
 def test_mimic_becomes_a_relation():
@@ -122,7 +160,10 @@ def test_mimic_becomes_a_relation():
 
 def test_serial_arms_have_no_gamma_nor_b():
     robot, _ = read_urdf(ur5().encode(), "ur5.urdf")
-    assert all(not f.gamma and not f.b for f in robot.frames[1:]) and robot.frames[1].alpha in (parse("pi/2"), parse("-pi/2"))
+    assert all(not f.gamma and not f.b for f in robot.frames[1:]) and robot.frames[1].alpha in (
+        parse("pi/2"),
+        parse("-pi/2"),
+    )
 
 
 def test_export_needs_masses():
@@ -143,7 +184,11 @@ def test_mangled_files_raise_nothing_else(data):
     text = ARM
     for _ in range(data.draw(st.integers(1, 4))):
         at, length = data.draw(st.integers(0, len(text))), data.draw(st.integers(0, 12))
-        text = text[:at] + data.draw(st.text(alphabet="<>/=\"' 0123456789.e-&;!x\n\x00é", max_size=8)) + text[at + length :]
+        text = (
+            text[:at]
+            + data.draw(st.text(alphabet="<>/=\"' 0123456789.e-&;!x\n\x00é", max_size=8))
+            + text[at + length :]
+        )
     try:
         read_urdf(text.encode("utf-8", "surrogatepass"), "arm.urdf")
     except DescriptionError as error:

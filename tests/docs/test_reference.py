@@ -1,4 +1,6 @@
-"""Reference pages hold what the program says, in the repository; every link between pages leads to a page and to a heading of it."""
+"""Reference pages hold what the program says, in the repository; every link between pages leads to
+a page and to a heading of it.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,9 @@ def test_references_hold_every_verb_section_and_robot() -> None:
         assert f"\n| `{field.name}` |" in page("reference/study_file.md"), field.name
     for name in packaged_robots():
         assert f"\n## {name}\n" in page("reference/gallery.md")
-    assert "{6: q6\\*\\*2 + 2\\*q5\\*q6}" in page("reference/robot_file.md"), "asterisks of a description are read as emphasis"
+    assert "{6: q6\\*\\*2 + 2\\*q5\\*q6}" in page("reference/robot_file.md"), (
+        "asterisks of a description are read as emphasis"
+    )
 
 
 def test_every_public_name_is_described() -> None:
@@ -54,9 +58,12 @@ def test_every_public_name_is_described() -> None:
         for name in package.__all__:
             assert f"\n### `{name}`\n" in index, f"{package.__name__}.{name}"
     for room in (
-        folder for package in ("symgen", "runtime") for folder in (ROOT / package).iterdir() if (folder / "__init__.py").is_file()
+        folder
+        for package in ("symgen", "runtime")
+        for folder in (ROOT / package).iterdir()
+        if (folder / "__init__.py").is_file()
     ):
-        if room.name not in ("cli", "demo"):
+        if room.name != "cli":
             assert f"`{room.parent.name}.{room.name}`" in page(f"api/{room.name}.md")
 
 
@@ -80,6 +87,8 @@ def test_links_between_pages_lead_somewhere() -> None:
             target = (path.parent / link["path"]).resolve() if link["path"] else path
             assert target.exists(), f"{path.name} links to {link[0]}"
             if link["anchor"] and target.suffix == ".md":
-                assert link["anchor"] in slugs(target.read_text(encoding="utf-8")), f"{path.name} links to {link[0]}"
+                assert link["anchor"] in slugs(target.read_text(encoding="utf-8")), (
+                    f"{path.name} links to {link[0]}"
+                )
             checked += 1
     assert checked > 50

@@ -1,4 +1,6 @@
-"""The C file: agreement with NumPy on every packaged robot, no warnings, clean under sanitizers, deterministic, closed to hostile texts."""
+"""The C file: agreement with NumPy on every packaged robot, no warnings, clean under sanitizers,
+deterministic, closed to hostile texts.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,23 @@ from symgen.description import load_robot, packaged_robots, parse_robot
 from symgen.emit import c_parts
 from symgen.emit.generate import generate_files
 
-FLAGS = ["-std=c11", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
-FAST = [*FLAGS, "-O2", "-ftree-vectorize", "-shared", "-fPIC"]  # as users are told to compile: seconds a robot
+FLAGS = [
+    "-std=c11",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Werror",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ffp-contract=off",
+]
+FAST = [
+    *FLAGS,
+    "-O2",
+    "-ftree-vectorize",
+    "-shared",
+    "-fPIC",
+]  # as users are told to compile: seconds a robot
 SOON = [*FLAGS, "-O0", "-shared", "-fPIC"]
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
 GENERAL_LOOPS = {"four_bar", "five_bar"}  # closed by Newton iteration: NumPy only
@@ -49,21 +66,45 @@ def numpy_module(name: str, text: str) -> ModuleType:
 
 def compiled(folder: Path, text: str, compiler: str, flags: list[str]) -> Path:
     (folder / "robot.c").write_text(text, encoding="utf-8")
-    done = subprocess.run([compiler, *flags, "robot.c", "-o", "robot.so", "-lm"], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [compiler, *flags, "robot.c", "-o", "robot.so", "-lm"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0 and done.stderr == "", done.stderr
     return folder / "robot.so"
 
 
 def call(
-    library: ctypes.CDLL, module: ModuleType, name: str, states: np.ndarray, X: np.ndarray, shape: tuple[int, ...], flags: int
+    library: ctypes.CDLL,
+    module: ModuleType,
+    name: str,
+    states: np.ndarray,
+    X: np.ndarray,
+    shape: tuple[int, ...],
+    flags: int,
 ) -> np.ndarray:
-    """The result of one C function, in an array that held NaN or, for the regressor, the store of the module."""
+    """The result of one C function, in an array that held NaN or, for the regressor, the store of
+    the module.
+    """
     N, used = states.shape[1], FUNCTIONS[name]
     S = module.store(N).view(np.ndarray) if name == "regressor" else np.full((*shape, N), np.nan)
     constants = np.array([*module.CONSTANTS.values(), 0.0])
-    arrays = [*(np.ascontiguousarray(x) for x in states[: len(used)]), *([] if name == "regressor" else [X]), constants, S]
+    arrays = [
+        *(np.ascontiguousarray(x) for x in states[: len(used)]),
+        *([] if name == "regressor" else [X]),
+        constants,
+        S,
+    ]
     pointers = [ctypes.c_void_p(x.ctypes.data) for x in arrays]
-    assert getattr(library, f"{module.NAME}_{name}")(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)) == 0
+    assert (
+        getattr(library, f"{module.NAME}_{name}")(
+            ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)
+        )
+        == 0
+    )
     return np.moveaxis(S.transpose(1, 0, 2) if name == "regressor" else S, -1, 0)
 
 
@@ -80,14 +121,18 @@ def compare(library: ctypes.CDLL, module: ModuleType, samples: tuple[int, ...]) 
                 found = call(library, module, name, states, X, shapes.get(name, (n,)), flags)
                 assert found.shape == expected.shape
                 if N:
-                    scale = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)  # each column's maximum
+                    scale = (
+                        np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
+                    )  # each column's maximum
                     assert (np.abs(found - expected) <= 1e-12 * scale).all(), (name, N, flags)
 
 
 @needs_compiler
 @pytest.mark.parametrize("name", sampled(ROBOTS, 4, always=("emps_asymmetric", "haptic", "tx40")))
 def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
-    """To 1e-12 of each column's maximum: the sums are the same, sines and cosines may differ by some units in the last place."""
+    """To 1e-12 of each column's maximum: the sums are the same, sines and cosines may differ by
+    some units in the last place.
+    """
     library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], COMPILERS[0], SOON)))
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (0, 1, 513))
 
@@ -104,17 +149,23 @@ def test_agrees_as_users_compile_it(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", [pytest.param("panda", marks=campaign), "sr400"])
 def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:
-    library = ctypes.CDLL(str(compiled(tmp_path, files(name)[f"{name}.c"], compiler, [*FAST, "-DPORTABLE"])))
+    library = ctypes.CDLL(
+        str(compiled(tmp_path, files(name)[f"{name}.c"], compiler, [*FAST, "-DPORTABLE"]))
+    )
     compare(library, numpy_module(name, files(name)[f"{name}.py"]), (1, 131))
 
 
 @needs_compiler
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_long_bodies_in_parts(compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_bodies_in_parts(
+    compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every kernel cut into functions of a few lines says the same, without warnings, in one width."""
     monkeypatch.setattr(c_parts, "LONG", 30)
     monkeypatch.setattr(c_parts, "PART", 25)
-    text = generate_files(load_robot("two_branch"), targets=("c",), command="two_branch")["two_branch.c"]
+    text = generate_files(load_robot("two_branch"), targets=("c",), command="two_branch")[
+        "two_branch.c"
+    ]
     assert all(f"PART static void {name}_part2(" in text for name in FUNCTIONS)
     width = ['-DWIDTH="sse2"'] if platform.machine() == "x86_64" else []
     library = ctypes.CDLL(str(compiled(tmp_path, text, compiler, [*FAST, *width])))
@@ -123,17 +174,35 @@ def test_long_bodies_in_parts(compiler: str, tmp_path: Path, monkeypatch: pytest
 
 @needs_compiler
 def test_long_chain(tmp_path: Path) -> None:
-    """Ten joints: bodies in parts of their own accord, headings that come again in one part (the columns of the inertia matrix)."""
+    """Ten joints: bodies in parts of their own accord, headings that come again in one part (the
+    columns of the inertia matrix).
+    """
     frames = "\n".join(
-        f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: L, theta: q{j}, r: 0.1}}" for j in range(1, 11)
+        (
+            f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: L, "
+            "theta: "
+            f"q{j}, r: 0.1}}"
+        )
+        for j in range(1, 11)
     )
     robot = parse_robot(
-        f"symgen: 1\nname: chain\ngravity: [0, 0, -g]\nconstants: {{g: 9.81, L: 0.3}}\nframes:\n{frames}\n".encode(), file="chain.yaml"
+        (
+            f"symgen: 1\nname: chain\ngravity: [0, 0, -g]\nconstants: {{g: 9.81, L: "
+            f"0.3}}\nframes:\n{frames}\n"
+        ).encode(),
+        file="chain.yaml",
     )
     emitted_files = generate_files(robot, targets=("numpy", "c"))
     assert "inertia_matrix_part3(" in emitted_files["chain.c"]
     library = ctypes.CDLL(
-        str(compiled(tmp_path, emitted_files["chain.c"], COMPILERS[0], ["-O0", "-shared", "-fPIC", "-ffp-contract=off", "-DPORTABLE"]))
+        str(
+            compiled(
+                tmp_path,
+                emitted_files["chain.c"],
+                COMPILERS[0],
+                ["-O0", "-shared", "-fPIC", "-ffp-contract=off", "-DPORTABLE"],
+            )
+        )
     )
     compare(library, numpy_module("chain", emitted_files["chain.py"]), (1, 33))
 
@@ -173,7 +242,9 @@ int main(void)
 
 @campaign
 @needs_compiler
-@pytest.mark.parametrize("path", [[], pytest.param(["-DPORTABLE"], marks=campaign)], ids=["wide", "portable"])
+@pytest.mark.parametrize(
+    "path", [[], pytest.param(["-DPORTABLE"], marks=campaign)], ids=["wide", "portable"]
+)
 def test_sanitizers(path: list[str], tmp_path: Path) -> None:
     module = numpy_module("scara", files("scara")["scara.py"])
     sizes = {"name": "scara", "n": len(module.JOINTS), "b": len(module.BASE_PARAMETERS)}
@@ -182,7 +253,9 @@ def test_sanitizers(path: list[str], tmp_path: Path) -> None:
     (tmp_path / "robot.c").write_text(files("scara")["scara.c"], encoding="utf-8")
     sanitize = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     flags = [*FLAGS, "-O1", *path, *sanitize, "main.c", "robot.c", "-o", "main", "-lm"]
-    done = subprocess.run([COMPILERS[0], *flags], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [COMPILERS[0], *flags], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and done.stderr == "", done.stderr
@@ -190,18 +263,37 @@ def test_sanitizers(path: list[str], tmp_path: Path) -> None:
 
 def test_quantities_have_the_names_of_the_numpy_module() -> None:
     text = files("tx40")["tx40.c"]
-    assert "const double W12 = -S2*QP1;" in text and "/* Link 2 */" in text and "np." not in text and "**" not in text.split("*/", 1)[1]
+    assert (
+        "const double W12 = -S2*QP1;" in text
+        and "/* Link 2 */" in text
+        and "np." not in text
+        and "**" not in text.split("*/", 1)[1]
+    )
 
 
 @needs_compiler
-@pytest.mark.parametrize("title", ["*/ int evil(void) { return 1; } /*", "a /* b */ c", "?\u202e?/ \\", "**/*/ */", "\n*/", "ends in \\"])
+@pytest.mark.parametrize(
+    "title",
+    [
+        "*/ int evil(void) { return 1; } /*",
+        "a /* b */ c",
+        "?\u202e?/ \\",
+        "**/*/ */",
+        "\n*/",
+        "ends in \\",
+    ],
+)
 def test_texts_stay_in_their_comment(title: str, tmp_path: Path) -> None:
     """A robot refuses most such titles itself; the command may hold any file name."""
     robot = replace(load_robot("planar_2r"), title="?? / ** / ?? *")
     text = generate_files(robot, targets=("c",), command=title)["planar_2r.c"]
     compiled(tmp_path, text, COMPILERS[0], [*FLAGS, "-O0", "-shared", "-fPIC"])
     comment, code = text.split("*/", 1)
-    assert "evil" not in code and comment.count("/*") == 1 and code == files("planar_2r")["planar_2r.c"].split("*/", 1)[1]
+    assert (
+        "evil" not in code
+        and comment.count("/*") == 1
+        and code == files("planar_2r")["planar_2r.c"].split("*/", 1)[1]
+    )
 
 
 AWKWARD = b"""
@@ -230,10 +322,17 @@ def test_constants_with_the_names_of_c(tmp_path: Path) -> None:
 @needs_compiler
 def test_nan_and_infinity_as_in_numpy(tmp_path: Path) -> None:
     module = numpy_module("planar_2r", files("planar_2r")["planar_2r.py"])
-    library = ctypes.CDLL(str(compiled(tmp_path, files("planar_2r")["planar_2r.c"], COMPILERS[0], FAST)))
+    library = ctypes.CDLL(
+        str(compiled(tmp_path, files("planar_2r")["planar_2r.c"], COMPILERS[0], FAST))
+    )
     states = np.ones((3, 5, 2))
     states[1, 1, 0], states[1, 2, 1], states[2, 3, 0] = np.nan, np.inf, -np.inf
     b = len(module.BASE_PARAMETERS)
     with np.errstate(invalid="ignore"):
         expected = module.regressor(*states)
-    np.testing.assert_allclose(call(library, module, "regressor", states, np.ones(b), (2, b), 0), expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        call(library, module, "regressor", states, np.ones(b), (2, b), 0),
+        expected,
+        rtol=1e-12,
+        atol=1e-12,
+    )

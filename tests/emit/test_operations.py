@@ -11,62 +11,81 @@ from campaign import sampled
 
 from symgen.description import load_robot, packaged_robots
 from symgen.emit.generate import generate_module
-from symgen.emit.printers import Text
-from symgen.emit.spec import inverse_dynamics, is_inertial, is_inertial_or_actuator, module_spec, regressor_program
+from symgen.emit.printers import NUMPY
+from symgen.emit.python_target import blocks_of
+from symgen.emit.spec import function, is_inertial, is_inertial_or_actuator, module_spec
 from symgen.regroup.regrouping import Regrouping, regroup
 
 
 def counted(source: str) -> tuple[int, int]:
-    """(multiplications, additions) of a text by its syntax tree; a square is one multiplication, a sign is free."""
+    """(multiplications, additions) of a text by its syntax tree; a square is one multiplication, a
+    sign is free.
+    """
     operators = [node.op for node in ast.walk(ast.parse(source)) if isinstance(node, ast.BinOp)]
-    return sum(isinstance(op, ast.Mult | ast.Pow) for op in operators), sum(isinstance(op, ast.Add | ast.Sub) for op in operators)
+    return sum(isinstance(op, ast.Mult | ast.Pow) for op in operators), sum(
+        isinstance(op, ast.Add | ast.Sub) for op in operators
+    )
 
 
 @pytest.mark.parametrize("name", sampled(packaged_robots(), 5, always=("tx40",)))
 def test_header_counts_are_those_of_the_text(name: str) -> None:
     tree = ast.parse(generate_module(load_robot(name)))
     header = ast.get_docstring(tree) or ""
-    blocks = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name.endswith("_block")}
+    blocks = {
+        node.name: node
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and node.name.endswith("_block")
+    }
     stated = re.findall(r"^ {4}(\w+) +(\d+) multiplications, (\d+) additions", header, re.MULTILINE)
     assert len(stated) >= 6 and {f"_{function}_block" for function, *_ in stated} >= blocks.keys()
-    for function, mul, add in stated:  # a model in which nothing acts has no block
-        body = "\n".join(ast.unparse(statement) for statement in getattr(blocks.get(f"_{function}_block"), "body", []))
-        assert counted(body) == (int(mul), int(add)), function
+    for model, mul, add in stated:  # a model in which nothing acts has no block
+        body = "\n".join(
+            ast.unparse(statement)
+            for statement in getattr(blocks.get(f"_{model}_block"), "body", [])
+        )
+        assert counted(body) == (int(mul), int(add)), model
 
 
 def regressor_operations(regrouping: Regrouping, only: Callable[[str], bool]) -> tuple[int, int]:
-    _, program = regressor_program(regrouping, tuple(own for own in regrouping.own if only(own)))
-    return Text(program.outputs, program.sections, ()).operations
+    return function(regrouping, "regressor", only).operations
 
 
 def at_most(found: tuple[int, int], limit: tuple[int, int]) -> bool:
     return found[0] <= limit[0] and found[1] <= limit[1]
 
 
-# Limits: regrouping theory, section 6 (axis form; product form). Peers: OpenSYMORO 577/336 and 287/226, SymPyBotics 548/339 and 298/228.
+# Limits: regrouping theory, section 6 (axis form; product form). Peers: OpenSYMORO 577/336 and
+# 287/226, SymPyBotics 548/339 and 298/228.
 def test_tx40_table1_limits() -> None:
     regrouping = regroup(load_robot("tx40_table1"))
     robot = regrouping.robot
     columns = [own for own in regrouping.own if is_inertial_or_actuator(robot)(own)]
     assert len(columns) == 40
     assert at_most(regressor_operations(regrouping, is_inertial_or_actuator(robot)), (367, 272))
-    model = inverse_dynamics(regrouping, is_inertial(robot))
-    assert at_most((model.mul, model.add), (247, 233))
+    model = function(regrouping, "inverse_dynamics", is_inertial(robot))
+    assert at_most(model.operations, (247, 233))
 
 
 def test_panda_limits() -> None:
     regrouping = regroup(load_robot("panda"))
     robot = regrouping.robot
     assert at_most(regressor_operations(regrouping, is_inertial_or_actuator(robot)), (688, 500))
-    model = inverse_dynamics(regrouping, is_inertial(robot))
-    assert at_most((model.mul, model.add), (314, 297))
+    model = function(regrouping, "inverse_dynamics", is_inertial(robot))
+    assert at_most(model.operations, (314, 297))
 
 
 @pytest.mark.parametrize("name", sampled(packaged_robots(), 5, always=("tx40",)))
 def test_names_come_from_structure(name: str) -> None:
-    """No temporaries, no running numbers: every local is a family with indices, a product of names, or a constant."""
-    for function in module_spec(regroup(load_robot(name))).functions.values():
-        lines = [line for section in function.sections for line in section.lines]
-        names = [line.split(" = ")[0] for line in lines if "[" not in line.split(" = ")[0] and " = " in line]
+    """No temporaries, no running numbers: every local is a family with indices, a product of names,
+    or a constant.
+    """
+    spec = module_spec(regroup(load_robot(name)))
+    for block in blocks_of(spec, NUMPY).values():
+        lines = [line for section in block.sections([]) for line in section.lines]
+        names = [
+            line.split(" = ")[0]
+            for line in lines
+            if "[" not in line.split(" = ")[0] and " = " in line
+        ]
         assert not [n for n in names if re.fullmatch(r"(tmp|t|x|K)\d+", n)]
         assert len(set(names)) == len(names)

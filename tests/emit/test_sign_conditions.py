@@ -1,4 +1,6 @@
-"""Frictions of dependent directions are one parameter, for the sign that their ratio has in the robot file."""
+"""Frictions of dependent directions are one parameter, for the sign that their ratio has in the
+robot file.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +29,14 @@ elements:
 def test_friction_of_a_mimic_joint_is_regrouped(KR: float, formula: str) -> None:
     robot = symgen.parse_robot(MIMIC.format(KR=KR).encode(), "mimic.yaml")
     found = symgen.regrouping(robot)
-    assert symgen.certify(found).valid
+    assert symgen.certificate(found).valid
     assert {b.name: str(b.formula) for b in found.base}["FS1R"] == formula
     model = runtime.load_model(symgen.model(robot))
     chi = np.arange(1.0, len(model.STANDARD_PARAMETERS) + 1)
     assert np.isfinite(model.base_parameters(chi, KR=KR / 2)).all()
-    with pytest.raises(ValueError, match=rf"FS1R holds where KR is {'positive' if KR > 0 else 'negative'}"):
+    with pytest.raises(
+        ValueError, match=rf"FS1R holds where KR is {'positive' if KR > 0 else 'negative'}"
+    ):
         model.base_parameters(chi, KR=-KR)
     function = symgen.model(robot, target="casadi").base_parameters
     k = model.BASE_PARAMETERS.index("FS1R")

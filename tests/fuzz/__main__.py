@@ -1,4 +1,6 @@
-"""python -m fuzz [FORMAT ...] [--cases N] [--seed S] [--out FOLDER]: counts by format; new faults, minimised, in FOLDER/FORMAT/."""
+"""python -m fuzz [FORMAT ...] [--cases N] [--seed S] [--out FOLDER]: counts by format; new faults,
+minimised, in FOLDER/FORMAT/.
+"""
 
 from __future__ import annotations
 
@@ -23,27 +25,46 @@ def main() -> None:
     total = sum(FORMATS[name].share for name in arguments.formats)
     counts = {}
     for name in arguments.formats:
-        reader = Reader()  # of its own: threads of one library must not count against the memory of the next
+        reader = (
+            Reader()
+        )  # of its own: threads of one library must not count against the memory of the next
         cases, begun = arguments.cases * FORMATS[name].share // total, monotonic()
-        found: dict[str, float] = {"ok": 0, "refused": 0, "fault": 0, "seconds": 0.0, "peak_MB": 0.0}
+        found: dict[str, float] = {
+            "ok": 0,
+            "refused": 0,
+            "fault": 0,
+            "seconds": 0.0,
+            "peak_MB": 0.0,
+        }
         known: set[tuple[str, str]] = set()
         slowest = (0.0, 0)
-        for number, content, outcome in run(reader, name, arguments.seed, range(arguments.first, arguments.first + cases)):
+        for number, content, outcome in run(
+            reader, name, arguments.seed, range(arguments.first, arguments.first + cases)
+        ):
             found["fault" if outcome.fault else outcome.kind] += 1
             slowest = max(slowest, (outcome.seconds, number))
             found["peak_MB"] = max(found["peak_MB"], round(outcome.peak / 1e6))
             if outcome.fault and (outcome.kind, outcome.where) not in known:
                 known.add((outcome.kind, outcome.where))
-                content = smaller(reader, name, content, outcome, 12 if outcome.kind in ("hang", "death") else 300)
+                content = smaller(
+                    reader, name, content, outcome, 12 if outcome.kind in ("hang", "death") else 300
+                )
                 folder = arguments.out / name
                 folder.mkdir(parents=True, exist_ok=True)
                 label = hashlib.sha256(content).hexdigest()[:12]
                 (folder / label).write_bytes(content)
                 (folder / f"{label}.txt").write_text(
-                    f"seed {arguments.seed} number {number}\n{outcome.kind} {outcome.where}\n{outcome.text}\n", errors="replace"
+                    (
+                        f"seed {arguments.seed} number {number}\n{outcome.kind} "
+                        f"{outcome.where}\n{outcome.text}\n"
+                    ),
+                    errors="replace",
                 )
                 print(
-                    f"  {name} {number}: {outcome.kind} {outcome.where} -> {label}\n     {outcome.text.strip().splitlines()[-1][:200] if outcome.text.strip() else ''}",
+                    (
+                        f"  {name} {number}: {outcome.kind} {outcome.where} -> {label}\n     "
+                        f"{outcome.text.strip().splitlines()[-1][:200] if outcome.text.strip() else ''}"
+                    ),
                     flush=True,
                 )
         found["seconds"] = round(slowest[0], 2)

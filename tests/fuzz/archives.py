@@ -1,4 +1,6 @@
-"""Cases of binary formats, aware of their structure: NumPy headers, ZIP archives, MATLAB elements, Parquet and gzip."""
+"""Cases of binary formats, aware of their structure: NumPy headers, ZIP archives, MATLAB elements,
+Parquet and gzip.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,11 @@ def npy_header(text: str, version: tuple[int, int] = (1, 0), length: int | None 
     return (
         b"\x93NUMPY"
         + bytes(version)
-        + (struct.pack("<H", size & 0xFFFF) if version == (1, 0) else struct.pack("<I", size & 0xFFFFFFFF))
+        + (
+            struct.pack("<H", size & 0xFFFF)
+            if version == (1, 0)
+            else struct.pack("<I", size & 0xFFFFFFFF)
+        )
         + data
     )
 
@@ -44,13 +50,25 @@ def npy(rng: random.Random, rows: int = 12) -> bytes:
         rng.choice(("False", "True", "0", "'x'", "None")),
     )
     sound = ("'<f8'", "False", "(12, 5)")
-    dtype, fortran, shape = (x if rng.random() < 0.5 else y for x, y in zip((dtype, fortran, shape), sound, strict=True))
-    text = f"{{'descr': {dtype}, 'fortran_order': {fortran}, 'shape': {shape}}}" if rng.random() < 0.85 else rng.choice(HEADERS)
+    dtype, fortran, shape = (
+        x if rng.random() < 0.5 else y for x, y in zip((dtype, fortran, shape), sound, strict=True)
+    )
+    text = (
+        f"{{'descr': {dtype}, 'fortran_order': {fortran}, 'shape': {shape}}}"
+        if rng.random() < 0.85
+        else rng.choice(HEADERS)
+    )
     text += rng.choice((" " * 20 + "\n",) * 9 + ("\n", "", " " * 60000))
     version = rng.choice(((1, 0),) * 20 + ((2, 0), (3, 0), (4, 0), (0, 0), (255, 255)))
     length = rng.choice((None,) * 20 + (0, 1, 65535, 2**31, 2**32 - 1))
     body = rng.choice(
-        (*[np.arange(rows * 5, dtype=float).tobytes()] * 6, np.full(rows * 5, np.nan).tobytes(), b"", b"\x80\x04N.", bytes(range(200)))
+        (
+            *[np.arange(rows * 5, dtype=float).tobytes()] * 6,
+            np.full(rows * 5, np.nan).tobytes(),
+            b"",
+            b"\x80\x04N.",
+            bytes(range(200)),
+        )
     )
     return npy_header(text, version, length) + body
 
@@ -89,13 +107,21 @@ def npz(members: dict[str, bytes], rng: random.Random) -> bytes:
     if rng.random() < 0.2:
         members.pop(rng.choice(sorted(members)))
     stream = io.BytesIO()
-    method = rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA))
+    method = rng.choice(
+        (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA)
+    )
     with zipfile.ZipFile(stream, "w", method, allowZip64=True) as archive:
         for name, data in members.items():
             archive.writestr(name or "q1.npy", data)
     data = bytearray(stream.getvalue())
-    for _ in range(rng.choice((0, 0, 1, 2))):  # fields of the local and central headers and of the end
-        found = [k for mark in (b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06") for k in positions(data, mark)]
+    for _ in range(
+        rng.choice((0, 0, 1, 2))
+    ):  # fields of the local and central headers and of the end
+        found = [
+            k
+            for mark in (b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06")
+            for k in positions(data, mark)
+        ]
         if not found:
             break
         at = rng.choice(found) + rng.randrange(4, 46)
@@ -138,7 +164,9 @@ COUNTS = (0, 1, 2, 7, 8, 12, 255, 2**16, 2**28, 2**31 - 1, 2**31, 2**32 - 8, 2**
 def element(kind: int, data: bytes, declared: int | None = None) -> bytes:
     """A data element of MATLAB's level 5."""
     return (
-        struct.pack("<II", kind & 0xFFFFFFFF, (len(data) if declared is None else declared) & 0xFFFFFFFF)
+        struct.pack(
+            "<II", kind & 0xFFFFFFFF, (len(data) if declared is None else declared) & 0xFFFFFFFF
+        )
         + data
         + b"\x00" * (-len(data) % 8)
     )
@@ -146,12 +174,23 @@ def element(kind: int, data: bytes, declared: int | None = None) -> bytes:
 
 def mat5(rng: random.Random, depth: int = 3) -> bytes:
     """A .mat file of level 5 with declared sizes, classes and types that may be wrong."""
-    parts = [matrix(rng, name, depth) for name in rng.sample(("t", "q1", "q2", "tau1", "tau2", "x", ""), rng.randrange(1, 7))]
-    parts = [element(15, zlib.compress(part), rng.choice((None,) * 6 + COUNTS)) if rng.random() < 0.3 else part for part in parts]
+    parts = [
+        matrix(rng, name, depth)
+        for name in rng.sample(("t", "q1", "q2", "tau1", "tau2", "x", ""), rng.randrange(1, 7))
+    ]
+    parts = [
+        element(15, zlib.compress(part), rng.choice((None,) * 6 + COUNTS))
+        if rng.random() < 0.3
+        else part
+        for part in parts
+    ]
     head = (
         rng.choice((b"MATLAB 5.0 MAT-file", b"", b"x" * 200)).ljust(116)[:116]
         + b"\x00" * 8
-        + rng.choice((b"\x00\x01IM",) * 8 + (b"\x01\x00MI", b"\x00\x02IM", b"\x00\x00\x00\x00", b"\x00\x03IM"))
+        + rng.choice(
+            (b"\x00\x01IM",) * 8
+            + (b"\x01\x00MI", b"\x00\x02IM", b"\x00\x00\x00\x00", b"\x00\x03IM")
+        )
     )
     return head + b"".join(parts)
 
@@ -161,9 +200,25 @@ def matrix(rng: random.Random, name: str, depth: int) -> bytes:
     kind = rng.choice((6, 6, 6, 6, 7, 9, 12, 14, 4, 1, 2, 3, 5, 16, 17, 18, 0, 255))
     sizes = rng.choice(
         ((12, 1),) * 6
-        + ((1, 12), (12, 2), (3, 2, 2), (0, 0), (-1, 12), (2**31 - 1, 1), (2**30, 4), (2**31 - 1, 2**31 - 1), (1,) * 40, (), (12,))
+        + (
+            (1, 12),
+            (12, 2),
+            (3, 2, 2),
+            (0, 0),
+            (-1, 12),
+            (2**31 - 1, 1),
+            (2**30, 4),
+            (2**31 - 1, 2**31 - 1),
+            (1,) * 40,
+            (),
+            (12,),
+        )
     )
-    head = element(6, struct.pack("<II", kind | rng.choice((0, 0, 0, 0x800, 0x200)), 0), rng.choice((None,) * 9 + COUNTS))
+    head = element(
+        6,
+        struct.pack("<II", kind | rng.choice((0, 0, 0, 0x800, 0x200)), 0),
+        rng.choice((None,) * 9 + COUNTS),
+    )
     head += element(5, struct.pack(f"<{len(sizes)}i", *sizes), rng.choice((None,) * 9 + COUNTS))
     head += element(rng.choice((1, 1, 1, 1, 9, 0)), name.encode(), rng.choice((None,) * 9 + COUNTS))
     if kind in (1, 2) and depth:
@@ -171,10 +226,16 @@ def matrix(rng: random.Random, name: str, depth: int) -> bytes:
             head += element(5, struct.pack("<i", rng.choice((32, 0, -1, 2**31 - 1)))) + element(
                 1, b"a".ljust(32, b"\x00"), rng.choice((None, None, *COUNTS))
             )
-        body = b"".join(matrix(rng, rng.choice(("", "q1")), depth - 1) for _ in range(rng.choice((0, 1, 12))))
+        body = b"".join(
+            matrix(rng, rng.choice(("", "q1")), depth - 1) for _ in range(rng.choice((0, 1, 12)))
+        )
     else:
         data = np.arange(12, dtype=float).tobytes()
-        body = element(rng.choice((9, 9, 9, 7, 2, 12, 14, 15, 16, 99, 0)), data, rng.choice((None,) * 6 + COUNTS))
+        body = element(
+            rng.choice((9, 9, 9, 7, 2, 12, 14, 15, 16, 99, 0)),
+            data,
+            rng.choice((None,) * 6 + COUNTS),
+        )
     return element(14, head + body, rng.choice((None,) * 9 + COUNTS))
 
 
@@ -190,7 +251,10 @@ def mat4(rng: random.Random) -> bytes:
         )
         length = rng.choice((len(name) + 1, len(name) + 1, *COUNTS))
         parts.append(
-            struct.pack("<5I", mopt, rows, columns, imaginary, length) + name.encode() + b"\x00" + np.arange(12, dtype=float).tobytes()
+            struct.pack("<5I", mopt, rows, columns, imaginary, length)
+            + name.encode()
+            + b"\x00"
+            + np.arange(12, dtype=float).tobytes()
         )
     return b"".join(parts)
 
@@ -199,7 +263,9 @@ def gzipped(content: bytes, rng: random.Random) -> bytes:
     """The content compressed, its header or end damaged now and then."""
     data = bytearray(gzip.compress(content, 1, mtime=0))
     for _ in range(rng.choice((0, 0, 1, 2))):
-        data[rng.choice((*range(2, 12), -1, -4, -8, len(data) // 2)) % len(data)] = rng.randrange(256)
+        data[rng.choice((*range(2, 12), -1, -4, -8, len(data) // 2)) % len(data)] = rng.randrange(
+            256
+        )
     return bytes(data if rng.random() < 0.9 else data[: rng.randrange(2, len(data))]) + rng.choice(
         (b"",) * 8 + (b"\x00" * 20, b"\x1f\x8b", b"junk", bytes(data))
     )

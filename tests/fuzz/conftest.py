@@ -7,7 +7,9 @@ import pytest
 from fuzz.harness import Reader
 
 if sys.platform != "linux":
-    collect_ignore_glob = ["test_*.py"]  # limits of memory and what a process has used are read as Linux tells them
+    collect_ignore_glob = [
+        "test_*.py"
+    ]  # limits of memory and what a process has used are read as Linux tells them
 
 
 @pytest.fixture(scope="session")

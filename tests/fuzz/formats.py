@@ -49,7 +49,11 @@ FORMATS: dict[str, Format] = {
     "db3": Format("db3", partial(making.make_bag, "db3"), reading.read_record, 15),
     "ros2": Format("zip", making.make_ros2, reading.read_folder, 20, ("case", "run.")),
     "model": Format("py", making.make_model, reading.read_model, 20),
-    "checkpoint": Format("npz", making.make_checkpoint, reading.read_checkpoint, 10, ("000000.npz",)),
-    "settings": Format("json", making.make_settings, reading.read_settings, 5, ("study.json", "runs")),
+    "checkpoint": Format(
+        "npz", making.make_checkpoint, reading.read_checkpoint, 10, ("000000.npz",)
+    ),
+    "settings": Format(
+        "json", making.make_settings, reading.read_settings, 5, ("study.json", "runs")
+    ),
     "estimate": Format("json", making.make_estimate, reading.read_estimate, 15),
 }

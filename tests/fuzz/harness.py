@@ -1,6 +1,8 @@
-"""Runs cases in another process that may hang, run out of memory or die, and tells faults from clear errors.
+"""Runs cases in another process that may hang, run out of memory or die, and tells faults from
+clear errors.
 
-Outcomes: "ok"; "refused", an error of this project's own that names the file in a short printable text; else a fault: any other exception, an
+Outcomes: "ok"; "refused", an error of this project's own that names the file in a short printable
+text; else a fault: any other exception, an
 unclear message, more than SECONDS of processor time, more than MEMORY, the death of the process.
 """
 
@@ -31,7 +33,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Outcome:
-    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds : processor time.   peak : bytes, the most so far, with the largest process started."""
+    """kind : ok, refused or a fault's name.   where : what tells faults apart.   seconds :
+    processor time.   peak : bytes, the most so far, with the largest process started.
+    """
 
     kind: str
     where: str = ""
@@ -44,7 +48,9 @@ class Outcome:
         return self.kind not in ("ok", "refused")
 
 
-def judged(read: Callable[[Path], object], path: Path, named: tuple[str, ...] = ("case",)) -> Outcome:
+def judged(
+    read: Callable[[Path], object], path: Path, named: tuple[str, ...] = ("case",)
+) -> Outcome:
     """What reading the file gives, in this process; an error holds one of the texts `named`."""
     from runtime.errors import InputError
     from symgen.errors import SymgenError
@@ -60,9 +66,19 @@ def judged(read: Callable[[Path], object], path: Path, named: tuple[str, ...] = 
             problem = "holds characters that a terminal obeys"
         elif len(text) > LONGEST:
             problem = f"has more than {LONGEST} characters"
-        return Outcome("unclear" if problem else "refused", f"{problem} {place(e)}".strip(), text[:600], processor_time() - start)
+        return Outcome(
+            "unclear" if problem else "refused",
+            f"{problem} {place(e)}".strip(),
+            text[:600],
+            processor_time() - start,
+        )
     except BaseException as e:
-        return Outcome(type(e).__name__, place(e), "".join(traceback.format_exception(e))[-3000:], processor_time() - start)
+        return Outcome(
+            type(e).__name__,
+            place(e),
+            "".join(traceback.format_exception(e))[-3000:],
+            processor_time() - start,
+        )
     return Outcome("ok", seconds=processor_time() - start)
 
 
@@ -74,12 +90,18 @@ def processor_time() -> float:
 
 def place(e: BaseException) -> str:
     """The innermost line of this repository that the exception passed."""
-    frames = [f for f in traceback.extract_tb(e.__traceback__) if f.filename.startswith(str(ROOT)) and "/tests/" not in f.filename]
+    frames = [
+        f
+        for f in traceback.extract_tb(e.__traceback__)
+        if f.filename.startswith(str(ROOT)) and "/tests/" not in f.filename
+    ]
     return f"{Path(frames[-1].filename).name}:{frames[-1].name}" if frames else "outside"
 
 
 def serve(pipe, folder: Path) -> None:
-    """The other process: a format and a case come in, an outcome goes out; cases are files in `folder`."""
+    """The other process: a format and a case come in, an outcome goes out; cases are files in
+    `folder`.
+    """
     os.environ.update(OPENBLAS_NUM_THREADS="1", POLARS_MAX_THREADS="1")
     from fuzz.formats import FAULTY, FORMATS
 
@@ -104,16 +126,28 @@ def serve(pipe, folder: Path) -> None:
         if not limited:  # after the first case, whose libraries map much that they never touch
             path = written(folder, known[name].ending, b"")
             judged(known[name].read, path)
-            resource.setrlimit(resource.RLIMIT_DATA, (memory("VmData") - memory("VmRSS") + MEMORY,) * 2)
+            resource.setrlimit(
+                resource.RLIMIT_DATA, (memory("VmData") - memory("VmRSS") + MEMORY,) * 2
+            )
             limited = True
         path = written(folder, known[name].ending, content)
         outcome = judged(known[name].read, path, known[name].named)
-        pipe.send(replace(outcome, peak=memory("VmHWM") + 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))
+        pipe.send(
+            replace(
+                outcome,
+                peak=memory("VmHWM")
+                + 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss,
+            )
+        )
 
 
 def memory(key: str) -> int:
     """Bytes of this process that the system calls so."""
-    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines() if ":" in line)
+    status = dict(
+        line.split(":", 1)
+        for line in Path("/proc/self/status").read_text().splitlines()
+        if ":" in line
+    )
     return 1024 * int(status[key].split()[0])
 
 
@@ -142,9 +176,16 @@ class Reader:
             self.pipe.send((name, content))
         begun, used = monotonic(), self._used()
         while not self.pipe.poll(0.2):
-            if self._used() - used > self.seconds + START * (self.served == 1) or monotonic() - begun > WAIT:
+            if (
+                self._used() - used > self.seconds + START * (self.served == 1)
+                or monotonic() - begun > WAIT
+            ):
                 self.close()
-                return Outcome("hang", "waits" if monotonic() - begun > WAIT else "computes", f"more than {self.seconds} s")
+                return Outcome(
+                    "hang",
+                    "waits" if monotonic() - begun > WAIT else "computes",
+                    f"more than {self.seconds} s",
+                )
         try:
             outcome = self.pipe.recv()
         except (EOFError, ConnectionError):
@@ -159,8 +200,12 @@ class Reader:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self.pipe, other = context.Pipe()
-        self.folder = tempfile.TemporaryDirectory(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None)
-        self.process = context.Process(target=serve, args=(other, Path(self.folder.name)), daemon=True)
+        self.folder = tempfile.TemporaryDirectory(
+            prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None
+        )
+        self.process = context.Process(
+            target=serve, args=(other, Path(self.folder.name)), daemon=True
+        )
         self.process.start()
         other.close()
         self.served = 0
@@ -189,7 +234,9 @@ def case(name: str, seed: int, number: int) -> bytes:
     return FORMATS[name].make(random.Random(f"{name} {seed} {number}"))
 
 
-def run(reader: Reader, name: str, seed: int, numbers: range) -> Iterator[tuple[int, bytes, Outcome]]:
+def run(
+    reader: Reader, name: str, seed: int, numbers: range
+) -> Iterator[tuple[int, bytes, Outcome]]:
     """Outcomes of cases."""
     for number in numbers:
         content = case(name, seed, number)

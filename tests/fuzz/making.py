@@ -21,7 +21,11 @@ def either(
     content = structured(rng) if rng.random() < share else rng.choice(sound)
     if rng.random() < share and content not in sound:
         return content
-    return mutated(content, rng, sound) if tokens is None or rng.random() < 0.5 else mutated(content, rng, sound, tokens)
+    return (
+        mutated(content, rng, sound)
+        if tokens is None or rng.random() < 0.5
+        else mutated(content, rng, sound, tokens)
+    )
 
 
 def small_first(rng: random.Random, items: tuple) -> object:
@@ -33,7 +37,9 @@ def make_robot(rng: random.Random) -> bytes:
     return either(
         rng,
         seeds.robots(),
-        lambda rng: texts.structured(small_first(rng, seeds.robot_tables()), rng, others=seeds.robot_tables()),
+        lambda rng: texts.structured(
+            small_first(rng, seeds.robot_tables()), rng, others=seeds.robot_tables()
+        ),
         tokens=texts.TOKENS,
     )
 
@@ -43,20 +49,56 @@ def make_expression(rng: random.Random) -> bytes:
     spots = [
         path
         for path in texts.places(table)
-        if path and path[0] in ("frames", "gravity", "elements", "constants", "constraints", "limits", "drives", "values")
+        if path
+        and path[0]
+        in (
+            "frames",
+            "gravity",
+            "elements",
+            "constants",
+            "constraints",
+            "limits",
+            "drives",
+            "values",
+        )
     ]
     for _ in range(rng.choice((1, 2, 4))):
-        table = texts.changed(table, rng.choice(spots), texts.Raw("'" + texts.expression(rng, ("q1", "q2", "D2", "g"), 5) + "'"))
+        table = texts.changed(
+            table,
+            rng.choice(spots),
+            texts.Raw("'" + texts.expression(rng, ("q1", "q2", "D2", "g"), 5) + "'"),
+        )
     return texts.yaml_text(table).encode()
 
 
 def make_derived(rng: random.Random) -> bytes:
     """Files that still describe a robot more often: one number or expression changed."""
-    table = small_first(rng, (seeds.robot_tables()[0], seeds.robot_tables()[4], seeds.robot_tables()[2], seeds.robot_tables()[3]))
+    table = small_first(
+        rng,
+        (
+            seeds.robot_tables()[0],
+            seeds.robot_tables()[4],
+            seeds.robot_tables()[2],
+            seeds.robot_tables()[3],
+        ),
+    )
     spots = [
         path
         for path in texts.places(table)
-        if path and path[0] in ("frames", "gravity", "constants", "elements", "values", "drives", "limits", "title", "source", "name")
+        if path
+        and path[0]
+        in (
+            "frames",
+            "gravity",
+            "constants",
+            "elements",
+            "values",
+            "drives",
+            "limits",
+            "title",
+            "source",
+            "name",
+        )
     ]
     value = rng.choice(
         (
@@ -87,11 +129,20 @@ def make_par(rng: random.Random) -> bytes:
 
 
 def make_urdf(rng: random.Random) -> bytes:
-    return either(rng, seeds.urdf_files(), lambda rng: xml_texts.changed(rng.choice(seeds.urdf_files()), rng, xml_texts.URDF))
+    return either(
+        rng,
+        seeds.urdf_files(),
+        lambda rng: xml_texts.changed(rng.choice(seeds.urdf_files()), rng, xml_texts.URDF),
+    )
 
 
 def make_mjcf(rng: random.Random) -> bytes:
-    return either(rng, seeds.mjcf_files(), lambda rng: xml_texts.changed(rng.choice(seeds.mjcf_files()), rng, xml_texts.MJCF), 0.75)
+    return either(
+        rng,
+        seeds.mjcf_files(),
+        lambda rng: xml_texts.changed(rng.choice(seeds.mjcf_files()), rng, xml_texts.MJCF),
+        0.75,
+    )
 
 
 def make_study(rng: random.Random) -> bytes:
@@ -99,7 +150,9 @@ def make_study(rng: random.Random) -> bytes:
     return either(
         rng,
         sound,
-        lambda rng: texts.structured(rng.choice(seeds.study_tables()), rng, ("pi", "1", "2"), seeds.study_tables()),
+        lambda rng: texts.structured(
+            rng.choice(seeds.study_tables()), rng, ("pi", "1", "2"), seeds.study_tables()
+        ),
         tokens=texts.TOKENS,
     )
 
@@ -107,14 +160,19 @@ def make_study(rng: random.Random) -> bytes:
 def make_fleet(rng: random.Random) -> bytes:
     sound = tuple(texts.yaml_text(table).encode() for table in seeds.FLEETS)
     return either(
-        rng, sound, lambda rng: texts.structured(rng.choice(seeds.FLEETS), rng, ("pi",), seeds.study_tables()), tokens=texts.TOKENS
+        rng,
+        sound,
+        lambda rng: texts.structured(rng.choice(seeds.FLEETS), rng, ("pi",), seeds.study_tables()),
+        tokens=texts.TOKENS,
     )
 
 
 def make_motion(rng: random.Random) -> bytes:
     table = {
         "controller": {"rate": 500, "reference": {"motion": seeds.MOTION}},
-        "excitation": {"parts": [{k: v for k, v in part.items() if k != "p"} for part in seeds.MOTION["parts"]]},
+        "excitation": {
+            "parts": [{k: v for k, v in part.items() if k != "p"} for part in seeds.MOTION["parts"]]
+        },
     }
     return texts.structured(table, rng, ("pi", "1"), (table,))
 
@@ -132,7 +190,11 @@ def make_npz(rng: random.Random) -> bytes:
 
 
 def make_mat(rng: random.Random) -> bytes:
-    return either(rng, seeds.mat_files(), lambda rng: archives.mat5(rng) if rng.random() < 0.8 else archives.mat4(rng))
+    return either(
+        rng,
+        seeds.mat_files(),
+        lambda rng: archives.mat5(rng) if rng.random() < 0.8 else archives.mat4(rng),
+    )
 
 
 def make_mat73(rng: random.Random) -> bytes:
@@ -144,9 +206,9 @@ def make_parquet(rng: random.Random) -> bytes:
     if rng.random() < 0.5:  # the footer, where shapes and places stand
         length = int.from_bytes(content[-8:-4], "little")
         for _ in range(rng.choice((1, 1, 2, 5))):
-            content[len(content) - 8 - rng.randrange(length + 8 if rng.random() < 0.1 else length)] = rng.choice(
-                (0, 0xFF, 0x7F, 0x80, rng.randrange(256))
-            )
+            content[
+                len(content) - 8 - rng.randrange(length + 8 if rng.random() < 0.1 else length)
+            ] = rng.choice((0, 0xFF, 0x7F, 0x80, rng.randrange(256)))
         return bytes(content)
     return mutated(bytes(content), rng, seeds.parquet_files())
 
@@ -209,13 +271,21 @@ def make_model(rng: random.Random) -> bytes:
         rng.choice(seeds.model_files()),
         rng,
         seeds.model_files(),
-        tokens if rng.random() < 0.6 else (b"0", b"1", b"", b"\n", b"    ", b"q", b"np.", b"'", b"(", b")", b",", b"-1"),
+        tokens
+        if rng.random() < 0.6
+        else (b"0", b"1", b"", b"\n", b"    ", b"q", b"np.", b"'", b"(", b")", b",", b"-1"),
     )
 
 
 def make_checkpoint(rng: random.Random) -> bytes:
-    members = {f"{name}.npy": archives.plain_npy(x) for name, x in seeds.checkpoint_arrays().items()}
-    return archives.npz(members, rng) if rng.random() < 0.7 else mutated(archives.npz(members, random.Random(1)), rng)
+    members = {
+        f"{name}.npy": archives.plain_npy(x) for name, x in seeds.checkpoint_arrays().items()
+    }
+    return (
+        archives.npz(members, rng)
+        if rng.random() < 0.7
+        else mutated(archives.npz(members, random.Random(1)), rng)
+    )
 
 
 def make_settings(rng: random.Random) -> bytes:

@@ -12,7 +12,12 @@ BYTES = (
 )  # fmt: skip
 
 
-def mutated(content: bytes, rng: random.Random, others: tuple[bytes, ...] = (), tokens: tuple[bytes, ...] = BYTES) -> bytes:
+def mutated(
+    content: bytes,
+    rng: random.Random,
+    others: tuple[bytes, ...] = (),
+    tokens: tuple[bytes, ...] = BYTES,
+) -> bytes:
     """One to four changes: bits, cuts, repeats, tokens, parts of other files."""
     data = bytearray(content)
     for _ in range(rng.choice((1, 1, 1, 2, 2, 4))):

@@ -1,7 +1,10 @@
-"""What reading a file of each format means: the functions that the library and the command line call."""
+"""What reading a file of each format means: the functions that the library and the command line
+call.
+"""
 
 from __future__ import annotations
 
+import ast
 import os
 import signal
 import zipfile
@@ -21,21 +24,20 @@ def read_robot(path: Path) -> object:
     """A tree of links is read again with the links that fixed joints hold as frames."""
     from symgen.description.files import read_robot as read
 
-    robot, _ = read(path, nearly=1e-4)
+    robot, _ = read(path)
     if path.suffix in (".urdf", ".xml"):
-        read(path, nearly=1e-4, keep_fixed=True)
+        read(path, keep_fixed=True)
     return robot
 
 
 def read_and_derive(path: Path) -> object:
-    """Small robots are derived and emitted as well, and the module is checked as a file is."""
-    from runtime.model.loading import check_source
+    """Small robots are derived and emitted as well; the module is Python."""
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module
 
     robot = load_robot(path)
     if len(robot.frames) <= 5 and not robot.loops:
-        check_source(generate_module(robot), path.name)
+        ast.parse(generate_module(robot), path.name)
     return robot
 
 
@@ -56,7 +58,7 @@ def read_fleet(path: Path) -> object:
 
 
 def read_motion(path: Path) -> object:
-    from runtime.motion.reference import reference_of
+    from runtime.loop.reference import reference_of
     from runtime.settings.files import load_study
 
     study = load_study(path)
@@ -69,7 +71,12 @@ def read_motion(path: Path) -> object:
 def two_joints() -> object:
     from types import SimpleNamespace
 
-    return SimpleNamespace(NAME="two", JOINTS=(1, 2), LIMITS={"q": ((-1e6, 1e6),) * 2, "qd": (1e6,) * 2, "qdd": (1e6,) * 2}, DRIVES=None)
+    return SimpleNamespace(
+        NAME="two",
+        JOINTS=(1, 2),
+        LIMITS={"q": ((-1e6, 1e6),) * 2, "qd": (1e6,) * 2, "qdd": (1e6,) * 2},
+        DRIVES=None,
+    )
 
 
 def read_record(path: Path) -> object:
@@ -110,7 +117,11 @@ def columns_of(path: Path) -> Columns:
 
     if path.suffix == ".npy":
         return Columns(t="1", q=("2", "3"), tau=("4", "5"))
-    return Columns(q=("a", "b"), tau=("a", "b")) if path.suffix in ("", ".bag", ".db3", ".mcap") else Columns()
+    return (
+        Columns(q=("a", "b"), tau=("a", "b"))
+        if path.suffix in ("", ".bag", ".db3", ".mcap")
+        else Columns()
+    )
 
 
 def read_folder(path: Path) -> object:

@@ -1,4 +1,6 @@
-"""Sound files of every format, from which cases are made: packaged robots, and small records made at run time."""
+"""Sound files of every format, from which cases are made: packaged robots, and small records made
+at run time.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,19 @@ import numpy as np
 
 from fuzz import archives, texts
 
-ROBOTS = ("planar_2r", "emps_asymmetric", "scara", "two_branch", "emps", "stanford", "rx90", "four_bar", "sr400", "panda", "tx40")
+ROBOTS = (
+    "planar_2r",
+    "emps_asymmetric",
+    "scara",
+    "two_branch",
+    "emps",
+    "stanford",
+    "rx90",
+    "four_bar",
+    "sr400",
+    "panda",
+    "tx40",
+)
 ROWS = 12
 COLUMNS = ("t", "q1", "q2", "tau1", "tau2")
 
@@ -36,10 +50,8 @@ def robot_tables() -> tuple[dict, ...]:
 
 @cache
 def par_files() -> tuple[bytes, ...]:
-    from symgen.description import load_robot
-    from symgen.description.par_write import write_par
-
-    return tuple(write_par(load_robot(name))[0].encode() for name in ("planar_2r", "scara", "two_branch", "tx40_table1", "sr400"))
+    folder = Path(__file__).parents[1] / "description" / "par_files"
+    return tuple(path.read_bytes() for path in sorted(folder.iterdir()))
 
 
 @cache
@@ -48,7 +60,10 @@ def urdf_files() -> tuple[bytes, ...]:
     from symgen.description.urdf_write import write_urdf
 
     loaded = [load_robot(name) for name in ("planar_2r", "scara", "stanford", "rx90")]
-    return tuple(write_urdf(replace(robot, values=dict.fromkeys(robot.parameters, 0.25)))[0].encode() for robot in loaded)
+    return tuple(
+        write_urdf(replace(robot, values=dict.fromkeys(robot.parameters, 0.25)))[0].encode()
+        for robot in loaded
+    )
 
 
 @cache
@@ -67,12 +82,19 @@ def record_columns() -> np.ndarray:
 
 @cache
 def csv_file() -> bytes:
-    return ("\n".join([",".join(COLUMNS), *(",".join(map(repr, map(float, row))) for row in record_columns())]) + "\n").encode()
+    return (
+        "\n".join(
+            [",".join(COLUMNS), *(",".join(map(repr, map(float, row))) for row in record_columns())]
+        )
+        + "\n"
+    ).encode()
 
 
 @cache
 def npz_members() -> dict[str, bytes]:
-    return {f"{name}.npy": archives.plain_npy(record_columns()[:, k]) for k, name in enumerate(COLUMNS)}
+    return {
+        f"{name}.npy": archives.plain_npy(record_columns()[:, k]) for k, name in enumerate(COLUMNS)
+    }
 
 
 @cache
@@ -89,27 +111,46 @@ def mat_files() -> tuple[bytes, ...]:
     found = []
     for settings in ({}, {"do_compression": True}, {"format": "4"}):
         stream = io.BytesIO()
-        more = {} if settings.get("format") else {"s": {"a": 1.0, "b": ["x", "y"]}, "c": np.array([1, "x"], dtype=object), "flag": True}
-        savemat(stream, {name: record_columns()[:, k] for k, name in enumerate(COLUMNS)} | more, **settings)
+        more = (
+            {}
+            if settings.get("format")
+            else {
+                "s": {"a": 1.0, "b": ["x", "y"]},
+                "c": np.array([1, "x"], dtype=object),
+                "flag": True,
+            }
+        )
+        savemat(
+            stream,
+            {name: record_columns()[:, k] for k, name in enumerate(COLUMNS)} | more,
+            **settings,
+        )
         found.append(stream.getvalue())
     return tuple(found)
 
 
 @cache
 def mat73_files() -> tuple[bytes, ...]:
-    """HDF5 behind the text of 512 bytes that MATLAB writes, stored plainly and by compressed chunks."""
+    """HDF5 behind the text of 512 bytes that MATLAB writes, stored plainly and by compressed
+    chunks.
+    """
     import h5py
 
     found = []
-    for settings in ({}, {"chunks": (1, 5), "compression": "gzip", "shuffle": True, "fletcher32": True}):
+    for settings in (
+        {},
+        {"chunks": (1, 5), "compression": "gzip", "shuffle": True, "fletcher32": True},
+    ):
         stream = io.BytesIO()
         with h5py.File(stream, "w", userblock_size=512) as archive:
             for k, name in enumerate(COLUMNS):
-                archive.create_dataset(name, data=record_columns()[None, :, k], **settings).attrs["MATLAB_class"] = np.bytes_("double")
+                archive.create_dataset(name, data=record_columns()[None, :, k], **settings).attrs[
+                    "MATLAB_class"
+                ] = np.bytes_("double")
             archive.create_group("s").attrs["MATLAB_class"] = np.bytes_("struct")
-            archive.create_dataset("x", data=np.frombuffer("abc".encode("utf-16-le"), np.uint16)[None, :]).attrs["MATLAB_class"] = (
-                np.bytes_("char")
-            )
+            archive.create_dataset(
+                "x", data=np.frombuffer("abc".encode("utf-16-le"), np.uint16)[None, :]
+            ).attrs["MATLAB_class"] = np.bytes_("char")
         data = bytearray(stream.getvalue())
         data[:128] = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
         found.append(bytes(data))
@@ -120,9 +161,9 @@ def mat73_files() -> tuple[bytes, ...]:
 def parquet_files() -> tuple[bytes, ...]:
     import polars
 
-    frame = polars.DataFrame({name: record_columns()[:, k] for k, name in enumerate(COLUMNS)}).with_columns(
-        x=polars.lit("text"), i=polars.lit(3)
-    )
+    frame = polars.DataFrame(
+        {name: record_columns()[:, k] for k, name in enumerate(COLUMNS)}
+    ).with_columns(x=polars.lit("text"), i=polars.lit(3))
     found = []
     for compression in ("uncompressed", "snappy", "zstd", "gzip"):
         stream = io.BytesIO()
@@ -143,7 +184,12 @@ def bags() -> tuple[dict[str, bytes], ...]:
     for kind in KINDS:
         with TemporaryDirectory() as folder:
             path = write_bag(kind, Path(folder) / "run", topics)
-            found.append({file.name: file.read_bytes() for file in ([path] if path.is_file() else sorted(path.iterdir()))})
+            found.append(
+                {
+                    file.name: file.read_bytes()
+                    for file in ([path] if path.is_file() else sorted(path.iterdir()))
+                }
+            )
     return tuple(found)
 
 
@@ -168,7 +214,12 @@ def study_tables() -> tuple[dict, ...]:
     from runtime.records.datasets import dataset_study
     from runtime.settings.study import Study, study_from_mapping, to_mapping
 
-    small = {"symgen": 1, "record": {"files": ["a.csv"], "rate": 1000}, "cestac": {"delta": ["2*pi/10000"], "runs": 3}, "stream": "off"}
+    small = {
+        "symgen": 1,
+        "record": {"files": ["a.csv"], "rate": 1000},
+        "cestac": {"delta": ["2*pi/10000"], "runs": 3},
+        "stream": "off",
+    }
     rich = small | {
         "payload": {"record": {"files": ["b.csv"]}, "known": {"M": 2.0}, "gains": True},
         "controller": {
@@ -177,10 +228,16 @@ def study_tables() -> tuple[dict, ...]:
             "reference": {"points": {"duration": 10, "seed": 1}},
             "values": {"M1": 1},
         },
-        "excitation": {"starts": 2, "spheres": [{"frame": 2, "radius": 0.1}], "limits": {"q": [[-1, 1], 2]}},
+        "excitation": {
+            "starts": 2,
+            "spheres": [{"frame": 2, "radius": 0.1}],
+            "limits": {"q": [[-1, 1], 2]},
+        },
         "validate": {
             "split": [[0, 1], [1, 2]],
-            "record": [{"files": ["c.csv"], "units": {"q": "deg", "tau": "A"}, "torque_constant": 0.1}],
+            "record": [
+                {"files": ["c.csv"], "units": {"q": "deg", "tau": "A"}, "torque_constant": 0.1}
+            ],
         },
     }
     complete = to_mapping(study_from_mapping(dataset_study("tx40")))
@@ -194,7 +251,15 @@ def study_tables() -> tuple[dict, ...]:
     )
 
 
-FLEETS = ({"symgen": 1, "jobs": [{"robot": "tx40", "record": "tx40"}, {"name": "left", "robot": "a.yaml", "record": "b.csv"}]},)
+FLEETS = (
+    {
+        "symgen": 1,
+        "jobs": [
+            {"robot": "tx40", "record": "tx40"},
+            {"name": "left", "robot": "a.yaml", "record": "b.csv"},
+        ],
+    },
+)
 MOTION = {
     "parts": [
         {"family": "fourier", "period": 10.0, "harmonics": 2, "p": [[0.1] * 5] * 2},
@@ -208,7 +273,9 @@ def model_files() -> tuple[bytes, ...]:
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module
 
-    return tuple(generate_module(load_robot(name)).encode() for name in ("planar_2r", "emps_asymmetric"))
+    return tuple(
+        generate_module(load_robot(name)).encode() for name in ("planar_2r", "emps_asymmetric")
+    )
 
 
 def checkpoint_arrays() -> dict[str, np.ndarray]:
@@ -223,19 +290,25 @@ def checkpoint_arrays() -> dict[str, np.ndarray]:
 
 @cache
 def estimate_file() -> bytes:
-    from hashlib import sha256
-
-    from runtime.estimators.methods import estimate_of
-    from runtime.model.generated import ModelText  # a model from text, checked like any file
-    from runtime.observation.observation import observe, stack
+    from runtime.loop.methods import estimate_of
+    from runtime.model.generated import load_model
+    from runtime.model.loading import run
     from runtime.records.record import Record
+    from runtime.rows.observation import stack
+    from runtime.rows.observe import observe
     from runtime.settings.study import study_from_mapping
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module
 
     text = generate_module(load_robot("planar_2r"))
-    model = ModelText("planar_2r.py", text, sha256(text.encode()).hexdigest()).load()
+    model = load_model(run(text, Path("planar_2r.py")))
     rng, t = np.random.default_rng(1), np.arange(400) / 100
-    record = Record(t, np.sin(t[:, None] * [1.0, 2.3]), rng.standard_normal((400, 2)), rate=100.0, name="x")
+    record = Record(
+        t, np.sin(t[:, None] * [1.0, 2.3]), rng.standard_normal((400, 2)), rate=100.0, name="x"
+    )
     study = study_from_mapping({"signals": {"lowpass": None, "decimate": None}})
-    return estimate_of(stack([observe(model, record, study)]), study.estimate, model=model).to_json().encode()
+    return (
+        estimate_of(stack([observe(model, record, study)]), study.estimate, model=model)
+        .to_json()
+        .encode()
+    )

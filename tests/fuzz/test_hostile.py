@@ -1,4 +1,6 @@
-"""Hostile files made by hand, beside those the fuzzer finds: bombs, depth, entities, names, things that are no files."""
+"""Hostile files made by hand, beside those the fuzzer finds: bombs, depth, entities, names, things
+that are no files.
+"""
 
 import gzip
 import io
@@ -28,12 +30,16 @@ STUDY = "record: {files: [a.csv]}\n"
 
 
 def refused(reader, name, content, said=""):
-    outcome = reader(name, content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content)
+    outcome = reader(
+        name, content.encode("utf-8", "surrogatepass") if isinstance(content, str) else content
+    )
     assert outcome.kind == "refused", outcome
     assert said in outcome.text, outcome.text
 
 
-LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 12))
+LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 12)
+)
 YAML = {
     "alias bomb": (LAUGHS, "anchors and aliases"),
     "alias of itself": ("a: &a [*a]\n", "anchors and aliases"),
@@ -57,7 +63,12 @@ YAML = {
 @pytest.mark.parametrize("name", YAML)
 def test_yaml(reader, format, name):
     text, said = YAML[name]
-    refused(reader, format, text, said if format != "robot" or name not in ("long text", "many values") else "")
+    refused(
+        reader,
+        format,
+        text,
+        said if format != "robot" or name not in ("long text", "many values") else "",
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,7 +90,24 @@ def test_names_of_robots(reader, name):
 
 @pytest.mark.parametrize(
     "name",
-    ["q", "tau", "np", "pi", "class", "__class__", "__builtins__", "q1", "XX1", "ZZ1R", "lambda", "D2)", "a b", "x" * 50, "out", "None"],
+    [
+        "q",
+        "tau",
+        "np",
+        "pi",
+        "class",
+        "__class__",
+        "__builtins__",
+        "q1",
+        "XX1",
+        "ZZ1R",
+        "lambda",
+        "D2)",
+        "a b",
+        "x" * 50,
+        "out",
+        "None",
+    ],
 )
 def test_names_of_constants(reader, name):
     refused(reader, "robot", PLANAR.replace("constants: {", f'constants: {{"{name}": 1.0, '))
@@ -88,7 +116,10 @@ def test_names_of_constants(reader, name):
 @pytest.mark.parametrize(
     "doctype",
     [
-        '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;">]>',
+        (
+            '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c '
+            '"&b;&b;&b;&b;&b;&b;&b;&b;">]>'
+        ),
         '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>',
         '<!DOCTYPE robot SYSTEM "http://localhost:9/robot.dtd">',
         '<!DOCTYPE robot [<!ENTITY % p SYSTEM "file:///dev/zero"> %p;]>',
@@ -96,7 +127,12 @@ def test_names_of_constants(reader, name):
     ],
 )
 def test_document_types(reader, doctype):
-    refused(reader, "urdf", doctype.encode() + urdf_files()[0].split(b"?>")[-1], "document types and entities")
+    refused(
+        reader,
+        "urdf",
+        doctype.encode() + urdf_files()[0].split(b"?>")[-1],
+        "document types and entities",
+    )
 
 
 def test_nested_and_endless_xml(reader):
@@ -106,20 +142,30 @@ def test_nested_and_endless_xml(reader):
 
 
 @pytest.mark.parametrize(
-    "mesh", ["../../../etc/passwd", "/dev/zero", "file:///dev/zero", "package://x/../../y.dae", "http://localhost:9/x.stl"]
+    "mesh",
+    [
+        "../../../etc/passwd",
+        "/dev/zero",
+        "file:///dev/zero",
+        "package://x/../../y.dae",
+        "http://localhost:9/x.stl",
+    ],
 )
 def test_meshes_are_never_opened(tmp_path, monkeypatch, mesh):
     geometry = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
     path = tmp_path / "arm.urdf"
     path.write_bytes(urdf_files()[0].replace(b"<inertial>", geometry.encode() + b"<inertial>"))
     opened, original = [], Path.open
-    monkeypatch.setattr(Path, "open", lambda self, *a, **k: opened.append(self) or original(self, *a, **k))
+    monkeypatch.setattr(
+        Path, "open", lambda self, *a, **k: opened.append(self) or original(self, *a, **k)
+    )
     monkeypatch.setattr("builtins.open", lambda *a, **k: pytest.fail(f"opened {a}"))
     load_robot(path)
     assert opened == [path]
 
 
-# --- records ----------------------------------------------------------------------------------------------------------
+# --- records
+# ----------------------------------------------------------------------------------------------------------
 
 
 def archive(members, method=zipfile.ZIP_DEFLATED):
@@ -132,21 +178,32 @@ def archive(members, method=zipfile.ZIP_DEFLATED):
 
 @campaign
 def test_zip_bombs(reader):
-    zeros = npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (7500000,)}\n") + bytes(60_000_000)
+    zeros = npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (7500000,)}\n") + bytes(
+        60_000_000
+    )
     bomb = archive(dict.fromkeys(npz_members(), zeros))
     assert len(bomb) < 1_000_000
     refused(reader, "npz", bytes(bomb), "unpacks to")
-    at = bomb.rindex(b"PK\x01\x02", 0, bomb.index(b"q1.npy", bomb.index(b"PK\x01\x02")))  # its entry in the table says 100 bytes
+    at = bomb.rindex(
+        b"PK\x01\x02", 0, bomb.index(b"q1.npy", bomb.index(b"PK\x01\x02"))
+    )  # its entry in the table says 100 bytes
     struct.pack_into("<I", bomb, at + 24, 100)
     outcome = reader("npz", bytes(bomb))
     assert not outcome.fault, outcome
-    refused(reader, "npz", bytes(archive({f"x{k}.npy": b"" for k in range(20_000)}, zipfile.ZIP_STORED)), "20000 arrays")
+    refused(
+        reader,
+        "npz",
+        bytes(archive({f"x{k}.npy": b"" for k in range(20_000)}, zipfile.ZIP_STORED)),
+        "20000 arrays",
+    )
     refused(reader, "npz", bytes(archive({"a.npz": bytes(archive(npz_members()))})), "case.npz")
 
 
 def test_members_that_overlap_and_names_that_climb(reader, tmp_path):
     data = archive({**npz_members(), "../../evil.npy": plain_npy(np.zeros(12))}, zipfile.ZIP_STORED)
-    assert reader("npz", bytes(data)).kind == "ok"  # read from memory: nothing is ever written by a member's name
+    assert (
+        reader("npz", bytes(data)).kind == "ok"
+    )  # read from memory: nothing is ever written by a member's name
     entries = [k for k in range(len(data)) if data[k : k + 4] == b"PK\x01\x02"]
     for at in entries:
         struct.pack_into("<I", data, at + 42, 0)  # all begin where the first begins
@@ -175,7 +232,9 @@ def test_parquet_bombs(reader, tmp_path):
     import polars
 
     stream = io.BytesIO()
-    polars.select(q1=polars.repeat(1.0, 40_000_000), tau1=polars.repeat(1.0, 40_000_000)).write_parquet(stream, row_group_size=40_000_000)
+    polars.select(
+        q1=polars.repeat(1.0, 40_000_000), tau1=polars.repeat(1.0, 40_000_000)
+    ).write_parquet(stream, row_group_size=40_000_000)
     assert len(stream.getvalue()) < 1_000_000
     refused(reader, "parquet", stream.getvalue(), "unpacks to")
 
@@ -206,10 +265,13 @@ def test_generated_modules(reader):
         "x = " + "+".join(["1"] * 50_000),
     ):
         refused(reader, "model", text, "case")
-    refused(reader, "model", model_files()[0] + b"\nx = " + b"(" * 5000 + b"1" + b")" * 5000, "case")
+    refused(
+        reader, "model", model_files()[0] + b"\nx = " + b"(" * 5000 + b"1" + b")" * 5000, "case"
+    )
 
 
-# --- what is no file --------------------------------------------------------------------------------------------------
+# --- what is no file
+# --------------------------------------------------------------------------------------------------
 
 
 def special(kind, folder, ending):
@@ -236,7 +298,9 @@ KINDS = ["fifo", "folder", "loop", "missing", "nul", "long", "/dev/zero", "/dev/
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_no_file(tmp_path, kind):
-    """No pipe is waited for, no device read to its end. The system's own error of a name that is too long is one line on the command line."""
+    """No pipe is waited for, no device read to its end. The system's own error of a name that is
+    too long is one line on the command line.
+    """
     expected = (InputError, OSError) if kind == "long" else InputError
     for ending in (".yaml", ".par", ".urdf"):
         with pytest.raises(DescriptionError):

@@ -1,4 +1,6 @@
-"""Cases of text formats, aware of their structure: YAML with nasty values, expressions of the grammar, `.par`, tables, JSON."""
+"""Cases of text formats, aware of their structure: YAML with nasty values, expressions of the
+grammar, `.par`, tables, JSON.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,13 @@ def yaml_text(data: dict[Any, Any]) -> str:
 
 def places(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Paths of all values."""
-    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    items = (
+        node.items()
+        if isinstance(node, dict)
+        else enumerate(node)
+        if isinstance(node, list)
+        else ()
+    )
     return [path, *(found for key, value in items for found in places(value, (*path, key)))]
 
 
@@ -81,7 +89,10 @@ def nasty(rng: random.Random, symbols: tuple[str, ...]) -> Raw:
 
 
 def structured(
-    data: dict[Any, Any], rng: random.Random, symbols: tuple[str, ...] = ("q1", "q2", "D2", "g"), others: tuple[Any, ...] = ()
+    data: dict[Any, Any],
+    rng: random.Random,
+    symbols: tuple[str, ...] = ("q1", "q2", "D2", "g"),
+    others: tuple[Any, ...] = (),
 ) -> bytes:
     """YAML with values, keys or subtrees changed."""
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
@@ -102,7 +113,9 @@ def structured(
                     found = found[key]
                 data = changed(data, path, found)
             case 4 if isinstance(holder, dict):  # another key
-                renamed = {(nasty(rng, symbols) if k == path[-1] else k): v for k, v in holder.items()}
+                renamed = {
+                    (nasty(rng, symbols) if k == path[-1] else k): v for k, v in holder.items()
+                }
                 data = changed(data, path[:-1], renamed) if path[:-1] else renamed
             case 5:  # left out
                 kept = (
@@ -112,7 +125,9 @@ def structured(
                 )
                 data = changed(data, path[:-1], kept) if path[:-1] else kept
             case 6 if isinstance(holder, list):
-                data = changed(data, path[:-1], holder * rng.choice((2, 30, 300 if len(spots) < 300 else 3)))
+                data = changed(
+                    data, path[:-1], holder * rng.choice((2, 30, 300 if len(spots) < 300 else 3))
+                )
         if len(places(data)) > MANY:
             break
     return yaml_text(data).encode("utf-8", "replace")
@@ -122,8 +137,21 @@ def expression(rng: random.Random, symbols: tuple[str, ...], depth: int) -> str:
     """A random sentence of the grammar, sometimes beside it."""
     inner = lambda: expression(rng, symbols, depth - 1)  # noqa: E731
     if depth <= 0 or rng.random() < 0.2:
-        usual = (*symbols, "pi", "0", "1", "2", "1/2", "0.1", "1e-60", "1e60", "7" * rng.choice((3, 59)))
-        return rng.choice(usual if rng.random() < 0.98 else ("1e61", "7" * 61, "x", "1e400", "(", ""))
+        usual = (
+            *symbols,
+            "pi",
+            "0",
+            "1",
+            "2",
+            "1/2",
+            "0.1",
+            "1e-60",
+            "1e60",
+            "7" * rng.choice((3, 59)),
+        )
+        return rng.choice(
+            usual if rng.random() < 0.98 else ("1e61", "7" * 61, "x", "1e400", "(", "")
+        )
     return rng.choice((
         lambda: f"{inner()} + {inner()}", lambda: f"{inner()} - {inner()}", lambda: f"{inner()}*{inner()}", lambda: f"({inner()})*({inner()})",
         lambda: f"{inner()}/({inner()})", lambda: f"({inner()})**{rng.choice((0, 1, 2, 3, 8, 9, 31, 32, -1, -2, -8, -32) * 3 + (33, '(1/2)', 'q1', 10**9))}",
@@ -241,14 +269,29 @@ def table(content: bytes, rng: random.Random) -> bytes:
             case 3 | 4:
                 rows[0][rng.randrange(len(rows[0]))] = rng.choice(HEADERS)
             case 5:
-                rows[k] = rng.choice(([""], [], rows[k] * 2, rows[k][:-1], rows[k] * (5000 if len(rows[k]) < 100 else 1), [*rows[k], "#"]))
+                rows[k] = rng.choice(
+                    (
+                        [""],
+                        [],
+                        rows[k] * 2,
+                        rows[k][:-1],
+                        rows[k] * (5000 if len(rows[k]) < 100 else 1),
+                        [*rows[k], "#"],
+                    )
+                )
                 rows[k] = rows[k] or [""]
             case 6:
                 rows[k:k] = [list(rows[rng.randrange(len(rows))])] * rng.choice((1, 3, 100))
             case 7:
                 column = rng.randrange(len(rows[k]))
                 scale = rng.choice((0.0, -1.0, 1e300, 1e-300, 1e9, float("nan")))
-                rows = [[repr(float(x) * scale) if i == column and is_number(x) else x for i, x in enumerate(row)] for row in rows]
+                rows = [
+                    [
+                        repr(float(x) * scale) if i == column and is_number(x) else x
+                        for i, x in enumerate(row)
+                    ]
+                    for row in rows
+                ]
             case 8:
                 rows = rows[: rng.choice((1, 2, 3, 9, 11))]
     ending = rng.choice(("\n",) * 6 + ("\r\n", "\r", "\x85", "\u2028", "\x00"))

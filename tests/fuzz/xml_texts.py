@@ -1,4 +1,6 @@
-"""Cases of XML formats, aware of their structure: URDF and MJCF with nasty attributes, elements, document types, encodings and depth."""
+"""Cases of XML formats, aware of their structure: URDF and MJCF with nasty attributes, elements,
+document types, encodings and depth.
+"""
 
 from __future__ import annotations
 
@@ -50,14 +52,27 @@ NUMBERS = (
 
 @dataclass(frozen=True)
 class Dialect:
-    """Names of elements, values of attributes beside numbers and names, and elements that may be put anywhere: tag, attributes; `@` is a name, `#` a number."""
+    """Names of elements, values of attributes beside numbers and names, and elements that may be
+    put anywhere: tag, attributes; `@` is a name, `#` a number.
+    """
 
     tags: tuple[str, ...]
     values: tuple[str, ...]
     grown: tuple[tuple[str, dict[str, str]], ...]
 
 
-STRANGE = ("", "class", "../x", "a" * 3000, "é", "\u202e", "x\ty", "{{7*7}}", '"><script>', "package://../x.dae")
+STRANGE = (
+    "",
+    "class",
+    "../x",
+    "a" * 3000,
+    "é",
+    "\u202e",
+    "x\ty",
+    "{{7*7}}",
+    '"><script>',
+    "package://../x.dae",
+)
 URDF = Dialect(
     ("robot", "link", "joint", "inertial", "mimic", "xacro:macro", "origin", "x", "axis"),
     (*STRANGE, "revolute", "continuous", "fixed", "floating", "prismatic"),
@@ -87,19 +102,37 @@ MJCF = Dialect(
 
 
 def changed(content: bytes, rng: random.Random, dialect: Dialect) -> bytes:
-    """XML with attributes and elements changed; sometimes a document type, another encoding, much nesting."""
+    """XML with attributes and elements changed; sometimes a document type, another encoding, much
+    nesting.
+    """
     root = ElementTree.fromstring(content)
     for _ in range(rng.choice((1, 1, 2, 3, 6))):
         elements = list(root.iter())
         e, other = rng.choice(elements), rng.choice(elements)
         names = [
-            str(value) for x in elements for key in ("name", "link", "joint", "joint1", "tendon1", "class") if (value := x.get(key))
+            str(value)
+            for x in elements
+            for key in ("name", "link", "joint", "joint1", "tendon1", "class")
+            if (value := x.get(key))
         ] or ["x"]
         match rng.randrange(8):
             case 0 | 1 | 2 if e.attrib:
                 key = rng.choice(sorted(e.attrib))
-                numbers = " ".join(rng.choice(NUMBERS) if rng.random() < 0.3 else word for word in str(e.get(key)).split())
-                e.set(key, rng.choice((rng.choice(NUMBERS), rng.choice(names), rng.choice(dialect.values), numbers)))
+                numbers = " ".join(
+                    rng.choice(NUMBERS) if rng.random() < 0.3 else word
+                    for word in str(e.get(key)).split()
+                )
+                e.set(
+                    key,
+                    rng.choice(
+                        (
+                            rng.choice(NUMBERS),
+                            rng.choice(names),
+                            rng.choice(dialect.values),
+                            numbers,
+                        )
+                    ),
+                )
             case 3 if e.attrib:
                 del e.attrib[rng.choice(sorted(e.attrib))]
             case 4 if not any(x is e for x in other.iter()) and len(elements) < 500:
@@ -113,7 +146,12 @@ def changed(content: bytes, rng: random.Random, dialect: Dialect) -> bytes:
                 new = ElementTree.SubElement(e, tag)
                 for key, value in attributes.items():
                     words = [
-                        rng.choice(names) if w == "@" else rng.choice((*NUMBERS, "1", "0.5")) if w == "#" else w for w in value.split()
+                        rng.choice(names)
+                        if w == "@"
+                        else rng.choice((*NUMBERS, "1", "0.5"))
+                        if w == "#"
+                        else w
+                        for w in value.split()
                     ]
                     new.set(key, " ".join(words))
     text = ElementTree.tostring(root, encoding="unicode")
@@ -123,6 +161,19 @@ def changed(content: bytes, rng: random.Random, dialect: Dialect) -> bytes:
         depth, at = rng.choice((10, 40, 20000)), text.index(">") + 1
         text = text[:at] + "<a>" * depth + "</a>" * rng.choice((depth, 0)) + text[at:]
     encoding = rng.choice(("utf-8",) * 12 + ("utf-16", "latin-1", "utf-7"))
-    name = rng.choice(("utf-8", "utf-16", "latin-1", "x-none", "ascii", "utf-7", "shift_jis", "idna", "rot13", "zlib"))
+    name = rng.choice(
+        (
+            "utf-8",
+            "utf-16",
+            "latin-1",
+            "x-none",
+            "ascii",
+            "utf-7",
+            "shift_jis",
+            "idna",
+            "rot13",
+            "zlib",
+        )
+    )
     declared = f'<?xml version="1.0" encoding="{name}"?>' if rng.random() < 0.15 else ""
     return (declared + text).encode(encoding, "replace")

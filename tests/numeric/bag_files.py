@@ -6,7 +6,18 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.typesys import Stores, get_typestore
 
 MESSAGE = "sensor_msgs/msg/JointState"
-KINDS = ("ros1", "ros1 bz2", "ros1 lz4", "sqlite3", "sqlite3 message", "sqlite3 file", "mcap", "mcap storage", "bare mcap", "bare db3")
+KINDS = (
+    "ros1",
+    "ros1 bz2",
+    "ros1 lz4",
+    "sqlite3",
+    "sqlite3 message",
+    "sqlite3 file",
+    "mcap",
+    "mcap storage",
+    "bare mcap",
+    "bare db3",
+)
 
 
 def joint_states(stamps, joints, q, tau, qd=None):
@@ -16,7 +27,9 @@ def joint_states(stamps, joints, q, tau, qd=None):
 
 
 def write_bag(kind, path, topics, *, logged=None):
-    """A bag of the kind at `path`, without its ending; topics : messages by topic. Returns its path. logged : ns by message, default the stamps."""
+    """A bag of the kind at `path`, without its ending; topics : messages by topic. Returns its
+    path. logged : ns by message, default the stamps.
+    """
     if kind.startswith("ros1"):
         path = path.with_suffix(".bag")
         store = get_typestore(Stores.ROS1_NOETIC)
@@ -32,14 +45,23 @@ def write_bag(kind, path, topics, *, logged=None):
         if mode:
             writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
         encode, header = store.serialize_cdr, {}
-    Header, Time, State = (store.types[name] for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", MESSAGE))
+    Header, Time, State = (
+        store.types[name]
+        for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", MESSAGE)
+    )
     with writer:
         for topic, messages in topics.items():
             connection = writer.add_connection(topic, MESSAGE, typestore=store)
             for i, (stamp, joints, *values) in enumerate(messages):
                 time = Time(sec=int(stamp) // 10**9, nanosec=int(stamp) % 10**9)
-                state = State(Header(stamp=time, frame_id="", **header), list(joints), *(np.array(x, dtype=float) for x in values))
-                writer.write(connection, int(stamp) if logged is None else logged[i], encode(state, MESSAGE))
+                state = State(
+                    Header(stamp=time, frame_id="", **header),
+                    list(joints),
+                    *(np.array(x, dtype=float) for x in values),
+                )
+                writer.write(
+                    connection, int(stamp) if logged is None else logged[i], encode(state, MESSAGE)
+                )
     if kind.startswith("bare"):
         return next(path.glob("*.mcap" if "mcap" in kind else "*.db3"))
     return path

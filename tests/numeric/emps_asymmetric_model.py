@@ -1,4 +1,6 @@
-"""Stand-in for the emitted module of the EMPS axis with friction of its own for each direction of motion (no offset)."""
+"""Stand-in for the emitted module of the EMPS axis with friction of its own for each direction of
+motion (no offset).
+"""
 
 import numpy as np
 
@@ -37,7 +39,15 @@ def observation_matrix(q, qd, qdd, *, out=None):
 
 
 def base_parameters(standard):
-    return np.array([standard["M1"] + standard["Ia1"], standard["FVP1"], standard["FSP1"], standard["FVN1"], standard["FSN1"]])
+    return np.array(
+        [
+            standard["M1"] + standard["Ia1"],
+            standard["FVP1"],
+            standard["FSP1"],
+            standard["FVN1"],
+            standard["FSN1"],
+        ]
+    )
 
 
 def inverse_dynamics(q, qd, qdd, X):

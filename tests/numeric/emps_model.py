@@ -1,4 +1,6 @@
-"""Stand-in for the emitted module of the EMPS axis: one prismatic joint, force = M ddq + Fv dq + Fc sign(dq) + offset."""
+"""Stand-in for the emitted module of the EMPS axis: one prismatic joint, force = M ddq + Fv dq + Fc
+sign(dq) + offset.
+"""
 
 import numpy as np
 
@@ -35,7 +37,9 @@ def observation_matrix(q, qd, qdd, *, out=None):
 
 
 def base_parameters(standard):
-    return np.array([standard["M1"] + standard["Ia1"], standard["FV1"], standard["FS1"], standard["OFFSET1"]])
+    return np.array(
+        [standard["M1"] + standard["Ia1"], standard["FV1"], standard["FS1"], standard["OFFSET1"]]
+    )
 
 
 def inverse_dynamics(q, qd, qdd, X):

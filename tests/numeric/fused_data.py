@@ -15,7 +15,9 @@ from runtime.resolution.c import self_test as fused_check
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
 
-needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
+needs_compiler = pytest.mark.skipif(
+    not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler"
+)
 
 
 def in_c(robot: Robot, folder: Path) -> CompiledModel:
@@ -24,7 +26,7 @@ def in_c(robot: Robot, folder: Path) -> CompiledModel:
         (folder / name).write_text(text, encoding="utf-8")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        model = compiled_model(load_model(robot.name, folder=folder))
+        model = compiled_model(load_model(robot.name, folder=folder, trust=True))
     assert isinstance(model, CompiledModel)
     return model
 

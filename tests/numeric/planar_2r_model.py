@@ -1,6 +1,8 @@
-"""Planar arm of two revolute joints in the vertical plane, written by hand from its Lagrangian, in the form of an emitted module.
+"""Planar arm of two revolute joints in the vertical plane, written by hand from its Lagrangian, in
+the form of an emitted module.
 
-Gamma_2 = d/dt dL/dqd2 - dL/dq2 with L = 1/2 ZZ1R qd1^2 + 1/2 ZZ2 (qd1 + qd2)^2 + L qd1 (qd1 + qd2) (MX2 C2 - MY2 S2) - g (MX1R S1 + MY1 C1 + MX2 S12 + MY2 C12),
+Gamma_2 = d/dt dL/dqd2 - dL/dq2 with L = 1/2 ZZ1R qd1^2 + 1/2 ZZ2 (qd1 + qd2)^2 + L qd1 (qd1 + qd2)
+(MX2 C2 - MY2 S2) - g (MX1R S1 + MY1 C1 + MX2 S12 + MY2 C12),
 ZZ1R = ZZ1 + L^2 M2, MX1R = MX1 + L M2.
 """
 
@@ -10,7 +12,20 @@ NAME = "planar_2r_test"
 SCHEMA = 1
 JOINTS = (1, 2)
 BASE_PARAMETERS = ("ZZ1R", "MX1R", "MY1", "FV1", "FS1", "ZZ2", "MX2", "MY2", "FV2", "FS2")
-STANDARD_PARAMETERS = ("ZZ1", "MX1", "MY1", "M1", "FV1", "FS1", "ZZ2", "MX2", "MY2", "M2", "FV2", "FS2")
+STANDARD_PARAMETERS = (
+    "ZZ1",
+    "MX1",
+    "MY1",
+    "M1",
+    "FV1",
+    "FS1",
+    "ZZ2",
+    "MX2",
+    "MY2",
+    "M2",
+    "FV2",
+    "FS2",
+)
 UNITS = {
     "ZZ1R": "kg*m**2",
     "MX1R": "kg*m",
@@ -24,7 +39,9 @@ UNITS = {
     "FS2": "N*m",
 }
 FORMULAS = {"ZZ1R": "ZZ1 + L**2*M2", "MX1R": "MX1 + L*M2"}
-STRUCTURE = np.array([[1, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 1], [1, 1], [1, 1], [0, 1], [0, 1]], dtype=bool)
+STRUCTURE = np.array(
+    [[1, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 1], [1, 1], [1, 1], [0, 1], [0, 1]], dtype=bool
+)
 DRIVES = {"ratio": [[50.0, 0.0], [20.0, 40.0]], "offset": [0.0, 0.0], "torque_constant": 1.0}
 LIMITS = {}
 VALUES = {}
@@ -39,7 +56,11 @@ def store(N):
 
 def regressor(q, qd, qdd, *, out=None, L=0.5, g=9.81):
     """D, shape (N, n, b)."""
-    q, qd, qdd = np.asarray(q, dtype=float), np.asarray(qd, dtype=float), np.asarray(qdd, dtype=float)
+    q, qd, qdd = (
+        np.asarray(q, dtype=float),
+        np.asarray(qd, dtype=float),
+        np.asarray(qdd, dtype=float),
+    )
     single = q.ndim == 1
     (q1, q2), (v1, v2), (a1, a2) = np.atleast_2d(q).T, np.atleast_2d(qd).T, np.atleast_2d(qdd).T
     C2, S2, C12, S12 = np.cos(q2), np.sin(q2), np.cos(q1 + q2), np.sin(q1 + q2)

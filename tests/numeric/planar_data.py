@@ -3,8 +3,8 @@
 import numpy as np
 import planar_2r_model as planar
 
-from runtime.observation.observation import Observation
-from runtime.records.record import Record
+from runtime.records.record import Origin, Record
+from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
 
 OLS = EstimateSettings()
@@ -34,7 +34,9 @@ def one_joint_at_rest(t):
 
 
 def observation(N=300, rate=30.0, noise=(0.0, 0.0), seed=0, X=TRUE, motion=motion, colour=None):
-    """Observation of N instants with noise of deviation noise[j] (N m) on joint j; `colour` filters a (2, N) white array."""
+    """Observation of N instants with noise of deviation noise[j] (N m) on joint j; `colour` filters
+    a (2, N) white array.
+    """
     t = np.arange(N) / rate
     W = planar.observation_matrix(*motion(t))
     white = np.random.default_rng(seed).standard_normal((2, N))
@@ -57,5 +59,7 @@ def record(N=6000, rate=1000.0, noise=0.05, seed=0, X=TRUE):
     """Record of the motion with exact positions and white torque noise of deviation `noise` N m."""
     t = np.arange(N) / rate
     q, qd, qdd = motion(t)
-    tau = planar.inverse_dynamics(q, qd, qdd, X) + noise * np.random.default_rng(seed).standard_normal((N, 2))
-    return Record(t, q, tau, rate=rate, name="planar", files={"planar.csv": "cd" * 32})
+    tau = planar.inverse_dynamics(q, qd, qdd, X) + noise * np.random.default_rng(
+        seed
+    ).standard_normal((N, 2))
+    return Record(t, q, tau, rate=rate, name="planar", origin=Origin({"planar.csv": "cd" * 32}))

@@ -1,7 +1,10 @@
-"""Right studies of three robots and slips in them: what the verdict has to name. The list of the first 25 is that of the issue; 15 are our own.
+"""Right studies of three robots and slips in them: what the verdict has to name. The list of the
+first 25 is that of the issue; 15 are our own.
 
-A Case holds what a user gives: the text of a robot file, positions and torques of a log, sides and rate. A slip changes one thing. `told` says what
-became of it: equivalent (no fit can tell it: computed), named (a finding names the cause, in a list of at most six), wrong (findings, none of them the
+A Case holds what a user gives: the text of a robot file, positions and torques of a log, sides and
+rate. A slip changes one thing. `told` says what
+became of it: equivalent (no fit can tell it: computed), named (a finding names the cause, in a list
+of at most six), wrong (findings, none of them the
 cause), silent.
 """
 
@@ -17,10 +20,11 @@ import numpy as np
 
 import runtime
 import symgen
+from runtime.checks.alternatives import unchanged
+from runtime.checks.samples import samples_of
+from runtime.checks.trials import Problem, problem_of
 from runtime.errors import InputError
-from runtime.identification.plausibility.alternatives import unchanged
-from runtime.identification.plausibility.samples import samples_of
-from runtime.identification.plausibility.trials import SAME, WITHIN, Problem, problem_of
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.settings.study import study_from_mapping
 from symgen.description.yaml import parse_robot
@@ -32,7 +36,9 @@ Plain = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A study before anything is read: q in rad on `side`, tau in N m on `torque_side`, known torques of the joints."""
+    """A study before anything is read: q in rad on `side`, tau in N m on `torque_side`, known
+    torques of the joints.
+    """
 
     robot: str
     t: Array
@@ -59,8 +65,13 @@ class Case:
             q = drives.joint_position(q)
         if self.torque_side == "motor":
             tau = drives.joint_torque(tau)
-        record = runtime.Record(self.t / self.rate, q, tau, **({} if self.known is None else {"tau_known": self.known}))
-        settings = {"record": {"files": ["log.npz"], "side": self.side, "torque_side": self.torque_side}, **(self.study or {})}
+        record = runtime.Record(
+            self.t / self.rate, q, tau, **({} if self.known is None else {"tau_known": self.known})
+        )
+        settings = {
+            "record": {"files": ["log.npz"], "side": self.side, "torque_side": self.torque_side},
+            **(self.study or {}),
+        }
         return model, record, study_from_mapping(settings), symgen.variants(robot)
 
     def judged(self) -> Any:
@@ -94,10 +105,16 @@ class Slip:
 
 
 def told(right: Case, case: Case, slip: Slip, usual: set[str]) -> tuple[str, str]:
-    """equivalent, named, wrong or silent, and the findings. usual : questions that the right study is told as well."""
+    """equivalent, named, wrong or silent, and the findings. usual : questions that the right study
+    is told as well.
+    """
     result = case.judged()
     findings = (
-        [result] if isinstance(result, str) else [f"{c.finding}. {c.remedy}" for c in result.checks if _bad(c) and c.question not in usual]
+        [result]
+        if isinstance(result, str)
+        else [
+            f"{c.finding}. {c.remedy}" for c in result.checks if _bad(c) and c.question not in usual
+        ]
     )
     text = " | ".join(findings)
     if equivalent(right.problem(), case.problem()):
@@ -112,7 +129,9 @@ def _bad(check: Any) -> bool:
 
 
 def equivalent(right: Problem | None, slipped: Problem | None) -> bool:
-    """Whether no fit can tell a slip: its W spans every torque of the right study, as the slip maps them, and physics asks the same of both."""
+    """Whether no fit can tell a slip: its W spans every torque of the right study, as the slip maps
+    them, and physics asks the same of both.
+    """
     if right is None or slipped is None or len(right.samples) != len(slipped.samples):
         return False
     T = np.linalg.lstsq(right.tau, slipped.tau, rcond=None)[0].T
@@ -122,11 +141,11 @@ def equivalent(right: Problem | None, slipped: Problem | None) -> bool:
     V = np.einsum("ij,kjp->kip", T, D / np.abs(D).max(axis=(0, 1)))
     known = slipped.rows(unchanged(right.samples.n))[1] - Y @ T.T
     known[np.abs(known) < 1e-9 * np.abs(slipped.tau).max()] = 0.0
-    within = slipped.beyond(np.concatenate([V, known[:, :, None]], axis=2)) < WITHIN
+    within = slipped.beyond(np.concatenate([V, known[:, :, None]], axis=2)) < LIMIT.WITHIN_SPAN
     return (
         within
         and np.allclose(right.given.errors, slipped.given.errors, atol=0.05)
-        and abs(right.given.penalty - slipped.given.penalty) < SAME
+        and abs(right.given.penalty - slipped.given.penalty) < LIMIT.SAME_SCORE
     )
 
 
@@ -138,12 +157,23 @@ def factor(j: int, f: float, n: int) -> Array:
     return np.where(np.arange(n) == j, f, 1.0)
 
 
-# --- KUKA KR300 ---------------------------------------------------------------------------------------------------------------------------------------
+# --- KUKA KR300
+# ---------------------------------------------------------------------------------------------------------------------------------------
 
-CAREFUL: Plain = {"signals": {"median": 1, "lowpass": {"cutoff": 10}}, "rows": {"window": [1.8, 8.2], "low_speed": 0.02}}
+CAREFUL: Plain = {
+    "signals": {"median": 1, "lowpass": {"cutoff": 10}},
+    "rows": {"window": [1.8, 8.2], "low_speed": 0.02},
+}
 
 
-def kr300(folder: Path, letter: str = "A", *, values: bool = False, counterbalance: bool = True, careful: bool = True) -> Case:
+def kr300(
+    folder: Path,
+    letter: str = "A",
+    *,
+    values: bool = False,
+    counterbalance: bool = True,
+    careful: bool = True,
+) -> Case:
     from scipy.io import loadmat
 
     raw = loadmat(folder / f"{letter}.mat", squeeze_me=True, struct_as_record=False)["rec"]
@@ -153,7 +183,12 @@ def kr300(folder: Path, letter: str = "A", *, values: bool = False, counterbalan
     known[:, 1] = counterbalance_torque(q[:, 1])
     settings = CAREFUL if letter == "A" else {**CAREFUL, "rows": {"low_speed": 0.02}}
     return Case(
-        robot=text + (f"values: {{{', '.join(f'{k}: {v:.9g}' for k, v in kr300_values().items())}}}\n" if values else ""),
+        robot=text
+        + (
+            f"values: {{{', '.join(f'{k}: {v:.9g}' for k, v in kr300_values().items())}}}\n"
+            if values
+            else ""
+        ),
         t=raw.time_cont,
         q=q,
         tau=raw.act_torque_abs_nm.T,
@@ -172,14 +207,56 @@ def counterbalance_torque(q2: Array) -> Array:
     return 0.8 * 0.2 * np.sin(delta) / length * pressure * area
 
 
-# mass, centre of mass and inertia about it in the distal frame, d and alpha from there to Khalil's frame, rotor inertia and ratio:
-# facts of robot_model/model_KUKA_Quantec_Ultra_KR300.m of the source of the record, with its load of 200 kg
+# mass, centre of mass and inertia about it in the distal frame, d and alpha from there to Khalil's
+# frame, rotor inertia and ratio:
+# facts of robot_model/model_KUKA_Quantec_Ultra_KR300.m of the source of the record, with its load
+# of 200 kg
 LINKS = (
-    (395.40, (-0.353, 0.174, -0.004), (16.733765, 29.799119, 32.814954, -1.703664, 0.129384, 4.404062), 0.35, np.pi / 2, 0.00923, 1798 / 7),
-    (339.12, (-0.709, -0.001, 0.023), (7.507819, 88.886691, 88.673761, 0.430046, 0.173157, -4.396607), 1.15, 0.0, 0.0118, 1872 / 7),
-    (105.21, (-0.018, -0.018, -0.076), (10.783798, 10.186135, 1.943179, 0.118474, -0.606384, -0.10195), 0.041, -np.pi / 2, 0.0118, 757 / 3),
-    (35.80, (0.0, 0.236, 0.001), (0.425035, 0.217993, 0.428465, -4e-6, -0.011353, -2.7e-5), 0.0, np.pi / 2, 0.00173, 221.0),
-    (31.46, (0.0, -0.080, -0.009), (0.283826, 0.229562, 0.258266, -4e-6, -0.019521, -0.00012), 0.0, -np.pi / 2, 0.00173, 5032 / 21),
+    (
+        395.40,
+        (-0.353, 0.174, -0.004),
+        (16.733765, 29.799119, 32.814954, -1.703664, 0.129384, 4.404062),
+        0.35,
+        np.pi / 2,
+        0.00923,
+        1798 / 7,
+    ),
+    (
+        339.12,
+        (-0.709, -0.001, 0.023),
+        (7.507819, 88.886691, 88.673761, 0.430046, 0.173157, -4.396607),
+        1.15,
+        0.0,
+        0.0118,
+        1872 / 7,
+    ),
+    (
+        105.21,
+        (-0.018, -0.018, -0.076),
+        (10.783798, 10.186135, 1.943179, 0.118474, -0.606384, -0.10195),
+        0.041,
+        -np.pi / 2,
+        0.0118,
+        757 / 3,
+    ),
+    (
+        35.80,
+        (0.0, 0.236, 0.001),
+        (0.425035, 0.217993, 0.428465, -4e-6, -0.011353, -2.7e-5),
+        0.0,
+        np.pi / 2,
+        0.00173,
+        221.0,
+    ),
+    (
+        31.46,
+        (0.0, -0.080, -0.009),
+        (0.283826, 0.229562, 0.258266, -4e-6, -0.019521, -0.00012),
+        0.0,
+        -np.pi / 2,
+        0.00173,
+        5032 / 21,
+    ),
     (217.78, (0.0, 0.0, 19.111 / 217.78), (0.0,) * 6, 0.0, np.pi, 0.00173, 206793 / 1340),
 )
 BESIDE = {2: -0.189, 6: -0.24}  # r that the robot file leaves out, m
@@ -192,25 +269,56 @@ def kr300_values() -> dict[str, float]:
         c, s = np.cos(alpha), np.sin(alpha)
         R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
         P = R @ r + [d, 0, BESIDE.get(j, 0.0)]
-        J = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T + m * (P @ P * np.eye(3) - np.outer(P, P))
+        J = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T + m * (
+            P @ P * np.eye(3) - np.outer(P, P)
+        )
         values |= {
-            f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))
+            f"{name}{j}": J[i, k]
+            for name, i, k in (
+                ("XX", 0, 0),
+                ("XY", 0, 1),
+                ("XZ", 0, 2),
+                ("YY", 1, 1),
+                ("YZ", 1, 2),
+                ("ZZ", 2, 2),
+            )
         }
-        values |= {f"M{axis}{j}": m * x for axis, x in zip("XYZ", P, strict=True)} | {f"M{j}": m, f"Ia{j}": rotor * ratio**2}
+        values |= {f"M{axis}{j}": m * x for axis, x in zip("XYZ", P, strict=True)} | {
+            f"M{j}": m,
+            f"Ia{j}": rotor * ratio**2,
+        }
     return {name: float(value) for name, value in values.items()}
 
 
 def _kr300_classic(case: Case) -> Case:
     """The classic table, in the columns of Khalil's."""
-    rows = {1: ("pi/2", "A1"), 2: ("0", "A2"), 3: ("-pi/2", "A3"), 4: ("pi/2", "0"), 5: ("-pi/2", "0"), 6: ("0", "0")}
-    old = {1: ("pi", "0"), 2: ("pi/2", "A1"), 3: ("0", "A2"), 4: ("-pi/2", "A3"), 5: ("pi/2", "0"), 6: ("-pi/2", "0")}
+    rows = {
+        1: ("pi/2", "A1"),
+        2: ("0", "A2"),
+        3: ("-pi/2", "A3"),
+        4: ("pi/2", "0"),
+        5: ("-pi/2", "0"),
+        6: ("0", "0"),
+    }
+    old = {
+        1: ("pi", "0"),
+        2: ("pi/2", "A1"),
+        3: ("0", "A2"),
+        4: ("-pi/2", "A3"),
+        5: ("pi/2", "0"),
+        6: ("-pi/2", "0"),
+    }
     lines = case.robot.split("\n")
     for i, line in enumerate(lines):
         if m := re.match(r"  ([1-6]): {ant", line):
             j = int(m[1])
-            lines[i] = re.sub(r"alpha: *[^,]+, *d: *[^,]+,", f"alpha: {rows[j][0]}, d: {rows[j][1]},", line)
+            lines[i] = re.sub(
+                r"alpha: *[^,]+, *d: *[^,]+,", f"alpha: {rows[j][0]}, d: {rows[j][1]},", line
+            )
             assert lines[i] != line or rows[j] == old[j]
-    return replace(case, robot="\n".join(lines).replace("[0, 0, -g]", "[0, 0, g]"))  # its z0 points down
+    return replace(
+        case, robot="\n".join(lines).replace("[0, 0, -g]", "[0, 0, g]")
+    )  # its z0 points down
 
 
 def _constants(case: Case, torque_constant: str) -> Case:
@@ -235,7 +343,12 @@ ANY_ROBOT = (
 """Slips of every robot whose gravity is along -z."""
 
 KR300 = (
-    Slip(1, "ratio of joint 3 negative", r"torque of joint 3 has the wrong sign|joint 3 counts", lambda c: c.text("757/3", "-757/3")),
+    Slip(
+        1,
+        "ratio of joint 3 negative",
+        r"torque of joint 3 has the wrong sign|joint 3 counts",
+        lambda c: c.text("757/3", "-757/3"),
+    ),
     Slip(2, "degrees taken for rad", r"degrees", lambda c: replace(c, q=np.rad2deg(c.q))),
     Slip(
         3,
@@ -271,10 +384,19 @@ KR300 = (
         lambda c: replace(
             c,
             rate=4.0,
-            study={**c.study, "rows": {"window": [0.45, 2.05], "low_speed": 0.08}, "signals": {"median": 1, "lowpass": {"cutoff": 40}}},
+            study={
+                **c.study,
+                "rows": {"window": [0.45, 2.05], "low_speed": 0.08},
+                "signals": {"median": 1, "lowpass": {"cutoff": 40}},
+            },
         ),
     ),
-    Slip(13, "ratio forgotten", r"gear ratio is missing|record\.torque_side", lambda c: replace(c, torque_side="joint")),
+    Slip(
+        13,
+        "ratio forgotten",
+        r"gear ratio is missing|record\.torque_side",
+        lambda c: replace(c, torque_side="joint"),
+    ),
     Slip(
         14,
         "torque said to be current",
@@ -287,36 +409,101 @@ KR300 = (
         r"torque of joint 2 is to be multiplied by 0\.[67]",
         lambda c: replace(c, tau=c.tau * factor(1, 1.41, 6)),
     ),
-    Slip(16, "sense of joint 4 turned", r"joint 4 counts", lambda c: replace(c, q=c.q * factor(3, -1, 6), tau=c.tau * factor(3, -1, 6))),
-    Slip(17, "secondary encoders: axes 4 to 6 zero", r"4, 5, 6 stand still", lambda c: replace(c, q=c.q * [1, 1, 1, 0, 0, 0])),
-    Slip(18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 5, axis=0), c.tau[:-5]]))),
+    Slip(
+        16,
+        "sense of joint 4 turned",
+        r"joint 4 counts",
+        lambda c: replace(c, q=c.q * factor(3, -1, 6), tau=c.tau * factor(3, -1, 6)),
+    ),
+    Slip(
+        17,
+        "secondary encoders: axes 4 to 6 zero",
+        r"4, 5, 6 stand still",
+        lambda c: replace(c, q=c.q * [1, 1, 1, 0, 0, 0]),
+    ),
+    Slip(
+        18,
+        "torque 20 ms late",
+        r"Torques are late",
+        lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 5, axis=0), c.tau[:-5]])),
+    ),
     Slip(19, "classic table without convention", r"convention", _kr300_classic),
-    Slip(20, "alpha in degrees", r"alpha|degrees", lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: -90")),
+    Slip(
+        20,
+        "alpha in degrees",
+        r"alpha|degrees",
+        lambda c: c.text("ant: 3, sigma: 0, alpha: -pi/2", "ant: 3, sigma: 0, alpha: -90"),
+    ),
     Slip(21, "A2 = 1.5 for 1.15", r"d of frame 3 is", lambda c: c.text("A2: 1.15", "A2: 1.5")),
-    Slip(22, "D1 in mm", r"r of frame 1|link ends at frame 1", lambda c: c.text("D1: 0.675", "D1: 675.0")),
-    Slip(23, "D4 in mm", r"r of frame 4|longest link ends at frame 4", lambda c: c.text("D4: 1.0", "D4: 1000.0")),
-    Slip(24, "theta of frame 3 wrong by 90 degrees", r"theta of joint 3|zero of joint 3", lambda c: c.text("q3 + pi", "q3 + pi/2")),
+    Slip(
+        22,
+        "D1 in mm",
+        r"r of frame 1|link ends at frame 1",
+        lambda c: c.text("D1: 0.675", "D1: 675.0"),
+    ),
+    Slip(
+        23,
+        "D4 in mm",
+        r"r of frame 4|longest link ends at frame 4",
+        lambda c: c.text("D4: 1.0", "D4: 1000.0"),
+    ),
+    Slip(
+        24,
+        "theta of frame 3 wrong by 90 degrees",
+        r"theta of joint 3|zero of joint 3",
+        lambda c: c.text("q3 + pi", "q3 + pi/2"),
+    ),
     Slip(
         25,
         "ratios of joints 4 and 5 exchanged",
         r"ratios of joints 4 and 5",
         lambda c: replace(c, tau=c.tau * [1, 1, 1, 5032 / 21 / 221, 221 / (5032 / 21), 1]),
     ),
-    Slip(26, "zero of joint 3 off by 20 degrees", r"zero of joint 3", lambda c: replace(c, q=c.q + np.deg2rad(20) * (np.arange(6) == 2))),
+    Slip(
+        26,
+        "zero of joint 3 off by 20 degrees",
+        r"zero of joint 3",
+        lambda c: replace(c, q=c.q + np.deg2rad(20) * (np.arange(6) == 2)),
+    ),
     Slip(
         27,
         "torque of joint 5 in kp m",
         r"torque of joint 5 (is to be multiplied|0\.)",
         lambda c: replace(c, tau=c.tau * factor(4, 1 / 9.81, 6)),
     ),
-    Slip(28, "position columns moved by one", r"position columns are moved by one", lambda c: replace(c, q=np.roll(c.q, 1, axis=1))),
-    Slip(29, "torque columns moved by one", r"torque columns are moved by one", lambda c: replace(c, tau=np.roll(c.tau, -1, axis=1))),
-    Slip(30, "joint positions taken for those of motors", r"positions of the joints|record\.side", lambda c: replace(c, side="motor")),
-    Slip(31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)),
-    Slip(32, "mounted on a wall in the file", GRAVITY, lambda c: c.text("[0, 0, -g]", "[g, 0, 0]")),
-    Slip(33, "alpha of frame 5 zero", r"alpha of frame 5", lambda c: c.text("ant: 4, sigma: 0, alpha: pi/2", "ant: 4, sigma: 0, alpha: 0")),
     Slip(
-        34, "torque 12 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[3:], np.repeat(c.tau[-1:], 3, axis=0)]))
+        28,
+        "position columns moved by one",
+        r"position columns are moved by one",
+        lambda c: replace(c, q=np.roll(c.q, 1, axis=1)),
+    ),
+    Slip(
+        29,
+        "torque columns moved by one",
+        r"torque columns are moved by one",
+        lambda c: replace(c, tau=np.roll(c.tau, -1, axis=1)),
+    ),
+    Slip(
+        30,
+        "joint positions taken for those of motors",
+        r"positions of the joints|record\.side",
+        lambda c: replace(c, side="motor"),
+    ),
+    Slip(
+        31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)
+    ),
+    Slip(32, "mounted on a wall in the file", GRAVITY, lambda c: c.text("[0, 0, -g]", "[g, 0, 0]")),
+    Slip(
+        33,
+        "alpha of frame 5 zero",
+        r"alpha of frame 5",
+        lambda c: c.text("ant: 4, sigma: 0, alpha: pi/2", "ant: 4, sigma: 0, alpha: 0"),
+    ),
+    Slip(
+        34,
+        "torque 12 ms early",
+        r"Torques are early",
+        lambda c: replace(c, tau=np.vstack([c.tau[3:], np.repeat(c.tau[-1:], 3, axis=0)])),
     ),
     Slip(
         35,
@@ -331,12 +518,31 @@ KR300 = (
         lambda c: replace(
             c,
             rate=0.4,
-            study={**c.study, "rows": {"window": [4.5, 20.5], "low_speed": 0.008}, "signals": {"median": 1, "lowpass": {"cutoff": 4}}},
+            study={
+                **c.study,
+                "rows": {"window": [4.5, 20.5], "low_speed": 0.008},
+                "signals": {"median": 1, "lowpass": {"cutoff": 4}},
+            },
         ),
     ),
-    Slip(37, "A3 and D4 exchanged", r"[dr] of frame 4", lambda c: c.text("A3: 0.041", "A3: 1.0").text("D4: 1.0", "D4: 0.041")),
-    Slip(38, "joint 4 in degrees, the others in rad", r"joint 4.*degrees", lambda c: replace(c, q=c.q * factor(3, 180 / np.pi, 6))),
-    Slip(39, "theta of frame 2 with the wrong sign of pi/2", r"theta of joint 2", lambda c: c.text("q2 - pi/2", "q2 + pi/2")),
+    Slip(
+        37,
+        "A3 and D4 exchanged",
+        r"[dr] of frame 4",
+        lambda c: c.text("A3: 0.041", "A3: 1.0").text("D4: 1.0", "D4: 0.041"),
+    ),
+    Slip(
+        38,
+        "joint 4 in degrees, the others in rad",
+        r"joint 4.*degrees",
+        lambda c: replace(c, q=c.q * factor(3, 180 / np.pi, 6)),
+    ),
+    Slip(
+        39,
+        "theta of frame 2 with the wrong sign of pi/2",
+        r"theta of joint 2",
+        lambda c: c.text("q2 - pi/2", "q2 + pi/2"),
+    ),
     Slip(
         40,
         "another robot's values: masses of a third",
@@ -353,7 +559,8 @@ def _masses(case: Case, f: float) -> Case:
     return replace(case, robot=f"{head}values: {{{scaled}")
 
 
-# --- a four-axis palletiser, simulated ------------------------------------------------------------------------------------------------------------
+# --- a four-axis palletiser, simulated
+# ------------------------------------------------------------------------------------------------------------
 
 PALLETISER = """\
 symgen: 1
@@ -374,11 +581,18 @@ drives:                            # the motor of joint 3 stands at the base: it
   ratio: [[150, 0, 0, 0], [0, 180, 0, 0], [0, 160, 160, 0], [0, 0, 0, 80]]
 limits: {q: [[-3, 3], [-2, 2], [-2.5, 2.5], [-6, 6]], qd: [3, 3, 3, 6]}
 """
-BODIES = {1: (180, 0.1, 0.0, -0.1), 2: (90, 0.45, 0.02, 0.1), 3: (110, 0.35, 0.05, 0.0), 4: (60, 0.05, 0.02, -0.2)}  # kg, m
+BODIES = {
+    1: (180, 0.1, 0.0, -0.1),
+    2: (90, 0.45, 0.02, 0.1),
+    3: (110, 0.35, 0.05, 0.0),
+    4: (60, 0.05, 0.02, -0.2),
+}  # kg, m
 
 
 def palletiser(seed: int = 0, noise: float = 0.02) -> Case:
-    """Motor angles and torques: sums of sinusoids, dry friction that falls with speed (which the model lacks), noise, encoder steps."""
+    """Motor angles and torques: sums of sinusoids, dry friction that falls with speed (which the
+    model lacks), noise, encoder steps.
+    """
     rng = np.random.default_rng([41, seed])
     robot = parse_robot(PALLETISER.encode(), "palletiser.yaml")
     model = symgen.model(robot)
@@ -388,7 +602,11 @@ def palletiser(seed: int = 0, noise: float = 0.02) -> Case:
     q, qd, qdd = np.zeros((3, len(t), 4))
     for j in range(4):
         for k in rng.choice(np.arange(1, 11), 5, replace=False):
-            a, phase, w = size[j] * rng.uniform(0.2, 0.6) / np.sqrt(k), rng.uniform(0, 6.28), 2 * np.pi * k / T
+            a, phase, w = (
+                size[j] * rng.uniform(0.2, 0.6) / np.sqrt(k),
+                rng.uniform(0, 6.28),
+                2 * np.pi * k / T,
+            )
             q[:, j] += a * np.sin(w * t + phase)
             qd[:, j] += a * w * np.cos(w * t + phase)
             qdd[:, j] -= a * w**2 * np.sin(w * t + phase)
@@ -398,12 +616,24 @@ def palletiser(seed: int = 0, noise: float = 0.02) -> Case:
         P = np.array([x, y, z])
         J = m * (P @ P * np.eye(3) - np.outer(P, P)) + m * 0.04 * np.diag([1.0, 1.3, 1.1])
         chi |= {
-            f"{name}{j}": J[i, k] for name, i, k in (("XX", 0, 0), ("XY", 0, 1), ("XZ", 0, 2), ("YY", 1, 1), ("YZ", 1, 2), ("ZZ", 2, 2))
+            f"{name}{j}": J[i, k]
+            for name, i, k in (
+                ("XX", 0, 0),
+                ("XY", 0, 1),
+                ("XZ", 0, 2),
+                ("YY", 1, 1),
+                ("YZ", 1, 2),
+                ("ZZ", 2, 2),
+            )
         }
-        chi |= {f"M{axis}{j}": m * v for axis, v in zip("XYZ", P, strict=True)} | {f"M{j}": float(m)}
+        chi |= {f"M{axis}{j}": m * v for axis, v in zip("XYZ", P, strict=True)} | {
+            f"M{j}": float(m)
+        }
         chi |= {f"Ia{j}": 40.0 / j, f"FV{j}": 60.0 / j, f"FS{j}": 80.0 / j, f"OFFSET{j}": 2.0}
     tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(chi))
-    tau += 15 * np.sign(qd) * np.exp(-np.abs(qd) / 0.1) + noise * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    tau += 15 * np.sign(qd) * np.exp(-np.abs(qd) / 0.1) + noise * tau.std(
+        axis=0
+    ) * rng.standard_normal(tau.shape)
     drives = Drives.from_mapping(model.DRIVES)
     motor = drives.motor_position(q)
     return Case(
@@ -424,14 +654,32 @@ def _coupled(case: Case) -> Case:
 SIMULATED = (
     Slip(1, "ratio of joint 2 negative", r"joint 2 counts", lambda c: c.text("180", "-180")),
     Slip(2, "motor angles in degrees", r"units\.q: deg", lambda c: replace(c, q=np.rad2deg(c.q))),
-    Slip(3, "position columns 1 and 4 exchanged", r"position columns of joints 1 and 4", lambda c: replace(c, q=columns(3, 1, 2, 0)(c.q))),
-    Slip(4, "torque columns 2 and 3 exchanged", r"torque columns of joints 2 and 3", lambda c: replace(c, tau=columns(0, 2, 1, 3)(c.tau))),
+    Slip(
+        3,
+        "position columns 1 and 4 exchanged",
+        r"position columns of joints 1 and 4",
+        lambda c: replace(c, q=columns(3, 1, 2, 0)(c.q)),
+    ),
+    Slip(
+        4,
+        "torque columns 2 and 3 exchanged",
+        r"torque columns of joints 2 and 3",
+        lambda c: replace(c, tau=columns(0, 2, 1, 3)(c.tau)),
+    ),
     *ANY_ROBOT,
-    Slip(8, "alpha of frame 2 with the wrong sign", r"alpha of frame 2", lambda c: c.text("alpha: -pi/2", "alpha: pi/2")),
+    Slip(
+        8,
+        "alpha of frame 2 with the wrong sign",
+        r"alpha of frame 2",
+        lambda c: c.text("alpha: -pi/2", "alpha: pi/2"),
+    ),
     Slip(9, "coupling of joints 2 and 3 forgotten", r"coupling of joints 2 and 3", _coupled),
     Slip(12, "rate 2000 for 500", r"sampling rate is [^;]*\b1/4\b", lambda c: replace(c, rate=4.0)),
     Slip(
-        13, "motor torques taken for joint torques", r"gear ratio is missing|record\.torque_side", lambda c: replace(c, torque_side="joint")
+        13,
+        "motor torques taken for joint torques",
+        r"gear ratio is missing|record\.torque_side",
+        lambda c: replace(c, torque_side="joint"),
     ),
     Slip(
         15,
@@ -440,16 +688,39 @@ SIMULATED = (
         lambda c: replace(c, tau=c.tau * [1, 1.41, 1, 1]),
     ),
     Slip(
-        18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 10, axis=0), c.tau[:-10]]))
+        18,
+        "torque 20 ms late",
+        r"Torques are late",
+        lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 10, axis=0), c.tau[:-10]])),
     ),
     Slip(21, "D3 = 1.4 for 1.0", r"d of frame 3 is", lambda c: c.text("D3: 1.0", "D3: 1.4")),
     Slip(
-        24, "theta of frame 3 wrong by 90 degrees", r"theta of joint 3|zero of joint 3", lambda c: c.text("theta: q3", "theta: q3 + pi/2")
+        24,
+        "theta of frame 3 wrong by 90 degrees",
+        r"theta of joint 3|zero of joint 3",
+        lambda c: c.text("theta: q3", "theta: q3 + pi/2"),
     ),
-    Slip(26, "zero of joint 2 off by 15 degrees", r"zero of joint 2", lambda c: c.text("theta: q2", "theta: q2 + pi/12")),
-    Slip(31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)),
-    Slip(34, "torque 8 ms early", r"Torques are early", lambda c: replace(c, tau=np.vstack([c.tau[4:], np.repeat(c.tau[-1:], 4, axis=0)]))),
-    Slip(41, "D4 in mm", r"[dr] of frame 4|link ends at frame 4", lambda c: c.text("D4: 1.2", "D4: 1200.0")),
+    Slip(
+        26,
+        "zero of joint 2 off by 15 degrees",
+        r"zero of joint 2",
+        lambda c: c.text("theta: q2", "theta: q2 + pi/12"),
+    ),
+    Slip(
+        31, "all torques negative", r"torques have the wrong sign", lambda c: replace(c, tau=-c.tau)
+    ),
+    Slip(
+        34,
+        "torque 8 ms early",
+        r"Torques are early",
+        lambda c: replace(c, tau=np.vstack([c.tau[4:], np.repeat(c.tau[-1:], 4, axis=0)])),
+    ),
+    Slip(
+        41,
+        "D4 in mm",
+        r"[dr] of frame 4|link ends at frame 4",
+        lambda c: c.text("D4: 1.2", "D4: 1200.0"),
+    ),
     Slip(
         42,
         "motor angles taken for joint angles",
@@ -459,7 +730,8 @@ SIMULATED = (
 )
 
 
-# --- Staubli TX40, measured -----------------------------------------------------------------------------------------------------------------------
+# --- Staubli TX40, measured
+# -----------------------------------------------------------------------------------------------------------------------
 
 
 def tx40(folder: Path, *, values: bool = False) -> Case:
@@ -485,7 +757,12 @@ def tx40(folder: Path, *, values: bool = False) -> Case:
 
 
 TX40 = (
-    Slip(1, "ratio of joint 3 negative", r"joint 3 counts", lambda c: c.text("[0, 0, 45, 0", "[0, 0, -45, 0")),
+    Slip(
+        1,
+        "ratio of joint 3 negative",
+        r"joint 3 counts",
+        lambda c: c.text("[0, 0, 45, 0", "[0, 0, -45, 0"),
+    ),
     Slip(
         3,
         "position columns 2 and 3 exchanged",
@@ -519,9 +796,17 @@ TX40 = (
     ),
     Slip(16, "ratio of joint 4 positive", r"joint 4 counts", lambda c: c.text("-48", "48")),
     Slip(
-        18, "torque 20 ms late", r"Torques are late", lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 110, axis=0), c.tau[:-110]]))
+        18,
+        "torque 20 ms late",
+        r"Torques are late",
+        lambda c: replace(c, tau=np.vstack([np.repeat(c.tau[:1], 110, axis=0), c.tau[:-110]])),
     ),
-    Slip(23, "RL4 in mm", r"[dr] of frame 4|link ends at frame 4", lambda c: c.text("RL4: 0.225", "RL4: 225.0")),
+    Slip(
+        23,
+        "RL4 in mm",
+        r"[dr] of frame 4|link ends at frame 4",
+        lambda c: c.text("RL4: 0.225", "RL4: 225.0"),
+    ),
     Slip(
         24,
         "offset of joint 3 forgotten",

@@ -1,4 +1,6 @@
-"""Bags: every storage gives the same bits; joints go by name; what a message lacks, and a bag that is none, is named."""
+"""Bags: every storage gives the same bits; joints go by name; what a message lacks, and a bag that
+is none, is named.
+"""
 
 import hashlib
 import sys
@@ -23,11 +25,18 @@ COLUMNS = {"q": list(JOINTS), "tau": list(JOINTS)}
 
 
 def settings(path, **record):
-    return study_from_mapping({"record": {"files": str(path), "columns": COLUMNS, **record}}).record[0]
+    return study_from_mapping(
+        {"record": {"files": str(path), "columns": COLUMNS, **record}}
+    ).record[0]
 
 
 def bag(tmp_path, kind="mcap", topics=None, **others):
-    return write_bag(kind, tmp_path / "run", topics or {"/joint_states": joint_states(STAMPS, JOINTS, Q, TAU, QD)}, **others)
+    return write_bag(
+        kind,
+        tmp_path / "run",
+        topics or {"/joint_states": joint_states(STAMPS, JOINTS, Q, TAU, QD)},
+        **others,
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -49,13 +58,26 @@ def test_every_storage_gives_the_same_bits(tmp_path, kind):
 @campaign
 def test_columns(tmp_path):
     path = bag(tmp_path)
-    np.testing.assert_array_equal(read_record(settings(path, columns={"q": ["elbow", "shoulder"]})).tau, TAU[:, ::-1])
-    velocities = read_record(settings(path, columns={"q": ["elbow.velocity"], "tau": ["elbow"]}, rate=RATE))
+    np.testing.assert_array_equal(
+        read_record(settings(path, columns={"q": ["elbow", "shoulder"]})).tau, TAU[:, ::-1]
+    )
+    velocities = read_record(
+        settings(path, columns={"q": ["elbow.velocity"], "tau": ["elbow"]}, rate=RATE)
+    )
     np.testing.assert_array_equal(velocities.q[:, 0], QD[:, 1])
     for columns, said in (
         ({}, "/joint_states has the joints shoulder, elbow; name those of the robot"),
-        ({"q": ["wrist"]}, "no column wrist; the file has t, shoulder.position, shoulder.velocity, shoulder.effort, elbow.position"),
-        ({"q": ["wrist.position"]}, "message 1 of /joint_states: no joint wrist; it has shoulder, elbow"),
+        (
+            {"q": ["wrist"]},
+            (
+                "no column wrist; the file has t, shoulder.position, shoulder.velocity, "
+                "shoulder.effort, elbow.position"
+            ),
+        ),
+        (
+            {"q": ["wrist.position"]},
+            "message 1 of /joint_states: no joint wrist; it has shoulder, elbow",
+        ),
     ):
         with pytest.raises(InputError) as e:
             read_record(settings(path, columns=columns))
@@ -91,7 +113,10 @@ def test_joints_change_places(tmp_path):
         (lambda s, q, tau: (s, JOINTS, q, (), ()), "0 values of effort for 2 joints"),
         (lambda s, q, tau: (s, JOINTS[:1], q[:1], (), tau[:1]), "no joint elbow; it has shoulder"),
         (lambda s, q, tau: (s, JOINTS, q[:1], (), tau), "1 values of position for 2 joints"),
-        (lambda s, q, tau: (s, ("shoulder", "elbow", "elbow"), (*q, 0), (), (*tau, 0)), "joint elbow more than once"),
+        (
+            lambda s, q, tau: (s, ("shoulder", "elbow", "elbow"), (*q, 0), (), (*tau, 0)),
+            "joint elbow more than once",
+        ),
         (lambda s, q, tau: (s, JOINTS, q * np.nan, (), tau), "nan (2 such values in all)"),
     ],
 )
@@ -104,7 +129,9 @@ def test_what_a_message_lacks_is_named(tmp_path, spoil, said):
 
 
 def test_several_publishers(tmp_path):
-    """A gripper and a wheel publish on the topic of the arm, before it and between: skipped and counted; the clock is that of the arm."""
+    """A gripper and a wheel publish on the topic of the arm, before it and between: skipped and
+    counted; the clock is that of the arm.
+    """
     arm = joint_states(STAMPS, JOINTS, Q, TAU)
     grip = joint_states(STAMPS - 1_234_567, ("grip", "left"), Q, TAU[:, :0])
     wheel = joint_states(STAMPS[::3] + 500, ("wheel",), Q[::3, :1], TAU[::3, :1])
@@ -115,13 +142,25 @@ def test_several_publishers(tmp_path):
     np.testing.assert_array_equal(record.tau, TAU)
     np.testing.assert_array_equal(record.t, np.arange(N) / RATE)
     others = len(grip) + len(wheel)
-    assert record.time.endswith(f"{others} of {N + others} messages on /joint_states have none of these joints and are skipped")
+    assert record.origin.time.endswith(
+        f"{others} of {N + others} messages on /joint_states have none of these joints and are "
+        "skipped"
+    )
     wheel_alone = read_record(settings(path, columns={"q": ["wheel"]}))
     np.testing.assert_array_equal(wheel_alone.q, Q[::3, :1])
-    spoilt = [*messages[:8], (int(STAMPS[-1]) + 7, JOINTS[:1], Q[0, :1], (), TAU[0, :1]), *messages[8:]]
-    with pytest.raises(InputError, match="message 94 of /joint_states: no joint elbow; it has shoulder"):
+    spoilt = [
+        *messages[:8],
+        (int(STAMPS[-1]) + 7, JOINTS[:1], Q[0, :1], (), TAU[0, :1]),
+        *messages[8:],
+    ]
+    with pytest.raises(
+        InputError, match="message 94 of /joint_states: no joint elbow; it has shoulder"
+    ):
         read_record(settings(write_bag("mcap", tmp_path / "other", {"/joint_states": spoilt})))
-    nan = [(s, names, np.array(q) * (np.nan if names == JOINTS and k > 4 else 1), *rest) for k, (s, names, q, *rest) in enumerate(messages)]
+    nan = [
+        (s, names, np.array(q) * (np.nan if names == JOINTS and k > 4 else 1), *rest)
+        for k, (s, names, q, *rest) in enumerate(messages)
+    ]
     with pytest.raises(InputError, match="message 7 of /joint_states"):
         read_record(settings(write_bag("mcap", tmp_path / "nan", {"/joint_states": nan})))
 
@@ -129,10 +168,18 @@ def test_several_publishers(tmp_path):
 def test_topics(tmp_path):
     first, second = joint_states(STAMPS, JOINTS, Q, TAU), joint_states(STAMPS, JOINTS, 2 * Q, TAU)
     path = bag(tmp_path, topics={"/left/joint_states": first, "/right/joint_states": second})
-    with pytest.raises(InputError, match=r"several topics .*: /left/joint_states, /right/joint_states; choose one by record\.topic"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"several topics .*: /left/joint_states, /right/joint_states; choose one by "
+            r"record\.topic"
+        ),
+    ):
         read_record(settings(path))
     np.testing.assert_array_equal(read_record(settings(path, topic="/right/joint_states")).q, 2 * Q)
-    with pytest.raises(InputError, match="no topic /up of sensor_msgs/msg/JointState; the bag has /left"):
+    with pytest.raises(
+        InputError, match="no topic /up of sensor_msgs/msg/JointState; the bag has /left"
+    ):
         read_record(settings(path, topic="/up"))
 
 

@@ -1,8 +1,8 @@
 """Resolution study on a simulated record of the planar arm."""
 
 import json
+import pickle
 from dataclasses import replace
-from hashlib import sha256
 
 import numpy as np
 import planar_2r_model as planar
@@ -11,24 +11,29 @@ from campaign import campaign
 from planar_data import TRUE, motion, record
 from scipy.stats import t
 
-from runtime.errors import InputError, ModelError, SettingsError
-from runtime.estimators.methods import estimate_of
+from runtime.errors import InputError, SettingsError
+from runtime.loop.methods import estimate_of
 from runtime.model.drives import Drives
-from runtime.model.generated import ModelText
-from runtime.observation.filters import filtered_states
-from runtime.observation.observation import Observation, decimated_torque, observation_from_states, observe, select_rows
 from runtime.resolution.cestac import cestac, key_blocks, levels_of
 from runtime.resolution.perturbed import perturbed_position, perturbed_torque
 from runtime.resolution.result import deciding_names, level_result, runs_needed
 from runtime.resolution.runs import Level, Run, Runs
+from runtime.rows.observation import Observation
+from runtime.rows.observe import observe
+from runtime.rows.prepared import decimated_torque, observation_from_states
+from runtime.rows.selection import select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Signals, Study
+from runtime.signals.filters import filtered_states
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()
 
 
 def study(**settings):
-    return Study(signals=SIGNALS, cestac=CestacSettings(**{"delta": (1e-3, 2e-3), "runs": 3, "columns": "all", **settings}))
+    return Study(
+        signals=SIGNALS,
+        cestac=CestacSettings(**{"delta": (1e-3, 2e-3), "runs": 3, "columns": "all", **settings}),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +44,15 @@ def small():
 def test_one_run_is_equations_15_to_17(small):
     """The same run written out: perturb, filter, regressor on all columns, decimate, lstsq."""
     bits = np.random.Generator(np.random.Philox(np.random.SeedSequence(1, spawn_key=(1, 2))))
-    noise = 2.0 * np.unpackbits(np.frombuffer(bits.bytes(1500), dtype=np.uint8)).reshape(6000, 2) - 1
+    noise = (
+        2.0 * np.unpackbits(np.frombuffer(bits.bytes(1500), dtype=np.uint8)).reshape(6000, 2) - 1
+    )
     states = filtered_states(RECORD.q + 2e-3 * noise, 1000.0, SIGNALS)
     clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
-    seen = observation_from_states(planar, states, decimated_torque(RECORD.tau, selection), selection)
+    seen = observation_from_states(
+        planar, states, decimated_torque(RECORD.tau, selection), selection
+    )
     X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
     run = small.levels[1].runs[2]
     assert (run.level, run.run) == (1, 2)
@@ -58,7 +67,9 @@ def test_statistics_are_equations_18_to_22(small):
     sigma = np.sqrt(sum((X - mean) ** 2) / 2)
     clean = filtered_states(RECORD.q, 1000.0, SIGNALS)
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
-    seen = observation_from_states(planar, clean, decimated_torque(RECORD.tau, selection), selection)
+    seen = observation_from_states(
+        planar, clean, decimated_torque(RECORD.tau, selection), selection
+    )
     rho_ls, rho = (np.linalg.norm(seen.Y - seen.W @ x) for x in (X_ls, mean))
     own = np.mean([run.residual_norm for run in result.runs])
     assert np.allclose(X_ls, estimate_of(seen).X, rtol=1e-9)
@@ -69,20 +80,26 @@ def test_statistics_are_equations_18_to_22(small):
     assert np.isclose(result.e_rho_own, 100 * abs(1 - own / rho_ls))
     assert np.isclose(result.increase, 100 * (rho - rho_ls) / np.linalg.norm(seen.Y))
     assert np.isclose(result.increase_own, 100 * (own - rho_ls) / np.linalg.norm(seen.Y))
-    assert np.allclose(result.half_width, 4.302652729911275 * sigma / np.sqrt(3))  # Student, 2 degrees of freedom, 97.5 %
+    assert np.allclose(
+        result.half_width, 4.302652729911275 * sigma / np.sqrt(3)
+    )  # Student, 2 degrees of freedom, 97.5 %
 
 
 @campaign
 def test_processes_give_the_same_bits(small):
     """Of this one, too: BLAS has one thread in all of them (conftest.py)."""
     calls = []
-    two = cestac(planar, RECORD, study(), workers=2, progress=lambda done, total: calls.append((done, total)))
+    two = cestac(
+        planar, RECORD, study(), workers=2, progress=lambda done, total: calls.append((done, total))
+    )
     assert two.to_json() == small.to_json()
     assert calls == [(done, 6) for done in range(1, 7)]
 
 
 def test_common_random_numbers_are_filtered_once_for_all_steps():
-    """filter(q + Delta xi) = filter(q) + Delta filter(xi): the same run written out, on the side of the motors."""
+    """filter(q + Delta xi) = filter(q) + Delta filter(xi): the same run written out, on the side of
+    the motors.
+    """
     common = study(common=True, side="motor", delta=(2e-2, 1e-2))
     found = cestac(planar, RECORD, common)
     drives = Drives.from_mapping(planar.DRIVES)
@@ -90,13 +107,17 @@ def test_common_random_numbers_are_filtered_once_for_all_steps():
     selection = select_rows(RECORD, clean.qd, SIGNALS, Study().rows)
     for level in found.levels:
         q = perturbed_position(RECORD.q, level.level, common.cestac, drives, (2,))
-        seen = observation_from_states(planar, filtered_states(q, 1000.0, SIGNALS), decimated_torque(RECORD.tau, selection), selection)
+        seen = observation_from_states(
+            planar,
+            filtered_states(q, 1000.0, SIGNALS),
+            decimated_torque(RECORD.tau, selection),
+            selection,
+        )
         X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
         assert np.allclose(level.runs[2].X, X, rtol=1e-8)
 
 
-def test_least_squares_by_normal_equations_while_the_condition_allows_it(small):
-    assert all(run.method == "normal equations" for level in small.levels for run in level.runs)
+def test_least_squares_of_a_motion_that_hardly_accelerates():
     t = np.arange(6000) / 1000.0
     slow = replace(RECORD, q=motion(t / 300)[0])  # accelerations 1e-5 of before
     found = cestac(planar, slow, study(delta=(1e-9,)))
@@ -114,7 +135,9 @@ def test_weights_take_the_way_of_the_identification():
 
 
 def test_tasks_have_fixed_borders():
-    """Whatever is missing, a run shares its task with the same others; with common numbers all levels of a run stay together."""
+    """Whatever is missing, a run shares its task with the same others; with common numbers all
+    levels of a run stay together.
+    """
     keys = [(level, run) for level in range(3) for run in range(100)]
     blocks = key_blocks(keys, 100, 3, common=False)
     assert max(map(len, blocks)) == 20 and sorted(key for block in blocks for key in block) == keys
@@ -129,25 +152,31 @@ def test_tasks_have_fixed_borders():
 def test_many_runs_are_not_listed_in_json(small):
     many = replace(
         small.levels[0].runs,
-        **{f: np.repeat(getattr(small.levels[0].runs, f), 400, axis=0) for f in ("run", "level", "X", "residual_norm", "normal")},
+        **{
+            f: np.repeat(getattr(small.levels[0].runs, f), 400, axis=0)
+            for f in ("run", "level", "X", "residual_norm", "normal")
+        },
     )
     text = replace(small, levels=(replace(small.levels[0], runs=many), small.levels[1])).to_json()
-    assert json.loads(text)["levels"][0]["runs"] is None and json.loads(text)["levels"][0]["run_count"] == 1200
+    assert (
+        json.loads(text)["levels"][0]["runs"] is None
+        and json.loads(text)["levels"][0]["run_count"] == 1200
+    )
     assert len(text) < len(small.to_json())
 
 
-def test_model_text_is_checked():
-    sent = ModelText.of(planar)
-    assert sent.load().BASE_PARAMETERS == planar.BASE_PARAMETERS
-    with pytest.raises(ModelError, match="not the one that was sent"):
-        replace(sent, text=sent.text + "\n").load()
-    harmful = sent.text + "\nimport os\n"
-    with pytest.raises(ModelError, match="import os"):
-        replace(sent, text=harmful, digest=sha256(harmful.encode()).hexdigest()).load()
+def test_an_emitted_module_travels_as_text():
+    """Other modules by their names."""
+    sent = pickle.dumps((planar, planar, np))
+    again, same, numpy = pickle.loads(sent)  # noqa: S301
+    assert again.BASE_PARAMETERS == planar.BASE_PARAMETERS and again is not planar
+    assert again is same and numpy is np
 
 
 def test_bias_grows_as_the_square_of_the_step():
-    """e(2 Delta) / e(Delta) = 4 while the bias is small; common random numbers, so that only Delta differs."""
+    """e(2 Delta) / e(Delta) = 4 while the bias is small; common random numbers, so that only Delta
+    differs.
+    """
     found = cestac(planar, record(noise=0.0), study(delta=(5e-4, 1e-3, 2e-3), runs=20, common=True))
     for name in ("ZZ1R", "ZZ2"):
         i = found.names.index(name)
@@ -186,24 +215,41 @@ def test_other_columns_are_not_evaluated_into_the_fit():
 def test_several_records_are_stacked():
     other = record(N=4000, seed=5)
     found = cestac(planar, [RECORD, other], study(delta=(1e-3,)))
-    assert found.reference.rows > cestac(planar, RECORD, study(delta=(1e-3,), runs=2)).reference.rows
+    assert (
+        found.reference.rows > cestac(planar, RECORD, study(delta=(1e-3,), runs=2)).reference.rows
+    )
     assert found.settings["rate"] == [1000.0, 1000.0]
     again = cestac(planar, [RECORD, other], study(delta=(1e-3,)))
     assert again.to_json() == found.to_json()
-    alike = cestac(planar, [RECORD, RECORD], study(delta=(1e-3,)))  # the two draw different numbers: less scatter than one record
-    assert np.median(alike.levels[0].sigma) < np.median(cestac(planar, RECORD, study(delta=(1e-3,), runs=3)).levels[0].sigma)
+    alike = cestac(
+        planar, [RECORD, RECORD], study(delta=(1e-3,))
+    )  # the two draw different numbers: less scatter than one record
+    assert np.median(alike.levels[0].sigma) < np.median(
+        cestac(planar, RECORD, study(delta=(1e-3,), runs=3)).levels[0].sigma
+    )
 
 
 def test_torque_steps_alone_change_little_and_go_through_the_drives():
     found = cestac(planar, RECORD, study(delta=(1e-3,), torque=(1e-3, 0.01)))
-    assert [result.level for result in found.levels] == [Level(1e-3), Level(0, 1e-3), Level(0, 0.01), Level(1e-3, 1e-3), Level(1e-3, 0.01)]
-    assert [result.level.label for result in found.levels][1:4:2] == ["Phi 0.001", "0.001 + Phi 0.001"]
+    assert [result.level for result in found.levels] == [
+        Level(1e-3),
+        Level(0, 1e-3),
+        Level(0, 0.01),
+        Level(1e-3, 1e-3),
+        Level(1e-3, 0.01),
+    ]
+    assert [result.level.label for result in found.levels][1:4:2] == [
+        "Phi 0.001",
+        "0.001 + Phi 0.001",
+    ]
     alone, together = found.levels[1], found.levels[3]
     assert np.nanmax(alone.e) < 1 < np.max(together.e)
     assert alone.e_rho < 1
     assert found.settings["torque_side"] == "motor"
     drives = Drives.from_mapping(planar.DRIVES)
-    noise = perturbed_torque(RECORD.tau, Level(0, 0.01), study().cestac, drives, (1, 0, 1)) - RECORD.tau
+    noise = (
+        perturbed_torque(RECORD.tau, Level(0, 0.01), study().cestac, drives, (1, 0, 1)) - RECORD.tau
+    )
     assert np.allclose(np.unique(np.round(noise @ np.linalg.inv(drives.ratio), 9)), [-0.01, 0.01])
 
 
@@ -223,7 +269,10 @@ def test_motor_side_divides_the_step_by_the_ratio():
     motor = cestac(planar, RECORD, study(delta=(1e-3,), side="motor"))
     assert motor.levels[0].e[0] < 0.05 < joint.levels[0].e[0]
     blind = type(planar)("blind")
-    blind.__dict__.update({name: value for name, value in vars(planar).items() if not name.startswith("__")}, DRIVES=None)
+    blind.__dict__.update(
+        {name: value for name, value in vars(planar).items() if not name.startswith("__")},
+        DRIVES=None,
+    )
     with pytest.raises(SettingsError, match="no drives"):
         cestac(blind, RECORD, study(side="motor"))
     with pytest.raises(InputError, match="workers=0"):
@@ -238,7 +287,12 @@ def test_verdicts():
         ((7.0, 6.0, 60.0), "biased", {"a", "b"}),
     ):
         X = reference.X * (1 - np.array(e) / 100)
-        result = level_result(Level(1e-3), Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3), Measured, reference)
+        result = level_result(
+            Level(1e-3),
+            Runs.of([Run(0, k, tuple(X), 1.0) for k in range(3)], 3),
+            Measured,
+            reference,
+        )
         assert result.verdict == verdict
         assert set(result.decided_by) - {"rho"} == names
         assert "Not deciding" in result.message and "c" in result.message.rsplit(":", 1)[1]
@@ -247,7 +301,10 @@ def test_verdicts():
 
 def test_runs_without_an_estimate_are_left_out_and_counted():
     reference = estimate_like(relative_sigma=(1.0, 2.0, 30.0))
-    runs = [Run(0, k, tuple(reference.X * (1 + share)), 1.0) for k, share in enumerate((0.0, 0.02, np.nan))]
+    runs = [
+        Run(0, k, tuple(reference.X * (1 + share)), 1.0)
+        for k, share in enumerate((0.0, 0.02, np.nan))
+    ]
     result = level_result(Level(1e-3), Runs.of(runs, 3), Measured, reference)
     assert np.allclose(result.e, 1.0) and "1 of 3 runs found no estimate" in result.message
     with pytest.raises(InputError, match=r"finds 1 estimates of 2 runs at 0\.001"):
@@ -264,7 +321,11 @@ class Measured:
 def estimate_like(relative_sigma):
     """An Estimate of parameters a, b, c with the given %sigma."""
     instants = np.arange(4.0)
-    full = estimate_of(Observation(np.eye(4, 3), np.ones(4), (4,), ("a", "b", "c"), instants, np.zeros(4, dtype=int), 1.0))
+    full = estimate_of(
+        Observation(
+            np.eye(4, 3), np.ones(4), (4,), ("a", "b", "c"), instants, np.zeros(4, dtype=int), 1.0
+        )
+    )
     X = np.array([1.0, 2.0, 3.0])
     return replace(full, X=X, sigma=np.array(relative_sigma) * X / 100, residual_norm=2.0)
 
@@ -273,15 +334,26 @@ def test_runs_needed():
     assert runs_needed(0.0) == 2
     for spread in (0.5, 3.0, 20.0):
         N = runs_needed(spread)
-        assert t.ppf(0.975, N - 1) * spread / np.sqrt(N) < 1 <= t.ppf(0.975, N - 2) * spread / np.sqrt(N - 1)
+        assert (
+            t.ppf(0.975, N - 1) * spread / np.sqrt(N)
+            < 1
+            <= t.ppf(0.975, N - 2) * spread / np.sqrt(N - 1)
+        )
 
 
 def test_text_and_json(small):
     data = json.loads(small.to_json(), parse_constant=lambda name: pytest.fail(name))
     assert data["settings"]["rate"] == [1000.0] and data["settings"]["cestac"]["seed"] == 1
-    assert data["settings"]["signals"]["lowpass"]["cutoff"] == 20 and data["settings"]["factor"] == 20
-    assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {"planar.csv": "cd" * 32}
-    assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {"delta": 0.001, "torque": 0.0}
+    assert (
+        data["settings"]["signals"]["lowpass"]["cutoff"] == 20 and data["settings"]["factor"] == 20
+    )
+    assert data["provenance"]["seed"] == 1 and data["provenance"]["files"] == {
+        "planar.csv": "cd" * 32
+    }
+    assert len(data["levels"]) == 2 and data["levels"][0]["level"] == {
+        "delta": 0.001,
+        "torque": 0.0,
+    }
     text = str(small)
     assert "%e(rho) (22), measured W, as printed" in text and "verdict" in text
     assert len(small.error_table().to_text().splitlines()) == 11

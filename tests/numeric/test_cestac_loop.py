@@ -1,4 +1,6 @@
-"""CESTAC with every estimator, on recorded positions and with the encoder inside the loop of the planar arm."""
+"""CESTAC with every estimator, on recorded positions and with the encoder inside the loop of the
+planar arm.
+"""
 
 from dataclasses import replace
 
@@ -8,14 +10,14 @@ from campaign import campaign
 from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.closed_loop import closed_loop
-from runtime.estimators.methods import estimate_of
-from runtime.motion.simulation import Simulator
-from runtime.observation.observation import observe
+from runtime.loop.closed_loop import closed_loop
+from runtime.loop.methods import estimate_of
+from runtime.loop.simulation import Simulator
 from runtime.resolution.cestac import cestac
 from runtime.resolution.loop import loop_of
 from runtime.resolution.rounding import rounded, stream
 from runtime.resolution.runs import Level
+from runtime.rows.observe import observe
 from runtime.settings.study import CestacSettings, EstimateSettings, study_from_mapping
 
 STEP = 2e-4
@@ -25,7 +27,9 @@ TORQUE = {"saturation": None, "noise": 0.05}
 @pytest.fixture(scope="module")
 def study():
     settings = {"columns": "all", "rounding": "phase", "delta": [STEP], "runs": 2}
-    return study_from_mapping({**ARM, "cestac": settings, "controller": {**ARM["controller"], "torque": TORQUE}})
+    return study_from_mapping(
+        {**ARM, "cestac": settings, "controller": {**ARM["controller"], "torque": TORQUE}}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +72,14 @@ def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noq
     q = rounded(record.q, STEP, "phase", stream(1, 0, 0))
     selected = closed_loop(model, [record], instruments, simulator).measured()
     by_hand = closed_loop(model, [replace(record, q=q)], instruments, simulator).measured()
-    assert np.allclose(found.levels[0].runs[0].X, estimate_of(by_hand, instruments.estimate, model=model).X, rtol=1e-6)
-    assert np.allclose(found.reference.X, estimate_of(selected, instruments.estimate, model=model).X, rtol=1e-9)
+    assert np.allclose(
+        found.levels[0].runs[0].X,
+        estimate_of(by_hand, instruments.estimate, model=model).X,
+        rtol=1e-6,
+    )
+    assert np.allclose(
+        found.reference.X, estimate_of(selected, instruments.estimate, model=model).X, rtol=1e-9
+    )
     i = found.names.index("ZZ1R")
     assert found.levels[0].e[i] < cestac(model, record, study).levels[0].e[i] / 2
     assert "place: loop" in found.notes[0]
@@ -78,7 +88,12 @@ def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noq
 @campaign
 def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, simulator):  # noqa: F811
     model, *_, truth, _ = arm
-    found = cestac(model, record, method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"), simulator=simulator)
+    found = cestac(
+        model,
+        record,
+        method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one"),
+        simulator=simulator,
+    )
     i = found.names.index("ZZ1R")
     assert found.levels[0].e[i] < 0.1 < cestac(model, record, study).levels[0].e[i]
     assert "reads of the recorded positions the first alone" in found.notes[0]
@@ -87,7 +102,9 @@ def test_didim_does_not_see_recorded_positions_and_says_so(arm, study, record, s
 
 @campaign
 def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # noqa: F811
-    """Positions of a run lie on phi + k Delta; the arm answers them; the run is least squares of that record."""
+    """Positions of a run lie on phi + k Delta; the arm answers them; the run is least squares of
+    that record.
+    """
     model, *_ = arm
     asked = in_loop(study)
     loop = loop_of(model, (), asked, simulator)
@@ -108,7 +125,9 @@ def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # n
 @campaign
 def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F811
     model, *_, truth, _ = arm
-    asked = in_loop(method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one", around=0.05))
+    asked = in_loop(
+        method(study, "didim", start=away(truth, model.BASE_PARAMETERS), gains="one", around=0.05)
+    )
     found = cestac(model, (), asked, simulator=simulator)
     assert found.levels[0].e[found.names.index("ZZ1R")] > 0.2
 
@@ -123,8 +142,13 @@ def test_total_least_squares_is_told_the_steps(arm, study, record):  # noqa: F81
 
 @campaign
 def test_other_processes_simulate_the_same_loop(arm, study, simulator):  # noqa: F811
-    one, two = (cestac(arm[0], (), in_loop(study), simulator=simulator, workers=workers) for workers in (0, 2))
-    assert np.allclose([run.X for run in one.levels[0].runs], [run.X for run in two.levels[0].runs], rtol=1e-9)
+    one, two = (
+        cestac(arm[0], (), in_loop(study), simulator=simulator, workers=workers)
+        for workers in (0, 2)
+    )
+    assert np.allclose(
+        [run.X for run in one.levels[0].runs], [run.X for run in two.levels[0].runs], rtol=1e-9
+    )
 
 
 def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
@@ -137,10 +161,14 @@ def test_what_cannot_be_asked(arm, study, record):  # noqa: F811
     ):
         with pytest.raises(SettingsError, match=words):
             CestacSettings(**changed)
-    with pytest.raises(SettingsError, match="didim simulates the closed loop, and this study tells none"):
+    with pytest.raises(
+        SettingsError, match="didim simulates the closed loop, and this study tells none"
+    ):
         cestac(arm[0], record, replace(method(study, "didim"), controller=None))
     with pytest.raises(SettingsError, match="place: loop simulates the closed loop"):
         cestac(arm[0], (), replace(in_loop(study), controller=None))
     once = method(study, "iv", passes=1, start=away(arm[3], arm[0].BASE_PARAMETERS), gains="one")
-    with pytest.raises(InputError, match="iv: no estimate of the record as measured to compare with"):
+    with pytest.raises(
+        InputError, match="iv: no estimate of the record as measured to compare with"
+    ):
         cestac(arm[0], record, once)

@@ -1,4 +1,6 @@
-"""Long studies: killed, interrupted, on a full disk, and resumed with the bits of an uninterrupted one."""
+"""Long studies: killed, interrupted, on a full disk, and resumed with the bits of an uninterrupted
+one.
+"""
 
 import errno
 import json
@@ -27,7 +29,9 @@ HERE = Path(__file__).parent
 
 def study(**settings):
     settings = {"delta": (1e-3, 2e-3), "runs": 10, "columns": "all", **settings}
-    return Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(**settings))
+    return Study(
+        signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(**settings)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +65,34 @@ def test_interrupted_and_resumed(tmp_path, whole):
         cestac(planar, RECORD, study(), checkpoint=first, progress=stopping_after(7))
     assert files(tmp_path) == ["000000.npz", "study.json"] and first.written >= 7
     seen = []
-    second = cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda done, total: seen.append(done))
+    second = cestac(
+        planar,
+        RECORD,
+        study(),
+        checkpoint=Checkpoint(tmp_path),
+        progress=lambda done, total: seen.append(done),
+    )
     assert seen[0] == first.written + 2 and seen[-1] == 20  # tasks of two runs
     assert same_bits(second, whole) and second.to_json() == whole.to_json()
-    cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda *_: pytest.fail("nothing is left to do"))
+    cestac(
+        planar,
+        RECORD,
+        study(),
+        checkpoint=Checkpoint(tmp_path),
+        progress=lambda *_: pytest.fail("nothing is left to do"),
+    )
 
 
 def test_longer_study_repeats_nothing(tmp_path, whole):
     cestac(planar, RECORD, study(runs=6), checkpoint=Checkpoint(tmp_path))
     seen = []
-    found = cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path), progress=lambda done, total: seen.append(done))
+    found = cestac(
+        planar,
+        RECORD,
+        study(),
+        checkpoint=Checkpoint(tmp_path),
+        progress=lambda done, total: seen.append(done),
+    )
     assert same_bits(found, whole) and min(seen) > 12
     shorter = cestac(planar, RECORD, study(runs=4), checkpoint=Checkpoint(tmp_path))
     assert np.array_equal(shorter.levels[1].runs.X, whole.levels[1].runs.X[:4])
@@ -104,7 +126,9 @@ def test_killed_and_resumed(tmp_path, whole):
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
-    (tmp_path / "runs" / "000099.npz.unfinished").write_bytes(b"PK half of an archi")  # as a kill in the middle of writing leaves it
+    (tmp_path / "runs" / "000099.npz.unfinished").write_bytes(
+        b"PK half of an archi"
+    )  # as a kill in the middle of writing leaves it
     checkpoint = Checkpoint(tmp_path)
     found = cestac(planar, RECORD, study(), checkpoint=checkpoint)
     assert same_bits(found, whole)
@@ -134,7 +158,10 @@ def test_disk_that_fills_up_leaves_earlier_archives(tmp_path, whole, monkeypatch
     with pytest.raises(InputError, match=f"No space left on device; {first.written} runs are safe"):
         cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path))
     monkeypatch.undo()
-    assert files(tmp_path) == ["000000.npz", "study.json"] and (tmp_path / "runs" / "000000.npz").read_bytes() == before
+    assert (
+        files(tmp_path) == ["000000.npz", "study.json"]
+        and (tmp_path / "runs" / "000000.npz").read_bytes() == before
+    )
     assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
 
 
@@ -144,7 +171,10 @@ def test_disk_that_fills_up_leaves_earlier_archives(tmp_path, whole, monkeypatch
         (lambda r, s: (r, study(seed=2)), "cestac.seed"),
         (lambda r, s: (r, study(delta=(1e-3,))), "cestac.delta"),
         (lambda r, s: (replace(r, tau=r.tau + 1e-12), s), "records"),
-        (lambda r, s: (r, replace(s, signals=replace(s.signals, lowpass=Lowpass(cutoff=21)))), "factor, signals"),
+        (
+            lambda r, s: (r, replace(s, signals=replace(s.signals, lowpass=Lowpass(cutoff=21)))),
+            "factor, signals",
+        ),
     ],
 )
 def test_another_study_is_refused(tmp_path, change, names):
@@ -155,7 +185,13 @@ def test_another_study_is_refused(tmp_path, change, names):
 
 
 def some_runs(first, count, b=3):
-    return Runs.of([Run(0, k, tuple(float(k + i) for i in range(b)), 1.0) for k in range(first, first + count)], b)
+    return Runs.of(
+        [
+            Run(0, k, tuple(float(k + i) for i in range(b)), 1.0)
+            for k in range(first, first + count)
+        ],
+        b,
+    )
 
 
 def test_archives_are_numbered_and_written_when_it_is_time(tmp_path):
@@ -172,7 +208,9 @@ def test_archives_are_numbered_and_written_when_it_is_time(tmp_path):
     checkpoint.flush()
     assert files(tmp_path) == ["000000.npz", "000001.npz", "study.json"]
     found = Checkpoint(tmp_path).resume({"a": 1}, 3)
-    assert found.run.tolist() == list(range(11)) and found[10] == Run(0, 10, (10.0, 11.0, 12.0), 1.0)
+    assert found.run.tolist() == list(range(11)) and found[10] == Run(
+        0, 10, (10.0, 11.0, 12.0), 1.0
+    )
     checkpoint.remove()
     assert not (tmp_path / "runs").exists()
 
@@ -181,7 +219,13 @@ def test_archives_are_compact(tmp_path):
     """100,000 runs of 60 parameters must fit: no more than their numbers and 10 %."""
     b, R = 60, 20_000
     rng = np.random.default_rng(0)
-    runs = Runs(np.zeros(R, dtype=np.int64), np.arange(R), rng.standard_normal((R, b)), np.ones(R), np.ones(R, dtype=bool))
+    runs = Runs(
+        np.zeros(R, dtype=np.int64),
+        np.arange(R),
+        rng.standard_normal((R, b)),
+        np.ones(R),
+        np.ones(R, dtype=bool),
+    )
     checkpoint = Checkpoint(tmp_path)
     checkpoint.resume({}, b)
     checkpoint.add(runs)
@@ -193,11 +237,22 @@ def damaged(path):
 
 
 def pickled(path):
-    np.savez(path, X=np.array([{"a": 1}], dtype=object), **dict.fromkeys(("level", "run", "residual_norm", "normal"), np.zeros(1)))
+    np.savez(
+        path,
+        X=np.array([{"a": 1}], dtype=object),
+        **dict.fromkeys(("level", "run", "residual_norm", "normal"), np.zeros(1)),
+    )
 
 
 def other_shape(path):
-    np.savez(path, X=np.zeros((2, 4)), level=np.zeros(2, int), run=np.zeros(2, int), residual_norm=np.zeros(2), normal=np.zeros(2, bool))
+    np.savez(
+        path,
+        X=np.zeros((2, 4)),
+        level=np.zeros(2, int),
+        run=np.zeros(2, int),
+        residual_norm=np.zeros(2),
+        normal=np.zeros(2, bool),
+    )
 
 
 @pytest.mark.parametrize("spoil", [damaged, pickled, other_shape])
@@ -222,4 +277,8 @@ def test_bad_study_file(tmp_path, text):
 def test_study_file_says_what_was_studied(tmp_path):
     cestac(planar, RECORD, study(runs=2), checkpoint=Checkpoint(tmp_path))
     found = json.loads((tmp_path / "runs" / "study.json").read_text())
-    assert found["cestac.seed"] == 1 and found["robot"] == "planar_2r_test" and "cestac.runs" not in found
+    assert (
+        found["cestac.seed"] == 1
+        and found["robot"] == "planar_2r_test"
+        and "cestac.runs" not in found
+    )

@@ -1,4 +1,6 @@
-"""Columns of records found by the names of the joints: in any order, beside words for the quantity, refused where they say too little."""
+"""Columns of records found by the names of the joints: in any order, beside words for the quantity,
+refused where they say too little.
+"""
 
 from types import SimpleNamespace
 
@@ -11,19 +13,39 @@ from runtime.records.reading import read_records
 from runtime.settings.record import Columns, RecordSettings
 
 NAMES = ("elbow", "shoulder", "wrist")
-MODEL = SimpleNamespace(NAME="arm", JOINTS=(1, 2, 4), LABELS={1: "shoulder", 2: "elbow", 3: "flange", 4: "wrist"}, DRIVES=None)
+MODEL = SimpleNamespace(
+    NAME="arm",
+    JOINTS=(1, 2, 4),
+    LABELS={1: "shoulder", 2: "elbow", 3: "flange", 4: "wrist"},
+    DRIVES=None,
+)
 Q, TAU = np.random.default_rng(3).standard_normal((2, 50, 3))
 ORDER = [1, 0, 2]  # of the robot, among NAMES
 
 
 def record(tmp_path, head, columns, model=MODEL):
     file = tmp_path / "run.csv"
-    np.savetxt(file, np.column_stack([np.arange(50) / 100, Q, TAU]), delimiter=",", header=",".join(["t", *head]), comments="")
-    return read_records([RecordSettings(files=(str(file),), columns=Columns(t="t", **columns))], model)[0]
+    np.savetxt(
+        file,
+        np.column_stack([np.arange(50) / 100, Q, TAU]),
+        delimiter=",",
+        header=",".join(["t", *head]),
+        comments="",
+    )
+    return read_records(
+        [RecordSettings(files=(str(file),), columns=Columns(t="t", **columns))], model
+    )[0]
 
 
 @pytest.mark.parametrize(
-    ("q", "tau"), [("{}_pos", "tau_{}"), ("q/{}", "{}.effort"), ("{}", "torque_{}"), ("position.{}", "{}/torque"), ("{}.q", "{}")]
+    ("q", "tau"),
+    [
+        ("{}_pos", "tau_{}"),
+        ("q/{}", "{}.effort"),
+        ("{}", "torque_{}"),
+        ("position.{}", "{}/torque"),
+        ("{}.q", "{}"),
+    ],
 )
 def test_columns_are_found_in_any_order(q, tau, tmp_path):
     head = [*(q.format(name) for name in NAMES), *(tau.format(name) for name in NAMES)]
@@ -36,9 +58,21 @@ def test_columns_are_found_in_any_order(q, tau, tmp_path):
     ("head", "model", "words"),
     [
         (["elbow", "shoulder", "wrist", "a", "b", "c"], MODEL, "positions and torques"),
-        (["q_elbow", "q_shoulder", "x", "tau_elbow", "tau_shoulder", "tau_wrist"], MODEL, "no column wrist"),
-        (["q_elbow", "elbow.q", "q_wrist", "q_shoulder", "b", "c"], MODEL, "columns q_elbow, elbow.q"),
-        (["a", "b", "c", "d", "e", "f"], SimpleNamespace(**{**vars(MODEL), "LABELS": {1: "shoulder"}}), "no name for every joint"),
+        (
+            ["q_elbow", "q_shoulder", "x", "tau_elbow", "tau_shoulder", "tau_wrist"],
+            MODEL,
+            "no column wrist",
+        ),
+        (
+            ["q_elbow", "elbow.q", "q_wrist", "q_shoulder", "b", "c"],
+            MODEL,
+            "columns q_elbow, elbow.q",
+        ),
+        (
+            ["a", "b", "c", "d", "e", "f"],
+            SimpleNamespace(**{**vars(MODEL), "LABELS": {1: "shoulder"}}),
+            "no name for every joint",
+        ),
         (["a", "b", "c", "d", "e", "f"], None, "no name for every joint"),
     ],
 )
@@ -52,8 +86,14 @@ def test_messages_of_a_bag_need_no_columns(tmp_path):
     path = write_bag(
         "bare mcap",
         tmp_path / "run",
-        {"/joint_states": joint_states(stamps, (*NAMES, "gripper"), *(np.pad(x, ((0, 0), (0, 1))) for x in (Q, TAU)))},
+        {
+            "/joint_states": joint_states(
+                stamps, (*NAMES, "gripper"), *(np.pad(x, ((0, 0), (0, 1))) for x in (Q, TAU))
+            )
+        },
     )
     for columns in ({}, {"q": "names"}):
-        found = read_records([RecordSettings(files=(str(path),), columns=Columns(**columns))], MODEL)[0]
+        found = read_records(
+            [RecordSettings(files=(str(path),), columns=Columns(**columns))], MODEL
+        )[0]
         assert (found.q == Q[:, ORDER]).all() and (found.tau == TAU[:, ORDER]).all()

@@ -1,4 +1,6 @@
-"""Models in C: the API and the values of the NumPy module, the cache, and NumPy with one reason wherever C cannot be had."""
+"""Models in C: the API and the values of the NumPy module, the cache, and NumPy with one reason
+wherever C cannot be had.
+"""
 
 from __future__ import annotations
 
@@ -17,31 +19,36 @@ import pytest
 
 from runtime import load_model
 from runtime.errors import InputError
-from runtime.model.compiled import CompiledModel, FallbackWarning, cache_folder, compiled_model
+from runtime.model.compiled import CompiledModel, FallbackWarning, compiled_model
 from runtime.model.generated import GeneratedModel
-from runtime.observation.filters import States
-from runtime.observation.regressor_signals import decimated_columns
+from runtime.model.loading import cache_folder
 from runtime.resolution.c.kernels import SignalEntries
+from runtime.rows.regressor import decimated_columns
 from runtime.settings.study import Decimate
+from runtime.signals.filters import States
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files
 
 NAME = "planar_2r"
-needs_compiler = pytest.mark.skipif(not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler")
+needs_compiler = pytest.mark.skipif(
+    not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler"
+)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Module and C file of one robot."""
     folder = tmp_path_factory.mktemp("models")
-    for name, text in generate_files(load_robot(NAME), targets=("numpy", "c"), command=NAME).items():
+    for name, text in generate_files(
+        load_robot(NAME), targets=("numpy", "c"), command=NAME
+    ).items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder
 
 
 @pytest.fixture(scope="module")
 def model(folder: Path) -> GeneratedModel:
-    return load_model(NAME, folder=folder)
+    return load_model(NAME, folder=folder, trust=True)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +81,11 @@ def refused(model: GeneratedModel, reason: str, **options: Path) -> None:
 @needs_compiler
 @pytest.mark.parametrize("N", [0, 1, 63, 64, 129, 1024])
 def test_the_api_of_the_module(N: int, model: GeneratedModel, warm: Path) -> None:
-    c, (q, qd, qdd), X = in_c(model, warm), states(N), np.arange(1.0, 1 + len(model.BASE_PARAMETERS))
+    c, (q, qd, qdd), X = (
+        in_c(model, warm),
+        states(N),
+        np.arange(1.0, 1 + len(model.BASE_PARAMETERS)),
+    )
     calls = {
         "regressor": (q, qd, qdd),
         "observation_matrix": (q, qd, qdd),
@@ -103,11 +114,17 @@ def test_stores_and_constants(model: GeneratedModel, warm: Path) -> None:
     W = c.observation_matrix(*given, out=out)
     assert np.shares_memory(W, out) and W.flags.f_contiguous
     name = next(iter(model.CONSTANTS))
-    np.testing.assert_allclose(c.regressor(*given, **{name: 0.7}), model.regressor(*given, **{name: 0.7}), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        c.regressor(*given, **{name: 0.7}),
+        model.regressor(*given, **{name: 0.7}),
+        rtol=1e-12,
+        atol=1e-12,
+    )
     fortran = [np.asfortranarray(x) for x in given]
     assert np.array_equal(c.regressor(*fortran, out=out), c.regressor(*given))
     assert np.array_equal(
-        c.regressor(*(x.astype(np.float32) for x in given)), c.regressor(*(x.astype(np.float32).astype(float) for x in given))
+        c.regressor(*(x.astype(np.float32) for x in given)),
+        c.regressor(*(x.astype(np.float32).astype(float) for x in given)),
     )
     for wrong in (np.zeros(out.shape), out[:], c.store(69)):
         with pytest.raises(ValueError, match=r"expected store\(70\)"):
@@ -117,8 +134,12 @@ def test_stores_and_constants(model: GeneratedModel, warm: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("wrong", [np.zeros((69, 2)), np.zeros((70, 3)), np.zeros((1, 70, 2)), np.zeros(2)])
-def test_shapes_are_checked_before_c_reads(wrong: np.ndarray, model: GeneratedModel, warm: Path) -> None:
+@pytest.mark.parametrize(
+    "wrong", [np.zeros((69, 2)), np.zeros((70, 3)), np.zeros((1, 70, 2)), np.zeros(2)]
+)
+def test_shapes_are_checked_before_c_reads(
+    wrong: np.ndarray, model: GeneratedModel, warm: Path
+) -> None:
     c, (q, qd, _) = in_c(model, warm), states(70)
     with pytest.raises(InputError, match="expected"):
         c.regressor(q, qd, wrong)
@@ -141,23 +162,37 @@ elements:
 
 @needs_compiler
 def test_signals(tmp_path: Path) -> None:
-    """Each row once, whatever its sign: link 2 turns about opposite axes at its two joints, so its rows are equal up to sign."""
-    for name, text in generate_files(parse_robot(OPPOSED, "opposed.yaml"), targets=("numpy", "c")).items():
+    """Each row once, whatever its sign: link 2 turns about opposite axes at its two joints, so its
+    rows are equal up to sign.
+    """
+    for name, text in generate_files(
+        parse_robot(OPPOSED, "opposed.yaml"), targets=("numpy", "c")
+    ).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    model = load_model("opposed", folder=tmp_path)
+    model = load_model("opposed", folder=tmp_path, trust=True)
     c = in_c(model, tmp_path)
     signals, constants = c.signals, np.array([*model.CONSTANTS.values()])
-    assert set(signals.sign) == {-1, 1} and signals.count < len(signals.row) == np.sum(model.STRUCTURE)
+    assert set(signals.sign) == {-1, 1} and signals.count < len(signals.row) == np.sum(
+        model.STRUCTURE
+    )
     assert {
-        (model.BASE_PARAMETERS[k], j) for k, j in zip(signals.column[signals.constant], signals.row[signals.constant], strict=True)
+        (model.BASE_PARAMETERS[k], j)
+        for k, j in zip(
+            signals.column[signals.constant], signals.row[signals.constant], strict=True
+        )
     } == {
         ("OFFSET1", 0),
         ("OFFSET2", 1),
     }
     pointer, integer = ctypes.c_void_p, ctypes.c_int64
-    fill = ctypes.CFUNCTYPE(ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer)(signals.address)
+    fill = ctypes.CFUNCTYPE(
+        ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer
+    )(signals.address)
     for m in (0, 1, signals.tile, 3 * signals.tile + 5):
-        rows, U = np.random.default_rng(m).uniform(-2, 2, (3, 2, m + 3)), np.full((signals.count, m + 2), np.nan)
+        rows, U = (
+            np.random.default_rng(m).uniform(-2, 2, (3, 2, m + 3)),
+            np.full((signals.count, m + 2), np.nan),
+        )
         addresses = [x.ctypes.data for x in (*rows, constants, U)]
         assert fill(m, *addresses[:3], m + 3, *addresses[3:], m + 2) == 0
         assert np.isnan(U[:, m:]).all()
@@ -165,9 +200,14 @@ def test_signals(tmp_path: Path) -> None:
         S[:] = 0.0
         S[signals.column, signals.row] = signals.sign[:, None] * U[signals.signal, :m]
         states = [x[:, :m].T for x in rows]
-        np.testing.assert_allclose(S.transpose(2, 1, 0), model.regressor(*states), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            S.transpose(2, 1, 0), model.regressor(*states), rtol=1e-12, atol=1e-12
+        )
         np.testing.assert_array_equal(S.transpose(2, 1, 0), c.regressor(*states))
-        assert fill(m, *addresses[:3], m + 3, *addresses[3:], m - 1) == 1 and fill(-1, *addresses[:3], 9, *addresses[3:], 9) == 1
+        assert (
+            fill(m, *addresses[:3], m + 3, *addresses[3:], m - 1) == 1
+            and fill(-1, *addresses[:3], 9, *addresses[3:], 9) == 1
+        )
 
 
 @needs_compiler
@@ -176,15 +216,33 @@ def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> Non
     c = in_c(model, shutil.copytree(warm, tmp_path / "cache"))
     wanted = list(range(0, c.signals.count, 3))
     pointer, integer = ctypes.c_void_p, ctypes.c_int64
-    rows, constants = states(c.signals.tile).transpose(0, 2, 1).copy(), np.array([*model.CONSTANTS.values()])
+    rows, constants = (
+        states(c.signals.tile).transpose(0, 2, 1).copy(),
+        np.array([*model.CONSTANTS.values()]),
+    )
     results = []
     for table in (c.signals, c.signals_alone(wanted)):
         U = np.full((table.count, table.tile), np.nan)
-        fill = ctypes.CFUNCTYPE(ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer)(table.address)
-        assert fill(table.tile, *(x.ctypes.data for x in rows), table.tile, constants.ctypes.data, U.ctypes.data, table.tile) == 0
+        fill = ctypes.CFUNCTYPE(
+            ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer
+        )(table.address)
+        assert (
+            fill(
+                table.tile,
+                *(x.ctypes.data for x in rows),
+                table.tile,
+                constants.ctypes.data,
+                U.ctypes.data,
+                table.tile,
+            )
+            == 0
+        )
         results.append(U)
     every, some = results
-    assert np.array_equal(every[wanted], some[wanted]) and np.isnan(np.delete(some, wanted, axis=0)).all()
+    assert (
+        np.array_equal(every[wanted], some[wanted])
+        and np.isnan(np.delete(some, wanted, axis=0)).all()
+    )
     few = SignalEntries(c, model.BASE_PARAMETERS[-2:])  # what a study of two columns evaluates
     assert len(few.wanted) < c.signals.count and few.table.address != c.signals.address
 
@@ -192,17 +250,23 @@ def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> Non
 @needs_compiler
 @pytest.mark.parametrize("changed", [False, True])
 def test_decimated_columns_of_both(model: GeneratedModel, warm: Path, changed: bool) -> None:
-    """W of signals that C gives without a store, all columns and some in another order, with the constants of the file and with one changed."""
+    """W of signals that C gives without a store, all columns and some in another order, with the
+    constants of the file and with one changed.
+    """
     constants = {next(iter(model.CONSTANTS)): 0.7} if changed else {}
     given, c = States(*states(903)), in_c(model, warm)
     for columns in (None, [3, 0, len(model.BASE_PARAMETERS) - 1]):
         for factor, how in ((4, Decimate(factor=4)), (1, None)):
-            found, expected = (decimated_columns(m, given, factor, how, constants, columns) for m in (c, model))
+            found, expected = (
+                decimated_columns(m, given, factor, how, constants, columns) for m in (c, model)
+            )
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 @needs_compiler
-def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_large_results_are_streamed(
+    model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     c, given = in_c(model, warm), states(203)
     ordinary = c.regressor(*given).copy()
     monkeypatch.setattr(c, "_large", 0)
@@ -211,8 +275,12 @@ def test_large_results_are_streamed(model: GeneratedModel, warm: Path, monkeypat
 
 @needs_compiler
 @pytest.mark.parametrize("shift", range(8))
-def test_streamed_rows_at_every_place_in_a_cache_line(model: GeneratedModel, warm: Path, shift: int) -> None:
-    """Written past the caches in whole lines: the bits of ordinary stores, nothing beside the rows, whatever their length."""
+def test_streamed_rows_at_every_place_in_a_cache_line(
+    model: GeneratedModel, warm: Path, shift: int
+) -> None:
+    """Written past the caches in whole lines: the bits of ordinary stores, nothing beside the rows,
+    whatever their length.
+    """
     c = in_c(model, warm)
     constants, (b, n) = np.array([*model.CONSTANTS.values(), 0.0]), model.STRUCTURE.shape
     for N in (*range(1, 68), 203):
@@ -222,7 +290,10 @@ def test_streamed_rows_at_every_place_in_a_cache_line(model: GeneratedModel, war
             start = (-memory.ctypes.data // 8) % 8 + 8 + shift
             rows = memory[start : start + b * n * N]
             pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*given, constants, rows)]
-            assert c._library.planar_2r_regressor(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags)) == 0
+            assert (
+                c._library.planar_2r_regressor(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags))
+                == 0
+            )
             assert np.isnan(memory[:start]).all() and np.isnan(memory[start + b * n * N :]).all()
             results.append(rows)
         assert np.array_equal(*results, equal_nan=True) and np.isfinite(results[0]).any(), N
@@ -252,7 +323,9 @@ def test_an_object_of_another_processor_is_replaced(model: GeneratedModel, tmp_p
     foreign = bytearray(made.read_bytes())
     foreign[18:20] = b"\xf3\x00"  # machine of the ELF header: RISC-V
     made.unlink()
-    wrong = tmp_path / f"{made.stem.partition('-')[0]}-{hashlib.sha256(foreign).hexdigest()[:32]}.so"
+    wrong = (
+        tmp_path / f"{made.stem.partition('-')[0]}-{hashlib.sha256(foreign).hexdigest()[:32]}.so"
+    )
     wrong.write_bytes(foreign)
     in_c(model, tmp_path)
     assert not wrong.exists() and len(list(tmp_path.iterdir())) == 1
@@ -261,26 +334,38 @@ def test_an_object_of_another_processor_is_replaced(model: GeneratedModel, tmp_p
 @needs_compiler
 def test_two_processes_at_once(folder: Path, tmp_path: Path) -> None:
     code = (
-        "import sys, warnings\nwarnings.simplefilter('error')\nfrom pathlib import Path\nfrom runtime import load_model\n"
+        "import sys, warnings\nwarnings.simplefilter('error')\nfrom pathlib import Path\nfrom "
+        "runtime import load_model\n"
         "from runtime.model.compiled import compiled_model\n"
-        f"print(type(compiled_model(load_model('{NAME}', folder=Path(sys.argv[1])))).__name__)"
+        f"print(type(compiled_model(load_model('{NAME}', folder=Path(sys.argv[1]), trust=True))).__name__)"
     )
     environment = {**os.environ, "SYMGEN_CACHE": str(tmp_path / "new")}
     running = [
-        subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)
+        subprocess.Popen(
+            [sys.executable, "-c", code, str(folder)],
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
     ]
     assert [p.communicate()[0].strip() for p in running] == ["CompiledModel"] * 2
-    assert all(p.suffix == ".so" for p in (tmp_path / "new").iterdir())
+    assert all(p.suffix == ".so" for p in (tmp_path / "new" / "compiled").iterdir())
 
 
 @needs_compiler
 def test_subnormal_numbers_survive(model: GeneratedModel, warm: Path) -> None:
     """Objects linked with -ffast-math set flush-to-zero in the thread that loads them."""
     in_c(model, warm)
-    assert float(np.float64(1e-310) * np.float64(1.0)) == 1e-310 and (np.full(9, 1e-310) * 1.0 == 1e-310).all()
+    assert (
+        float(np.float64(1e-310) * np.float64(1.0)) == 1e-310
+        and (np.full(9, 1e-310) * 1.0 == 1e-310).all()
+    )
 
 
-def test_no_compiler(model: GeneratedModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_compiler(
+    model: GeneratedModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", "")
     refused(model, "no C compiler", cache=tmp_path)
@@ -291,9 +376,20 @@ def test_no_compiler(model: GeneratedModel, tmp_path: Path, monkeypatch: pytest.
 @needs_compiler
 @pytest.mark.parametrize(
     ("compiler", "reason"),
-    [("false", "failed with 1"), ("gcc -ffast-math", "arithmetic"), ("gcc --no-such-flag", "failed"), ("true", "failed with 0")],
+    [
+        ("false", "failed with 1"),
+        ("gcc -ffast-math", "arithmetic"),
+        ("gcc --no-such-flag", "failed"),
+        ("true", "failed with 0"),
+    ],
 )
-def test_a_compiler_that_fails(compiler: str, reason: str, model: GeneratedModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compiler_that_fails(
+    compiler: str,
+    reason: str,
+    model: GeneratedModel,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setenv("CC", compiler)
     refused(model, reason, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -307,7 +403,10 @@ def test_sources_that_do_not_fit(model: GeneratedModel, folder: Path, tmp_path: 
     wrong = {
         "syntax": (text + "int", "failed with 1"),
         "robot": (text.replace(model.SOURCE_SHA256, "0" * 64), "different robot files"),
-        "interface": (text.replace("_abi(void) { return 2; }", "_abi(void) { return 99; }"), "interface 99"),
+        "interface": (
+            text.replace("_abi(void) { return 2; }", "_abi(void) { return 99; }"),
+            "interface 99",
+        ),
         "name": (text.replace(f"{NAME}_", "other_"), "not that of"),
         "values": (text.replace("D[0][t] =", "D[0][t] = 3.0 +", 1), "differs from NumPy"),
     }
@@ -329,7 +428,11 @@ def test_folders_that_cannot_be_used(model: GeneratedModel, tmp_path: Path) -> N
 @needs_compiler
 @pytest.mark.skipif(sys.platform != "linux", reason="nobody may write to /proc")
 def test_a_folder_that_cannot_be_written(model: GeneratedModel) -> None:
-    refused(model, "cache folder /proc/symgen: .*; choose another by SYMGEN_CACHE", cache=Path("/proc/symgen"))
+    refused(
+        model,
+        "cache folder /proc/symgen: .*; choose another by SYMGEN_CACHE",
+        cache=Path("/proc/symgen"),
+    )
 
 
 FULL = """
@@ -337,7 +440,7 @@ import resource, sys, warnings
 from pathlib import Path
 from runtime import load_model
 from runtime.model.compiled import compiled_model
-model = load_model("planar_2r", folder=Path(sys.argv[1]))
+model = load_model("planar_2r", folder=Path(sys.argv[1]), trust=True)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
 with warnings.catch_warnings(record=True) as seen:
     warnings.simplefilter("always")
@@ -348,15 +451,28 @@ print(*(warning.message for warning in seen))
 
 @needs_compiler
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
-@pytest.mark.parametrize(("room", "reason"), [(100, "choose another by SYMGEN_CACHE"), (1.1, "failed with")], ids=["source", "object"])
+@pytest.mark.parametrize(
+    ("room", "reason"),
+    [(100, "choose another by SYMGEN_CACHE"), (1.1, "failed with")],
+    ids=["source", "object"],
+)
 def test_a_full_disk(room: float, reason: str, folder: Path, tmp_path: Path) -> None:
-    """Files may not grow: NumPy serves, one line says why, no temporary file is left. The first limit is in bytes, the second in C files."""
+    """Files may not grow: NumPy serves, one line says why, no temporary file is left. The first
+    limit is in bytes, the second in C files.
+    """
     limit = int(room if room > 2 else room * (folder / f"{NAME}.c").stat().st_size)
     done = subprocess.run(
-        [sys.executable, "-c", FULL, str(folder), str(tmp_path / "cache"), str(limit)], capture_output=True, text=True, check=False
+        [sys.executable, "-c", FULL, str(folder), str(tmp_path / "cache"), str(limit)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert reason in done.stdout and done.stdout.startswith(f"{NAME}: NumPy in place of C: ") and done.stdout.count("\n") == 1
+    assert (
+        reason in done.stdout
+        and done.stdout.startswith(f"{NAME}: NumPy in place of C: ")
+        and done.stdout.count("\n") == 1
+    )
     assert list((tmp_path / "cache").iterdir()) == []
 
 
@@ -372,6 +488,6 @@ def test_what_a_killed_process_left_is_removed(model: GeneratedModel, tmp_path: 
 
 def test_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path))
-    assert cache_folder() == tmp_path
+    assert cache_folder() == tmp_path / "compiled"
     monkeypatch.delenv("SYMGEN_CACHE")
     assert cache_folder().parts[-2:] == ("symgen", "compiled")

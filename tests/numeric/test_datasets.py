@@ -20,7 +20,12 @@ def toy(monkeypatch, tmp_path):
     source = tmp_path / "source"
     source.mkdir()
     toy = Dataset(
-        "Toy", "here", "none", f"{source.as_uri()}/", {"a.csv": hashlib.sha256(CONTENT).hexdigest()}, {"record": {"files": ["a.csv"]}}
+        "Toy",
+        "here",
+        "none",
+        f"{source.as_uri()}/",
+        {"a.csv": hashlib.sha256(CONTENT).hexdigest()},
+        {"record": {"files": ["a.csv"]}},
     )
     monkeypatch.setattr(datasets, "DATASETS", {"toy": toy})
     monkeypatch.delenv("SYMGEN_DATA", raising=False)
@@ -43,7 +48,11 @@ def test_folder_of_the_user_comes_first(toy, monkeypatch, tmp_path, packed):
     path = folder / ("a.csv.gz" if packed else "a.csv")
     path.write_bytes(gzip.compress(CONTENT) if packed else CONTENT)
     monkeypatch.setenv("SYMGEN_DATA", str(tmp_path / "data"))
-    assert fetch("toy", "a.csv", cache=tmp_path / "cache") == path == locate("toy", "a.csv", cache=tmp_path / "cache")
+    assert (
+        fetch("toy", "a.csv", cache=tmp_path / "cache")
+        == path
+        == locate("toy", "a.csv", cache=tmp_path / "cache")
+    )
     assert [p.name for p in folder.iterdir()] == [path.name] and not (tmp_path / "cache").exists()
 
 
@@ -69,7 +78,12 @@ def test_nowhere(toy, monkeypatch, tmp_path):
     with pytest.raises(DataUnavailableError) as e:
         fetch("toy", "a.csv", cache=tmp_path / "cache")
     assert len(e.value.tried) == 3
-    for said in ("SYMGEN_DATA=", "cache", "download of", "set the environment variable SYMGEN_DATA"):
+    for said in (
+        "SYMGEN_DATA=",
+        "cache",
+        "download of",
+        "set the environment variable SYMGEN_DATA",
+    ):
         assert said in str(e.value)
 
 
@@ -102,5 +116,9 @@ def test_settings_name_the_files(name):
 def test_settings_of_the_tx40_are_those_of_the_chapter():
     study = study_from_mapping(dataset_study("tx40"))
     assert study.record[0].side == "motor" and study.record[0].rate == 5000
-    assert (study.signals.lowpass.cutoff, study.signals.lowpass.order, study.signals.decimate.factor) == (50, 4, "auto")
+    assert (
+        study.signals.lowpass.cutoff,
+        study.signals.lowpass.order,
+        study.signals.decimate.factor,
+    ) == (50, 4, "auto")
     assert study.rows.window == (0, 7.5)

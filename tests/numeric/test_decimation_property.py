@@ -1,4 +1,6 @@
-"""Decimation of any signal, length and factor: scipy's decimate and MATLAB's, every kept sample, the ends included; by pieces too."""
+"""Decimation of any signal, length and factor: scipy's decimate and MATLAB's, every kept sample,
+the ends included; by pieces too.
+"""
 
 from math import ceil
 
@@ -9,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from runtime.errors import InputError
-from runtime.observation.filters import decimated, decimation_plan
-from runtime.observation.streaming_filters import StreamedDecimation
+from runtime.rows.pieces import Instants, decimation_reach
 from runtime.settings.study import Decimate
+from runtime.signals.decimation import decimate
+from runtime.signals.filters import decimated, decimation_plan, kept_samples
 
 SCIPY, MATLAB = Decimate(), Decimate(phase="last", padding="matlab")
 
@@ -34,9 +37,13 @@ factors = st.one_of(st.integers(2, 60), st.integers(2, 500))
 
 
 def close(found, expected, factor, u):
-    """The tolerance is the rounding of the reference, whose sections lose digits with the square of the factor."""
+    """The tolerance is the rounding of the reference, whose sections lose digits with the square of
+    the factor.
+    """
     assert found.shape == expected.shape
-    np.testing.assert_allclose(found, expected, rtol=0, atol=(2e-14 + 2e-15 * factor**2) * np.abs(u).max())
+    np.testing.assert_allclose(
+        found, expected, rtol=0, atol=(2e-14 + 2e-15 * factor**2) * np.abs(u).max()
+    )
 
 
 @settings(max_examples=150)
@@ -49,35 +56,71 @@ def test_scipys_decimate(kind, N, factor, seed):
 @settings(max_examples=150)
 @given(kind=kinds, N=st.integers(25, 6000), factor=factors, seed=st.integers(0, 10**6))
 def test_matlabs_decimate(kind, N, factor, seed):
-    """decimate.m: nout = ceil(nd/r), nbeg = r - (r*nout - nd), odata = filtfilt(b, a, idata), odata(nbeg:r:nd); filtfilt.m: nfact = 3*(nfilt-1)."""
+    """decimate.m: nout = ceil(nd/r), nbeg = r - (r*nout - nd), odata = filtfilt(b, a, idata),
+    odata(nbeg:r:nd); filtfilt.m: nfact = 3*(nfilt-1).
+    """
     u = signal(kind, N, seed)
     sos = scipy.signal.cheby1(8, 0.05, 0.8 / factor, output="sos")
     begin = factor - (factor * ceil(N / factor) - N)  # counts from 1
-    close(decimated(u, factor, MATLAB), scipy.signal.sosfiltfilt(sos, u, padtype="odd", padlen=3 * (9 - 1))[begin - 1 :: factor], factor, u)
+    close(
+        decimated(u, factor, MATLAB),
+        scipy.signal.sosfiltfilt(sos, u, padtype="odd", padlen=3 * (9 - 1))[begin - 1 :: factor],
+        factor,
+        u,
+    )
 
 
 @settings(max_examples=60)
 @given(
-    kind=kinds, N=st.integers(28, 20000), factor=factors, how=st.sampled_from([SCIPY, MATLAB]), seed=st.integers(0, 10**6), data=st.data()
+    kind=kinds,
+    N=st.integers(28, 20000),
+    factor=factors,
+    how=st.sampled_from([SCIPY, MATLAB]),
+    seed=st.integers(0, 10**6),
+    data=st.data(),
 )
-def test_any_pieces(kind, N, factor, how, seed, data):
-    """What the truncated backward recursion leaves out is far below rounding: the tolerance does not grow with the factor."""
+def test_any_parts(kind, N, factor, how, seed, data):
+    """What samples out of reach would change is far below rounding: the tolerance does not grow
+    with the factor.
+    """
     u = signal(kind, N, seed)[None]
-    stage = StreamedDecimation(decimation_plan(N, factor, how))
-    cuts = sorted(data.draw(st.lists(st.integers(0, N), max_size=8)))
-    found = np.concatenate([*(stage.push(part) for part in np.split(u, cuts, axis=1)), stage.finish()], axis=1)
-    np.testing.assert_allclose(found, decimated(u, factor, how), rtol=0, atol=5e-14 * np.abs(u).max())
+    whole = decimated(u, factor, how)
+    K, first = whole.shape[1], int(kept_samples(N, factor, how.phase)[0])
+    far = decimation_reach(factor)
+    at = Instants(0, N, factor, first, K, (0, K))
+    a = data.draw(st.integers(0, K - 1))
+    b = data.draw(st.integers(a + 1, K))
+    part = at.part(at.sample(a) - far, at.sample(b - 1) + far + 1, (a, b))
+    plan = decimation_plan(part.stop - part.start, factor, how, part.first)
+    assert part.sample(a) == first + a * factor and plan is not None
+    found = decimate(u[:, part.start : part.stop], plan)
+    np.testing.assert_allclose(
+        found[:, a - part.number : b - part.number],
+        whole[:, a:b],
+        rtol=0,
+        atol=5e-14 * np.abs(u).max(),
+    )
 
 
 @pytest.mark.parametrize(("N", "how", "pad"), [(27, SCIPY, 27), (24, MATLAB, 24), (1, SCIPY, 27)])
 def test_too_short(N, how, pad):
-    with pytest.raises(InputError, match=f"{N} samples; this zero-phase filter needs more than {pad}, use a longer record or window"):
+    with pytest.raises(
+        InputError,
+        match=(
+            f"{N} samples; this zero-phase filter needs more than {pad}, use a longer record or "
+            "window"
+        ),
+    ):
         decimated(np.ones(N), 3, how)
     assert decimated(np.ones(pad + 1), 3, how).shape == (ceil((pad + 1) / 3),)
 
 
 def test_a_batch_of_rows_is_row_by_row():
-    u = np.stack([signal(kind, 1003, 5) for kind in ("noise", "walk", "step", "ramp")]).reshape(2, 2, 1003)
+    u = np.stack([signal(kind, 1003, 5) for kind in ("noise", "walk", "step", "ramp")]).reshape(
+        2, 2, 1003
+    )
     found = decimated(u, 13, SCIPY)
     for i in np.ndindex(2, 2):
-        np.testing.assert_allclose(found[i], decimated(u[i], 13, SCIPY), rtol=0, atol=1e-13 * np.abs(u[i]).max())
+        np.testing.assert_allclose(
+            found[i], decimated(u[i], 13, SCIPY), rtol=0, atol=1e-13 * np.abs(u[i]).max()
+        )

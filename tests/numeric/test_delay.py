@@ -1,4 +1,6 @@
-"""The delay between torques and positions, against delays put into simulated records, and its deviation against the scatter."""
+"""The delay between torques and positions, against delays put into simulated records, and its
+deviation against the scatter.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,16 @@ from runtime.settings.study import study_from_mapping
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 30}}})
 
 
-def shifted_record(model, chi, seed: int, delay: float, *, rate: float = 1000.0, T: float = 8.0, noise: float = 0.02) -> runtime.Record:
+def shifted_record(
+    model,
+    chi,
+    seed: int,
+    delay: float,
+    *,
+    rate: float = 1000.0,
+    T: float = 8.0,
+    noise: float = 0.02,
+) -> runtime.Record:
     """Sums of sinusoids, torques of the instants t - delay, noise on both."""
     rng = np.random.default_rng([31, seed])
     n, t = len(model.JOINTS), np.arange(int(rate * T)) / rate
@@ -25,7 +36,11 @@ def shifted_record(model, chi, seed: int, delay: float, *, rate: float = 1000.0,
     def states(t):
         w = 2 * np.pi * k / T
         angle = w * t[:, None, None] + phase
-        return (a * np.sin(angle)).sum(-1), (a * w * np.cos(angle)).sum(-1), (-a * w**2 * np.sin(angle)).sum(-1)
+        return (
+            (a * np.sin(angle)).sum(-1),
+            (a * w * np.cos(angle)).sum(-1),
+            (-a * w**2 * np.sin(angle)).sum(-1),
+        )
 
     tau = model.inverse_dynamics(*states(t - delay), model.base_parameters(chi))
     tau = tau + noise * tau.std(axis=0) * rng.standard_normal(tau.shape)
@@ -57,14 +72,20 @@ def test_the_delay_put_in_is_found(planar, ms: float) -> None:
 @pytest.mark.parametrize("robot", ["planar_2r", "tx40"])
 @pytest.mark.parametrize("ms", [0.0, 1.0, 5.0, 20.0])
 def test_two_deviations_hold_95_percent(planar, robot: str, ms: float) -> None:
-    """Over 50 records under SYMGEN_FULL, else 8: each joint's delay and the common one; binomial bounds at one in a thousand.
+    """Over 50 records under SYMGEN_FULL, else 8: each joint's delay and the common one; binomial
+    bounds at one in a thousand.
 
-    The deviation of a light wrist is above 0.3 ms, since its torque is mostly friction, which tells instants by its jumps alone: there it is the
-    deviation of the common delay, and of the three joints of the arm in the median, that is below."""
+    The deviation of a light wrist is above 0.3 ms, since its torque is mostly friction, which tells
+    instants by its jumps alone: there it is the
+    deviation of the common delay, and of the three joints of the arm in the median, that is
+    below."""
     model, chi = planar if robot == "planar_2r" else (symgen.model(robot), None)
     chi = values_of(model) if chi is None else chi
     runs = 50 if FULL else 8
-    found = [runtime.delay(model, shifted_record(model, chi, seed, ms / 1e3), STUDY) for seed in range(runs)]
+    found = [
+        runtime.delay(model, shifted_record(model, chi, seed, ms / 1e3), STUDY)
+        for seed in range(runs)
+    ]
     inside = np.array([np.abs(f.shift - ms / 1e3) < 2 * f.sigma for f in found])
     common = np.array([abs(f.common - ms / 1e3) < 2 * f.sigma_common for f in found])
     for hits in (inside, common):

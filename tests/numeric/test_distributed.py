@@ -1,4 +1,6 @@
-"""A Dask cluster of two worker processes: the bits of one process, workers that die, schedulers that do not answer."""
+"""A Dask cluster of two worker processes: the bits of one process, workers that die, schedulers
+that do not answer.
+"""
 
 import os
 import signal
@@ -20,12 +22,17 @@ from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 from symgen.cli.fleet import fleet
 
 RECORD = record(N=3000)
-STUDY = Study(signals=Signals(median=1, lowpass=Lowpass(cutoff=20)), cestac=CestacSettings(delta=(1e-3, 2e-3), runs=12, columns="all"))
+STUDY = Study(
+    signals=Signals(median=1, lowpass=Lowpass(cutoff=20)),
+    cestac=CestacSettings(delta=(1e-3, 2e-3), runs=12, columns="all"),
+)
 
 
 @pytest.fixture
 def cluster(processes):
-    """The cluster with both of its processes: what the test before has killed takes its time to come back on a busy machine."""
+    """The cluster with both of its processes: what the test before has killed takes its time to
+    come back on a busy machine.
+    """
     with dask.Client(processes) as client:
         client.wait_for_workers(2, timeout=300)
     return processes
@@ -34,7 +41,13 @@ def cluster(processes):
 @pytest.fixture(scope="module")
 def processes():
     """Two processes on this machine, nothing on the network."""
-    with dask.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as local:
+    with dask.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address="127.0.0.1:0",
+        host="127.0.0.1",
+    ) as local:
         with dask.Client(local) as client:
             client.register_plugin(SearchPath(str(Path(__file__).parent)))
         yield local
@@ -70,7 +83,13 @@ def failing(context, key):
 def test_same_bits_as_one_process(cluster):
     here = cestac(planar, RECORD, STUDY)
     calls = []
-    there = cestac(planar, RECORD, STUDY, scheduler=cluster.scheduler_address, progress=lambda done, total: calls.append((done, total)))
+    there = cestac(
+        planar,
+        RECORD,
+        STUDY,
+        scheduler=cluster.scheduler_address,
+        progress=lambda done, total: calls.append((done, total)),
+    )
     assert there.to_json() == here.to_json()
     assert calls[-1] == (24, 24) and len(calls) == 8
 
@@ -103,7 +122,9 @@ def test_a_failing_task_is_the_callers_error(cluster):
 
 @pytest.mark.campaign
 def test_fleet(cluster, emps_data, tmp_path):
-    (tmp_path / "fleet.yaml").write_text("jobs: [{robot: emps, record: emps}, {robot: emps, record: missing.csv}]")
+    (tmp_path / "fleet.yaml").write_text(
+        "jobs: [{robot: emps, record: emps}, {robot: emps, record: missing.csv}]"
+    )
     app = typer.Typer()
     app.command()(fleet)
     here, there = (
@@ -119,7 +140,9 @@ def test_no_scheduler():
         listening.bind(("127.0.0.1", 0))
         listening.listen()
         port = listening.getsockname()[1]
-        with pytest.raises(InputError, match=f"no answer from the scheduler tcp://127.0.0.1:{port}"):
+        with pytest.raises(
+            InputError, match=f"no answer from the scheduler tcp://127.0.0.1:{port}"
+        ):
             list(results(failing, None, range(2), scheduler=f"tcp://127.0.0.1:{port}", timeout=0.5))
     for address in (f"tcp://127.0.0.1:{port}", "127.0.0.1", "nonsense://1", " "):
         with pytest.raises(InputError, match=f"no answer from the scheduler {address}"):
@@ -128,7 +151,9 @@ def test_no_scheduler():
 
 def test_no_workers():
     with (
-        dask.LocalCluster(n_workers=0, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1") as empty,
+        dask.LocalCluster(
+            n_workers=0, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
+        ) as empty,
         pytest.raises(InputError, match=r"no answer from the scheduler .* or its workers"),
     ):
         list(results(failing, None, range(2), scheduler=empty.scheduler_address, timeout=0.5))

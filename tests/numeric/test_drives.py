@@ -27,8 +27,12 @@ def test_there_and_back(drives, q):
 
 
 def test_equations_written_out(drives, q):
-    np.testing.assert_allclose(drives.motor_position(q)[:, 2], 32 * (q[:, 1] + np.pi / 2) + 45 * (q[:, 2] - 0.3))
-    np.testing.assert_allclose(drives.joint_torque(q)[:, 1], -48 * 0.2 * q[:, 1] + 32 * 0.05 * q[:, 2])
+    np.testing.assert_allclose(
+        drives.motor_position(q)[:, 2], 32 * (q[:, 1] + np.pi / 2) + 45 * (q[:, 2] - 0.3)
+    )
+    np.testing.assert_allclose(
+        drives.joint_torque(q)[:, 1], -48 * 0.2 * q[:, 1] + 32 * 0.05 * q[:, 2]
+    )
 
 
 def test_power_is_that_of_the_motors(drives):
@@ -37,15 +41,25 @@ def test_power_is_that_of_the_motors(drives):
     u, qd = rng.normal(size=(2, 20, 3))
     at_rest = drives.motor_position(np.zeros((20, 3)))
     qdm = drives.motor_position(qd) - at_rest
-    np.testing.assert_allclose((u * drives.torque_constant * qdm).sum(axis=1), (drives.joint_torque(u) * qd).sum(axis=1))
+    np.testing.assert_allclose(
+        (u * drives.torque_constant * qdm).sum(axis=1), (drives.joint_torque(u) * qd).sum(axis=1)
+    )
 
 
 @pytest.mark.parametrize(
-    ("coupling", "position", "torque"), [("both", True, True), ("position", True, False), ("torque", False, True), ("none", False, False)]
+    ("coupling", "position", "torque"),
+    [
+        ("both", True, True),
+        ("position", True, False),
+        ("torque", False, True),
+        ("none", False, False),
+    ],
 )
 def test_coupling_left_out(drives, q, coupling, position, torque):
     some, alone = drives.decoupled(coupling), Drives(np.diag(np.diag(RATIO)), OFFSET, CONSTANT)
-    np.testing.assert_allclose(some.joint_position(q), (drives if position else alone).joint_position(q))
+    np.testing.assert_allclose(
+        some.joint_position(q), (drives if position else alone).joint_position(q)
+    )
     np.testing.assert_allclose(some.joint_torque(q), (drives if torque else alone).joint_torque(q))
 
 

@@ -1,4 +1,6 @@
-"""EMPS, every published digit: A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, 2019, EMPS_Description.pdf section 3.4."""
+"""EMPS, every published digit: A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of
+EMPS, 2019, EMPS_Description.pdf section 3.4.
+"""
 
 from pathlib import Path
 
@@ -58,7 +60,9 @@ def test_validation_record_with_the_published_parameters(records, study):
     o = observe(emps_model, records[1], study)
     rho = o.Y - o.W @ PUBLISHED
     assert round(np.linalg.cond(o.W), 4) == 26.0217
-    assert round(np.linalg.norm(rho), 4) == 169.4869  # the published 169.4876 comes from unrounded parameters, next test
+    assert (
+        round(np.linalg.norm(rho), 4) == 169.4869
+    )  # the published 169.4876 comes from unrounded parameters, next test
     assert round(100 * np.linalg.norm(rho) / np.linalg.norm(o.Y), 4) == 5.9824
     assert round(rho.std(ddof=1), 4) == 3.4039
 
@@ -86,11 +90,15 @@ def test_scipy_padding_misses_the_digits(records, study):
     mapping["signals"]["lowpass"]["padding"] = mapping["signals"]["decimate"]["padding"] = "scipy"
     X, _, _ = solve(observe(emps_model, records[0], study_from_mapping(mapping)))
     assert X.round(4).tolist() != PUBLISHED
-    np.testing.assert_allclose(X, PUBLISHED, rtol=1e-2)  # the ends of the record carry 0.5 % of the offset
+    np.testing.assert_allclose(
+        X, PUBLISHED, rtol=1e-2
+    )  # the ends of the record carry 0.5 % of the offset
 
 
 def test_record_says_what_was_read(records):
     estimation, validation = records
     assert (estimation.name, validation.name) == ("emps", "emps_pulses")
     assert estimation.q.shape == (24841, 1) and estimation.rate == 1000
-    assert estimation.files == {"DATA_EMPS.mat": "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e"}
+    assert estimation.files == {
+        "DATA_EMPS.mat": "6cf6814ae14618795da0101aae2bb97ff0c6351b0501b5492751b02b07facf7e"
+    }

@@ -9,7 +9,7 @@ from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
-from runtime.estimators.methods import estimate_of
+from runtime.loop.methods import estimate_of
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
@@ -41,7 +41,9 @@ def test_trail_equals_refitting(threshold):
     names, trail = eliminated(seen, threshold)
     assert list(found.names) == names
     assert [step.name for step in found.trail] == [name for name, _, _ in trail]
-    assert np.allclose([(s.relative_sigma, s.ratio) for s in found.trail], [(r, q) for _, r, q in trail], rtol=1e-9)
+    assert np.allclose(
+        [(s.relative_sigma, s.ratio) for s in found.trail], [(r, q) for _, r, q in trail], rtol=1e-9
+    )
     assert [step.removed for step in found.trail] == [True] * (len(trail) - 1) + [False]
     assert found.counts[threshold] == len(names)
     again = estimate_of(seen, EstimateSettings(columns=found.names))
@@ -55,7 +57,9 @@ def test_counts_fall_with_the_threshold():
     assert (min(found.counts), max(found.counts)) == (1.02, 1.10)
     assert counts == sorted(counts, reverse=True)
     for threshold in (1.02, 1.06, 1.10):
-        assert found.counts[threshold] == len(essential_of(observation(noise=(1.5, 1.5), seed=2), EssentialSettings(threshold)).names)
+        assert found.counts[threshold] == len(
+            essential_of(observation(noise=(1.5, 1.5), seed=2), EssentialSettings(threshold)).names
+        )
     assert found.estimate.units["FV1"] == "N*m*s/rad"
 
 

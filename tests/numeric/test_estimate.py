@@ -8,13 +8,15 @@ import pytest
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.methods import estimate_of
 from runtime.json_documents import json_text
+from runtime.loop.methods import estimate_of
 
 
 @pytest.fixture(scope="module")
 def found():
-    return estimate_of(observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1})
+    return estimate_of(
+        observation(noise=(0.3, 0.05), seed=1), OLS, model=planar, provenance={"seed": 1}
+    )
 
 
 def no_constant(name):
@@ -69,9 +71,25 @@ def test_json_holds_what_the_design_promises(found):
 
 def test_json_text_leaves_brackets_in_texts_alone():
     text = json_text(
-        {"a": "[ 1 ] {", "b": [1, 2.5, float("inf")], "c": [{"x": [1]}], "d": [], "e": {}, "f": np.float64(2), "g": [[1], [2]]}
+        {
+            "a": "[ 1 ] {",
+            "b": [1, 2.5, float("inf")],
+            "c": [{"x": [1]}],
+            "d": [],
+            "e": {},
+            "f": np.float64(2),
+            "g": [[1], [2]],
+        }
     )
-    assert json.loads(text) == {"a": "[ 1 ] {", "b": [1, 2.5, None], "c": [{"x": [1]}], "d": [], "e": {}, "f": 2.0, "g": [[1], [2]]}
+    assert json.loads(text) == {
+        "a": "[ 1 ] {",
+        "b": [1, 2.5, None],
+        "c": [{"x": [1]}],
+        "d": [],
+        "e": {},
+        "f": 2.0,
+        "g": [[1], [2]],
+    }
     assert '"b": [1, 2.5, null]' in text
 
 

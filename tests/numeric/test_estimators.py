@@ -12,14 +12,20 @@ from scipy.signal import lfilter
 
 from runtime.errors import SettingsError
 from runtime.estimators.block_covariance import block_covariance
-from runtime.estimators.methods import LINEAR, METHODS, estimate_of, linear_system
+from runtime.estimators.method import LINEAR, linear_system
 from runtime.estimators.solution import null_groups, solve
-from runtime.observation.qr_factor import Factor, factor
-from runtime.observation.segments import merged
-from runtime.observation.system import split_rows
+from runtime.loop.methods import METHODS, estimate_of
+from runtime.rows.factor import Factor, factor
+from runtime.rows.observation import split_rows
+from runtime.rows.segments import merged
 from runtime.settings.study import EstimateSettings
 
-EVERY = [OLS, WLS, EstimateSettings(method="wls", weights="iterated"), EstimateSettings(method="wls", weights="covariance")]
+EVERY = [
+    OLS,
+    WLS,
+    EstimateSettings(method="wls", weights="iterated"),
+    EstimateSettings(method="wls", weights="covariance"),
+]
 KINDS = ["ols", "wls", "wls iterated", "wls covariance"]
 
 
@@ -48,18 +54,26 @@ def test_ordinary_equals_lstsq_and_its_formulas():
     X, *_ = np.linalg.lstsq(W, Y, rcond=None)
     found = estimate_of(seen, OLS)
     variance = np.sum((Y - W @ X) ** 2) / (len(Y) - 10)  # eq. (9)
-    covariance = variance * np.linalg.inv(W.T @ W)  # eq. (10), the textbook form: an oracle, not the method
+    covariance = variance * np.linalg.inv(
+        W.T @ W
+    )  # eq. (10), the textbook form: an oracle, not the method
     assert np.allclose(found.X, X, rtol=1e-11)
     assert np.isclose(found.sigma_rho, np.sqrt(variance), rtol=1e-11)
     assert np.allclose(found.covariance, covariance, rtol=1e-9)
-    assert np.allclose(found.relative_sigma, 100 * np.sqrt(np.diag(covariance)) / np.abs(X), rtol=1e-9)
+    assert np.allclose(
+        found.relative_sigma, 100 * np.sqrt(np.diag(covariance)) / np.abs(X), rtol=1e-9
+    )
     assert np.isclose(found.cond, np.linalg.cond(W), rtol=1e-9)
     assert np.isclose(found.cond_unit, np.linalg.cond(W / np.linalg.norm(W, axis=0)), rtol=1e-9)
-    assert np.isclose(found.relative_error, 100 * np.linalg.norm(Y - W @ X) / np.linalg.norm(Y), rtol=1e-11)
+    assert np.isclose(
+        found.relative_error, 100 * np.linalg.norm(Y - W @ X) / np.linalg.norm(Y), rtol=1e-11
+    )
     for j, fit in enumerate(found.per_joint):
         rows = seen.joint(j)
         assert np.isclose(fit.residual_norm, np.linalg.norm(Y[rows] - W[rows] @ X), rtol=1e-10)
-    assert np.isclose(np.sqrt(sum(fit.residual_norm**2 for fit in found.per_joint)), found.residual_norm)
+    assert np.isclose(
+        np.sqrt(sum(fit.residual_norm**2 for fit in found.per_joint)), found.residual_norm
+    )
 
 
 def test_weighted_equals_lstsq_of_divided_rows():
@@ -67,14 +81,18 @@ def test_weighted_equals_lstsq_of_divided_rows():
     scale = []
     for j in range(2):
         own = seen.W[seen.joint(j)]
-        _, square, rank, _ = np.linalg.lstsq(own[:, own.any(axis=0)], seen.Y[seen.joint(j)], rcond=None)
+        _, square, rank, _ = np.linalg.lstsq(
+            own[:, own.any(axis=0)], seen.Y[seen.joint(j)], rcond=None
+        )
         scale.append(np.sqrt(square[0] / (300 - rank)))
     s = np.repeat(scale, 300)
     X, *_ = np.linalg.lstsq(seen.W / s[:, None], seen.Y / s, rcond=None)
     found = estimate_of(seen, WLS)
     assert np.allclose([fit.scale for fit in found.per_joint], scale, rtol=1e-10)
     assert np.allclose(found.X, X, rtol=1e-10)
-    assert np.allclose(found.covariance, np.linalg.inv((seen.W / s[:, None] ** 2).T @ seen.W), rtol=1e-8)
+    assert np.allclose(
+        found.covariance, np.linalg.inv((seen.W / s[:, None] ** 2).T @ seen.W), rtol=1e-8
+    )
     assert 0.8 < found.sigma_rho < 1.2  # residuals of a weighted system have unit variance
 
 
@@ -91,13 +109,16 @@ def test_covariance_weights_equal_generalised_least_squares():
 
 
 def test_stated_sigma_matches_the_scatter_of_200_runs():
-    # per parameter sum z^2 is chi2(200); 1e-4 and 1 - 1e-4 quantiles over 10 parameters: 1 in 500 that a correct code fails, the seed is fixed
+    # per parameter sum z^2 is chi2(200); 1e-4 and 1 - 1e-4 quantiles over 10 parameters: 1 in 500
+    # that a correct code fails, the seed is fixed
     low, high = 131.4, 287.4  # scipy.stats.chi2.ppf([5e-5, 1 - 5e-5], 200)
     for settings, stated in ((OLS, "sigma"), (WLS, "sigma"), (OLS, "sigma_corrected")):
         noise = (0.2, 0.2) if settings is OLS else (0.4, 0.03)
         fits = [estimate_of(observation(N=150, noise=noise, seed=s), settings) for s in range(200)]
         z2 = np.array([((fit.X - TRUE) / getattr(fit, stated)) ** 2 for fit in fits]).sum(axis=0)
-        slack = 1.15 if stated == "sigma_corrected" else 1.02  # sigma itself is estimated, from 30 blocks: t instead of normal
+        slack = (
+            1.15 if stated == "sigma_corrected" else 1.02
+        )  # sigma itself is estimated, from 30 blocks: t instead of normal
         assert np.all(z2 > low / slack) and np.all(z2 < high * slack), (stated, z2)
 
 
@@ -108,7 +129,10 @@ def test_corrected_sigma_follows_correlated_residuals():
     def colour(white):
         return np.sqrt(1 - a**2) * lfilter([1], [1, -a], white, axis=1)
 
-    fits = [estimate_of(observation(N=600, rate=30, noise=(0.3, 0.3), seed=s, colour=colour), OLS) for s in range(200)]
+    fits = [
+        estimate_of(observation(N=600, rate=30, noise=(0.3, 0.3), seed=s, colour=colour), OLS)
+        for s in range(200)
+    ]
     scatter = np.std([fit.X for fit in fits], axis=0, ddof=1)
     stated = np.mean([fit.sigma for fit in fits], axis=0)
     corrected = np.mean([fit.sigma_corrected for fit in fits], axis=0)
@@ -117,18 +141,37 @@ def test_corrected_sigma_follows_correlated_residuals():
 
 
 def test_corrected_sigma_with_as_many_parameters_as_blocks():
-    """60 parameters, 50 blocks, residuals correlated by 0.8 from row to row: the jackknife states the scatter, blocks as they are 0.8 of it."""
+    """60 parameters, 50 blocks, residuals correlated by 0.8 from row to row: the jackknife states
+    the scatter, blocks as they are 0.8 of it.
+    """
     rng = np.random.default_rng(11)
     N, b, K, runs = 1000, 60, 50, 80
-    r, W = 2 * N, np.vstack([lfilter([1], [1, -0.9], rng.standard_normal((N, b)), axis=0) for _ in range(2)])
-    blocks, T = np.tile(np.repeat(np.arange(K), N // K), 2), np.linalg.inv(np.linalg.qr(W, mode="r"))
+    r, W = (
+        2 * N,
+        np.vstack([lfilter([1], [1, -0.9], rng.standard_normal((N, b)), axis=0) for _ in range(2)]),
+    )
+    blocks, T = (
+        np.tile(np.repeat(np.arange(K), N // K), 2),
+        np.linalg.inv(np.linalg.qr(W, mode="r")),
+    )
     found, jackknife, plain = [], [], []
     for _ in range(runs):
         Y = lfilter([0.6], [1, -0.8], rng.standard_normal((2, N + 100)))[:, 100:].ravel()
         X = T @ T.T @ (W.T @ Y)
         found.append(X)
-        jackknife.append(np.diag(block_covariance(split_rows(np.column_stack([W, Y]), blocks), X, T)))
-        g = np.array([rows[:, :-1].T @ (rows[:, -1] - rows[:, :-1] @ X) for rows in split_rows(np.column_stack([W, Y]), blocks)]) @ T @ T.T
+        jackknife.append(
+            np.diag(block_covariance(split_rows(np.column_stack([W, Y]), blocks), X, T))
+        )
+        g = (
+            np.array(
+                [
+                    rows[:, :-1].T @ (rows[:, -1] - rows[:, :-1] @ X)
+                    for rows in split_rows(np.column_stack([W, Y]), blocks)
+                ]
+            )
+            @ T
+            @ T.T
+        )
         plain.append((g**2).sum(axis=0) * K / (K - 1) * (r - 1) / (r - b))
     real = np.var(found, axis=0, ddof=1)
     assert np.median(np.sqrt(np.mean(jackknife, axis=0) / real)) == pytest.approx(1.0, abs=0.1)
@@ -136,19 +179,27 @@ def test_corrected_sigma_with_as_many_parameters_as_blocks():
 
 
 def test_corrected_sigma_is_that_of_estimates_without_one_block():
-    """The jackknife from its definition, with the weights of the joints; nothing where one block alone determines a parameter."""
+    """The jackknife from its definition, with the weights of the joints; nothing where one block
+    alone determines a parameter.
+    """
     seen = observation(N=120, noise=(0.4, 0.03), seed=8)
     settings = EstimateSettings("wls", options={"block": 0.5})
     fit = estimate_of(seen, settings)
     s, blocks = np.repeat([joint.scale for joint in fit.per_joint], 120), seen.blocks(0.5)
     K = blocks.max() + 1
     W, Y = seen.W / s[:, None], seen.Y / s
-    without = np.array([np.linalg.lstsq(W[blocks != k], Y[blocks != k], rcond=None)[0] for k in range(K)])
-    assert np.allclose(fit.sigma_corrected, np.sqrt((K - 1) / K * ((without - fit.X) ** 2).sum(axis=0)), rtol=1e-8)
+    without = np.array(
+        [np.linalg.lstsq(W[blocks != k], Y[blocks != k], rcond=None)[0] for k in range(K)]
+    )
+    assert np.allclose(
+        fit.sigma_corrected, np.sqrt((K - 1) / K * ((without - fit.X) ** 2).sum(axis=0)), rtol=1e-8
+    )
     W = seen.W.copy()
     W[:, seen.names.index("FS2")] = np.where(blocks == 2, W[:, seen.names.index("FS2")], 0.0)
     alone = estimate_of(replace(seen, W=W), settings)
-    assert np.isnan(alone.sigma_corrected).sum() == 1 and np.isnan(alone.sigma_corrected[alone.names.index("FS2")])
+    assert np.isnan(alone.sigma_corrected).sum() == 1 and np.isnan(
+        alone.sigma_corrected[alone.names.index("FS2")]
+    )
 
 
 def test_blocks_gather_all_joints_of_an_interval():
@@ -173,8 +224,14 @@ def test_weighted_estimate_ignores_the_scale_of_a_joint(c1, c2, seed):
 def test_iterated_weights_reach_a_fixed_point():
     found = estimate_of(observation(noise=(0.4, 0.03), seed=5), EVERY[2])
     assert found.status == "ok" and 1 <= found.iterations < 10
-    assert np.allclose([fit.scale for fit in found.per_joint], [fit.sigma_rho for fit in found.per_joint], rtol=2e-3)
-    stopped = estimate_of(observation(noise=(0.4, 0.03), seed=5), replace(EVERY[2], options={"passes": 1}))
+    assert np.allclose(
+        [fit.scale for fit in found.per_joint],
+        [fit.sigma_rho for fit in found.per_joint],
+        rtol=2e-3,
+    )
+    stopped = estimate_of(
+        observation(noise=(0.4, 0.03), seed=5), replace(EVERY[2], options={"passes": 1})
+    )
     assert stopped.status in ("ok", "not-converged")
 
 
@@ -198,16 +255,25 @@ def test_parts_combine_to_the_whole():
     seen = observation(N=200, noise=(0.3, 0.05), seed=7)
     half = [np.r_[0:90, 200:290], np.r_[90:200, 290:400]]
     parts = [factor(seen.W[rows], seen.Y[rows], (len(rows) // 2,) * 2, seen.names) for rows in half]
-    both, whole = Factor.of(seen.names, merged(part.joints for part in parts)), factor(seen.W, seen.Y, seen.rows, seen.names)
+    both, whole = (
+        Factor.of(seen.names, merged(part.joints for part in parts)),
+        factor(seen.W, seen.Y, seen.rows, seen.names),
+    )
     X = solve(whole).X
     assert both.rows == whole.rows
     assert np.allclose(solve(both).X, X, rtol=1e-10)
-    assert np.allclose([j.residual_norm(X) for j in both.joints], [j.residual_norm(X) for j in whole.joints], rtol=1e-10)
+    assert np.allclose(
+        [j.residual_norm(X) for j in both.joints],
+        [j.residual_norm(X) for j in whole.joints],
+        rtol=1e-10,
+    )
 
 
 @pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
 def test_rank_loss_names_the_parameters(settings):
-    """Joint 2 at rest at q2 = 0: no friction of joint 2; inertias and first moments of the two links merge."""
+    """Joint 2 at rest at q2 = 0: no friction of joint 2; inertias and first moments of the two
+    links merge.
+    """
     found = estimate_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), settings)
     assert found.status == "rank-deficient"
     assert found.rank < 10
@@ -217,7 +283,9 @@ def test_rank_loss_names_the_parameters(settings):
     determined = [name for name in found.names if not any(name in group for group in found.groups)]
     assert {"FV1", "FS1"} <= set(determined)
     assert np.all(np.isfinite([found.sigma[found.names.index(name)] for name in determined]))
-    assert all(np.isnan(found.sigma[found.names.index(name)]) for group in found.groups for name in group)
+    assert all(
+        np.isnan(found.sigma[found.names.index(name)]) for group in found.groups for name in group
+    )
     for fit, residual in zip(found.per_joint, (0.1, 0.1), strict=True):
         assert np.isclose(fit.sigma_rho, residual, rtol=0.2)
 
@@ -251,7 +319,9 @@ def test_few_rows_are_a_status():
 
 @pytest.mark.parametrize("settings", EVERY[:3], ids=KINDS[:3])
 def test_a_joint_without_rows_is_left_out(settings):
-    """All rows of joint 1 dropped (low speed): friction of joint 1 has no effect, the rest is estimated from joint 2."""
+    """All rows of joint 1 dropped (low speed): friction of joint 1 has no effect, the rest is
+    estimated from joint 2.
+    """
     seen = observation(noise=(0.1, 0.1)).where(np.repeat([False, True], 300))
     found = estimate_of(seen, settings)
     assert [fit.rows for fit in found.per_joint] == [0, 300]
@@ -265,7 +335,9 @@ def test_columns_restrict_the_estimate():
     seen = observation(noise=(0.1, 0.1))
     kept = ("ZZ1R", "FV1", "FS1", "MX1R", "ZZ2", "MX2", "FV2", "FS2")
     found = estimate_of(seen, EstimateSettings(columns=kept))
-    fresh, *_ = np.linalg.lstsq(seen.W[:, [seen.names.index(name) for name in kept]], seen.Y, rcond=None)
+    fresh, *_ = np.linalg.lstsq(
+        seen.W[:, [seen.names.index(name) for name in kept]], seen.Y, rcond=None
+    )
     assert found.names == kept
     assert np.allclose(found.X, fresh, rtol=1e-10)
 
@@ -276,8 +348,8 @@ def test_columns_restrict_the_estimate():
         (EstimateSettings(method="cloe"), "section `controller`"),
         (EstimateSettings(weights="joint"), "belong to method wls"),
         (EstimateSettings(columns=("ZZ9",)), "no parameter ZZ9"),
-        (EstimateSettings(options={"colour": 1}), "unknown option 'colour'"),
-        (EstimateSettings(options={"block": -1}), "expected a positive number"),
+        (EstimateSettings(options={"colour": 1}), "unknown key colour"),
+        (EstimateSettings(options={"block": -1}), "expected more than 0"),
     ],
 )
 def test_wrong_settings_say_what_to_do(settings, text):
@@ -288,7 +360,14 @@ def test_wrong_settings_say_what_to_do(settings, text):
 def test_covariance_weights_need_every_joint_at_every_instant():
     seen = observation(N=50)
     keep = np.r_[0:50, 55:100]
-    short = replace(seen, W=seen.W[keep], Y=seen.Y[keep], rows=(50, 45), t=seen.t[keep], record=seen.record[keep])
+    short = replace(
+        seen,
+        W=seen.W[keep],
+        Y=seen.Y[keep],
+        rows=(50, 45),
+        t=seen.t[keep],
+        record=seen.record[keep],
+    )
     with pytest.raises(SettingsError, match="50, 45"):
         estimate_of(short, EVERY[3])
 
@@ -303,5 +382,7 @@ def test_wrong_shapes_name_both():
 
 def test_each_joint_is_factored_on_its_own_columns():
     system = linear_system(observation(), OLS)
-    assert [list(joint.columns) for joint in system.raw.joints] == [list(np.flatnonzero(planar.STRUCTURE[:, j])) for j in range(2)]
+    assert [list(joint.columns) for joint in system.raw.joints] == [
+        list(np.flatnonzero(planar.STRUCTURE[:, j])) for j in range(2)
+    ]
     assert set(LINEAR) == {"ols", "wls"} <= set(METHODS)

@@ -1,4 +1,6 @@
-"""Feasible least squares against point masses, pinocchio, a hand-written parametrisation of all physical robots, and the TX40 record."""
+"""Feasible least squares against point masses, pinocchio, a hand-written parametrisation of all
+physical robots, and the TX40 record.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +12,32 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import Ellipsoid, RobotLimits, feasibility, limit_rows, pulled, scales, standard_parameters
+from runtime.estimators.feasibility import (
+    Ellipsoid,
+    RobotLimits,
+    feasibility,
+    limit_rows,
+    pulled,
+    scales,
+    standard_parameters,
+)
 from runtime.estimators.feasible import FeasibleOptions, residual_norm, weighed
-from runtime.estimators.methods import estimate_of
-from runtime.estimators.physical import negative_elements
+from runtime.estimators.method import linear_companion, linear_system
+from runtime.estimators.physical import negative_elements, reach_of
 from runtime.estimators.semidefinite import closest, everything
-from runtime.estimators.wls import least_squares
 from runtime.identification.validation import split_validation
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
-from runtime.observation.observation import Observation
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.reporting.physical import standard_csv
+from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
@@ -52,7 +63,9 @@ def tx40():
 def ten_of(mass: np.ndarray, place: np.ndarray) -> np.ndarray:
     """The ten parameters of point masses (k,) at places (k, 3), by definition."""
     J = sum(m * (x @ x * np.eye(3) - np.outer(x, x)) for m, x in zip(mass, place, strict=True))
-    return np.array([J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2], *(mass @ place), mass.sum()])
+    return np.array(
+        [J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2], *(mass @ place), mass.sum()]
+    )
 
 
 def simulated(model, X: np.ndarray, noise: float, seed: int = 0, N: int = 300) -> Observation:
@@ -62,7 +75,15 @@ def simulated(model, X: np.ndarray, noise: float, seed: int = 0, N: int = 300) -
     q, qd, qdd = rng.uniform(-3, 3, (3, N, n))
     W = np.asfortranarray(model.observation_matrix(q, qd, qdd))
     Y = W @ X + noise * rng.standard_normal(n * N)
-    return Observation(W, Y, (N,) * n, model.BASE_PARAMETERS, np.tile(np.arange(N) / 100, n), np.zeros(n * N, dtype=int), 100.0)
+    return Observation(
+        W,
+        Y,
+        (N,) * n,
+        model.BASE_PARAMETERS,
+        np.tile(np.arange(N) / 100, n),
+        np.zeros(n * N, dtype=int),
+        100.0,
+    )
 
 
 def values(model) -> np.ndarray:
@@ -73,7 +94,9 @@ def test_pseudo_inertia_is_the_second_moment_of_point_masses() -> None:
     rng = np.random.default_rng(0)
     mass, place = rng.uniform(0.1, 2, 7), rng.standard_normal((7, 3))
     homogeneous = np.column_stack([place, np.ones(7)])
-    np.testing.assert_allclose(pseudo_inertia(ten_of(mass, place)), (homogeneous.T * mass) @ homogeneous, atol=1e-13)
+    np.testing.assert_allclose(
+        pseudo_inertia(ten_of(mass, place)), (homogeneous.T * mass) @ homogeneous, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("name", ["tx40", "puma560", "two_branch"])
@@ -85,23 +108,40 @@ def test_regrouping_matrix_gives_the_torques_of_pinocchio(name: str) -> None:
     for _ in range(5):
         q, qd, qdd = rng.uniform(-2, 2, (3, len(model.JOINTS)))
         torque = oracle.torque(q, qd, qdd, chi)
-        np.testing.assert_allclose(model.inverse_dynamics(q, qd, qdd, K @ chi), torque, atol=1e-10 * np.abs(torque).max())
+        np.testing.assert_allclose(
+            model.inverse_dynamics(q, qd, qdd, K @ chi), torque, atol=1e-10 * np.abs(torque).max()
+        )
 
 
 def test_conditions_of_a_coupled_wrist_and_of_one_sided_friction(tx40) -> None:
     wrist = next(c for c in physical_model(tx40).conditions if c.name == "inertia of joints 5, 6")
     chi = dict.fromkeys(tx40.STANDARD_PARAMETERS, 0.0) | {"Ia5": 5.0, "Ia6": 2.0}
-    np.testing.assert_array_equal(wrist.matrix(np.array(list(chi.values()))), [[5, 2], [2, 2]])  # robot file: q6**2 + 2*q5*q6 of Ia6
+    np.testing.assert_array_equal(
+        wrist.matrix(np.array(list(chi.values()))), [[5, 2], [2, 2]]
+    )  # robot file: q6**2 + 2*q5*q6 of Ia6
     named = [c.name for c in physical_model(emitted("emps_asymmetric")).conditions]
     assert named == ["link 1", "Ia1", "FVP1", "FVN1", "FSP1", "FSN1"]
 
 
 def test_signs_that_no_drive_has(arm, tx40) -> None:
-    """Friction below zero is named where it is so beyond its deviation; offsets, inertias of sums and forms have no sign of their own."""
-    X = arm.base_parameters(dict.fromkeys(arm.STANDARD_PARAMETERS, 1.0) | {"FS2": -1.0, "OFFSET1": -1.0})
+    """Friction below zero is named where it is so beyond its deviation; offsets, inertias of sums
+    and forms have no sign of their own.
+    """
+    X = arm.base_parameters(
+        dict.fromkeys(arm.STANDARD_PARAMETERS, 1.0) | {"FS2": -1.0, "OFFSET1": -1.0}
+    )
     for noise, named in ((0.1, ("FS2",)), (1000.0, ())):
-        assert negative_elements(arm, estimate_of(simulated(arm, X, noise), EstimateSettings(), model=arm)) == named
-    wrist = {*negative_elements(tx40, estimate_of(simulated(tx40, -np.ones(60), 0.1), EstimateSettings(), model=tx40))}
+        assert (
+            negative_elements(
+                arm, estimate_of(simulated(arm, X, noise), EstimateSettings(), model=arm)
+            )
+            == named
+        )
+    wrist = {
+        *negative_elements(
+            tx40, estimate_of(simulated(tx40, -np.ones(60), 0.1), EstimateSettings(), model=tx40)
+        )
+    }
     assert {"Ia3", "FV1", "FSM6"} <= wrist and not {"Ia6", "FVM6", "OFFSET1", "ZZ1R"} & wrist
 
 
@@ -115,7 +155,9 @@ def test_feasible_is_least_squares_where_that_is_feasible(name: str) -> None:
     assert found.details["least_squares"]["feasible"]
     np.testing.assert_array_equal(found.X, ols.X)
     physical, options = physical_model(model), FeasibleOptions(prior="none", margin=1e-9)
-    chi, weight = weighed(least_squares(seen, FEASIBLE, {}).weighted, physical, options)
+    chi, weight = weighed(
+        linear_system(seen, linear_companion(FEASIBLE)).weighted, physical, options
+    )
     assert weight == 0 and np.abs((physical.K @ chi - ols.X) / ols.sigma).max() < 1e-2
 
 
@@ -124,13 +166,19 @@ def test_noise_free_records_give_the_parameters_back(tx40) -> None:
     found = estimate_of(simulated(tx40, truth, 0.0), FEASIBLE, model=tx40)
     np.testing.assert_allclose(found.X, truth, atol=1e-9)
     standard = np.array(list(found.details["standard"].values()))
-    np.testing.assert_allclose(standard, values(tx40), atol=1e-6)  # nearest to the values, and these have the torques
+    np.testing.assert_allclose(
+        standard, values(tx40), atol=1e-6
+    )  # nearest to the values, and these have the torques
 
 
 def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
-    """P = L L', friction and actuator inertia squares: every physical arm and no other; 4 kg in all, so that the mass of the links is told."""
+    """P = L L', friction and actuator inertia squares: every physical arm and no other; 4 kg in
+    all, so that the mass of the links is told.
+    """
     X = arm.base_parameters(arm.VALUES)
-    X = X + np.array([0, 0, 0, 0, 0, 0, -0.1, 0, 0, -0.01, -0.35, 0, 0])  # ZZ2 too small for MX2, FV2 below zero
+    X = X + np.array(
+        [0, 0, 0, 0, 0, 0, -0.1, 0, 0, -0.01, -0.35, 0, 0]
+    )  # ZZ2 too small for MX2, FV2 below zero
     seen = simulated(arm, X, 0.5, N=60)
     settings = EstimateSettings("feasible", options={**PLAIN, "total_mass": 4.0, "margin": 1e-9})
     found = estimate_of(seen, settings, model=arm)
@@ -151,7 +199,11 @@ def test_optimum_is_that_of_a_parametrisation_of_all_physical_arms(arm) -> None:
         return np.array([value[name] for name in arm.STANDARD_PARAMETERS])
 
     start = np.concatenate([np.eye(4)[lower], np.eye(4)[lower], np.zeros(2), np.full(6, 0.5)])
-    best = minimize(lambda u: np.sum((seen.Y - seen.W @ arm.base_parameters(chi(u))) ** 2), start, options={"maxiter": 600})
+    best = minimize(
+        lambda u: np.sum((seen.Y - seen.W @ arm.base_parameters(chi(u))) ** 2),
+        start,
+        options={"maxiter": 600},
+    )
     assert 1 - 1e-6 < best.fun / found.residual_norm**2 < 1 + 1e-6
     np.testing.assert_allclose(arm.base_parameters(chi(best.x)), found.X, atol=2e-3)
     assert found.residual_norm > found.details["least_squares"]["residual_norm"]
@@ -161,10 +213,17 @@ def test_infeasible_parameters_are_blamed_on_what_contradicts(arm) -> None:
     physical = physical_model(arm)
     X = arm.base_parameters(arm.VALUES)
     good = feasibility(physical, physical.base, X)
-    assert good.feasible and good.margin > 0 and not good.blocking and "physically feasible" in good.text
+    assert (
+        good.feasible
+        and good.margin > 0
+        and not good.blocking
+        and "physically feasible" in good.text
+    )
     X = X.copy()
     X[arm.BASE_PARAMETERS.index("FV2")] = -0.2
-    X[arm.BASE_PARAMETERS.index("ZZ2")] = 0.05  # with MX2 = 0.5 kg m and at most 2 kg: ZZ2 >= MX2**2/M2 = 0.125
+    X[arm.BASE_PARAMETERS.index("ZZ2")] = (
+        0.05  # with MX2 = 0.5 kg m and at most 2 kg: ZZ2 >= MX2**2/M2 = 0.125
+    )
     judged = feasibility(physical, physical.base, X, RobotLimits(bounds={"M2": (None, 2.0)}))
     assert not judged.feasible and [name for name, _ in judged.blocking] == ["FV2", "link 2"]
     assert judged.margin == pytest.approx(-0.2, abs=1e-6)
@@ -175,7 +234,9 @@ def test_infeasible_parameters_are_blamed_on_what_contradicts(arm) -> None:
 def test_standard_parameters_have_the_same_torques(tx40) -> None:
     physical = physical_model(tx40)
     X = tx40.base_parameters(tx40.VALUES)
-    chi = standard_parameters(replace(physical, values={}), physical.base, X)  # nothing known of the robot
+    chi = standard_parameters(
+        replace(physical, values={}), physical.base, X
+    )  # nothing known of the robot
     assert np.abs(chi - values(tx40)).max() > 1e-2  # another robot
     assert min(physical.smallest(chi).values()) >= 0
     np.testing.assert_allclose(physical.K @ chi, X, atol=1e-12)
@@ -196,7 +257,10 @@ def test_limits_hold(arm) -> None:
     P = pseudo_inertia(chi[physical.link(2)])
     x, a = np.array([0.25, 0.0, 0.0]), np.array([0.5, 0.2, 0.2])
     inside = (
-        P[3, 3] - (np.diag(P)[:3] / a**2).sum() + 2 * (P[3, :3] * x / a**2).sum() - P[3, 3] * (x**2 / a**2).sum()
+        P[3, 3]
+        - (np.diag(P)[:3] / a**2).sum()
+        + 2 * (P[3, :3] * x / a**2).sum()
+        - P[3, 3] * (x**2 / a**2).sum()
     )  # integral of 1 - (x - c)'A^-1(x - c)
     assert inside >= -1e-8
     weights = limit_rows(physical, limits).A[-1]
@@ -209,7 +273,10 @@ def test_held_out_weight_is_that_of_the_best_prediction(arm) -> None:
     options = {"bootstrap": 0, "reach": None}
     right, wrong = replace_values(arm), replace_values(arm)
     wrong.VALUES = {name: 3 * x for name, x in right.VALUES.items()}
-    weights = [estimate_of(seen, EstimateSettings("feasible", options=options), model=m).details["weight"] for m in (right, wrong)]
+    weights = [
+        estimate_of(seen, EstimateSettings("feasible", options=options), model=m).details["weight"]
+        for m in (right, wrong)
+    ]
     assert weights[0] > 10 * weights[1]
 
 
@@ -218,19 +285,37 @@ def test_a_strong_pull_ends_at_the_values_and_auto_costs_one_per_cent(arm, prior
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5)
     solid = replace_values(arm)
     free = estimate_of(seen, FEASIBLE, model=solid)
-    strong = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": 1e4}), model=solid)
+    strong = estimate_of(
+        seen,
+        EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": 1e4}),
+        model=solid,
+    )
     inertial = [f"{family}{j}" for j in (1, 2) for family in INERTIAL]
-    assert max(abs(strong.details["standard"][name] - solid.VALUES[name]) for name in inertial) < 1e-3
-    auto = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": "auto"}), model=solid)
-    assert free.residual_norm <= auto.residual_norm <= 1.0101 * free.residual_norm and auto.details["weight"] > 0
+    assert (
+        max(abs(strong.details["standard"][name] - solid.VALUES[name]) for name in inertial) < 1e-3
+    )
+    auto = estimate_of(
+        seen,
+        EstimateSettings("feasible", options={**PLAIN, "prior": prior, "weight": "auto"}),
+        model=solid,
+    )
+    assert (
+        free.residual_norm <= auto.residual_norm <= 1.0101 * free.residual_norm
+        and auto.details["weight"] > 0
+    )
 
 
 def replace_values(arm):
-    """The arm with thick links: the packaged ones are rods, whose pseudo-inertia is singular to the printed digits."""
+    """The arm with thick links: the packaged ones are rods, whose pseudo-inertia is singular to the
+    printed digits.
+    """
     from types import SimpleNamespace
 
     thick = dict(arm.VALUES) | {"XX1": 0.01, "XX2": 0.01, "ZZ1": 0.172, "ZZ2": 0.172}
-    return SimpleNamespace(**{name: getattr(arm, name) for name in dir(arm) if not name.startswith("_")} | {"VALUES": thick})
+    return SimpleNamespace(
+        **{name: getattr(arm, name) for name in dir(arm) if not name.startswith("_")}
+        | {"VALUES": thick}
+    )
 
 
 def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
@@ -238,7 +323,9 @@ def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
     settings = EstimateSettings("feasible", options={**PLAIN, "bootstrap": 12, "seed": 3})
     first, again = (estimate_of(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
     np.testing.assert_array_equal(first.sigma_corrected, again.sigma_corrected)
-    runs = np.array([estimate_of(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)])
+    runs = np.array(
+        [estimate_of(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)]
+    )
     ratio = np.median(first.sigma_corrected / runs.std(axis=0))
     assert 0.5 < ratio < 2  # 12 resampled records and 20 new ones: 27 % at one deviation
 
@@ -254,7 +341,10 @@ def test_json_keeps_the_standard_parameters(arm) -> None:
     [
         ({"total_mass": -1.0}, "without total_mass: widen"),
         (
-            {"bounds": {"M1": [3, None], "MX1": [None, -9]}, "centre": {"1": [[0, 1], [0, 1], [0, 1]]}},
+            {
+                "bounds": {"M1": [3, None], "MX1": [None, -9]},
+                "centre": {"1": [[0, 1], [0, 1], [0, 1]]},
+            },
             "one without bounds of MX1 or without centre of link 1",
         ),
         (
@@ -298,20 +388,26 @@ def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
         return whole(*problem)
 
     monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", impatient)
-    with pytest.raises(InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"):
+    with pytest.raises(
+        InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"
+    ):
         estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
 
 
 @pytest.mark.parametrize("kind", ["euclidean", "entropic", "pullback"])
 def test_the_pull_is_at_its_minimum(arm, kind) -> None:
-    """Criterion written down from the definitions of the distances: no step towards another robot makes it smaller."""
+    """Criterion written down from the definitions of the distances: no step towards another robot
+    makes it smaller.
+    """
     physical = physical_model(arm)
     prior = pulled(physical, kind, 1e-2)
     rng = np.random.default_rng(3)
     p = len(physical.standard)
     R, z = rng.standard_normal((6, p)) / 3, rng.standard_normal(6) / 3
     rows = limit_rows(physical, None)
-    chi = closest(R, z, physical.conditions, rows, everything(scales(physical)), least=1e-4, pull=prior).chi
+    chi = closest(
+        R, z, physical.conditions, rows, everything(scales(physical)), least=1e-4, pull=prior
+    ).chi
     links = [c for c in physical.conditions if c.name.startswith("link ")]
 
     def criterion(x):
@@ -330,7 +426,9 @@ def test_the_pull_is_at_its_minimum(arm, kind) -> None:
     assert smallest > 1e-4 - 1e-9
     tried = 0
     for _ in range(2000):
-        inside = prior.chi0 * rng.uniform(0.5, 2) + scales(physical) * rng.normal(0, 10 ** rng.uniform(-4, -1), p)
+        inside = prior.chi0 * rng.uniform(0.5, 2) + scales(physical) * rng.normal(
+            0, 10 ** rng.uniform(-4, -1), p
+        )
         if min(physical.smallest(inside).values()) >= 1e-4:
             tried += 1
             assert criterion(chi + 10 ** rng.uniform(-4, 0) * (inside - chi)) > best - 1e-10
@@ -338,7 +436,9 @@ def test_the_pull_is_at_its_minimum(arm, kind) -> None:
 
 
 def test_essential_columns_alone_leave_the_others_free(arm) -> None:
-    """With five columns the arm of the estimate has those five parameters and whatever else makes it an arm."""
+    """With five columns the arm of the estimate has those five parameters and whatever else makes
+    it an arm.
+    """
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.1)
     names = ("ZZ1R", "MX1R", "FV1", "ZZ2", "MX2")
     found = estimate_of(seen, replace(FEASIBLE, columns=names), model=arm)
@@ -348,12 +448,18 @@ def test_essential_columns_alone_leave_the_others_free(arm) -> None:
 
 
 def test_tx40_record(tx40, tx40_data) -> None:
-    """Least squares of the public record is infeasible; the feasible estimate costs less than 5 % (measured 0.24 %), and a robot has its torques."""
+    """Least squares of the public record is infeasible; the feasible estimate costs less than 5 %
+    (measured 0.24 %), and a robot has its torques.
+    """
     study = study_from_mapping(dataset_study("tx40"))
     seen = observe(tx40, read_records(study.record, tx40)[0], study)
     ols, found = estimate_of(seen), estimate_of(seen, FEASIBLE, model=tx40)
     told = found.details["least_squares"]
-    assert not told["feasible"] and told["blocking"][0]["condition"] == "link 3" and "NOT physically feasible" in found.message
+    assert (
+        not told["feasible"]
+        and told["blocking"][0]["condition"] == "link 3"
+        and "NOT physically feasible" in found.message
+    )
     assert 1 < found.relative_error / ols.relative_error < 1.05
     chi = np.array([found.details["standard"][name] for name in tx40.STANDARD_PARAMETERS])
     for j in range(1, 7):
@@ -367,18 +473,26 @@ def test_tx40_record(tx40, tx40_data) -> None:
     for _ in range(5):
         q, qd, qdd = rng.uniform(-2, 2, (3, 6))
         torque = oracle.torque(q, qd, qdd, chi)
-        np.testing.assert_allclose(tx40.inverse_dynamics(q, qd, qdd, found.X), torque, atol=1e-9 * np.abs(torque).max())
-    for split in (study.validate.split, study.validate.split[::-1]):  # each half predicts the other better than by least squares
+        np.testing.assert_allclose(
+            tx40.inverse_dynamics(q, qd, qdd, found.X), torque, atol=1e-9 * np.abs(torque).max()
+        )
+    for split in (
+        study.validate.split,
+        study.validate.split[::-1],
+    ):  # each half predicts the other better than by least squares
         errors = [
-            split_validation(seen, split, {"all": how}, model=tx40).predictions[1].relative_error for how in (EstimateSettings(), FEASIBLE)
+            split_validation(seen, split, {"all": how}, model=tx40).predictions[1].relative_error
+            for how in (EstimateSettings(), FEASIBLE)
         ]
         assert errors[1] < 0.98 * errors[0]
-    system = least_squares(seen, FEASIBLE, {})
+    system = linear_system(seen, linear_companion(FEASIBLE))
     assert residual_norm(system.weighted, found.X) == pytest.approx(found.residual_norm, rel=1e-9)
 
 
 def test_standard_parameters_where_a_friction_is_zero(tx40) -> None:
-    """A condition on its limit, which X alone decides, leaves the others free: the set is the nearest to the robot file, not the one of the largest margin."""
+    """A condition on its limit, which X alone decides, leaves the others free: the set is the
+    nearest to the robot file, not the one of the largest margin.
+    """
     physical = physical_model(tx40)
     chi = np.array([tx40.VALUES.get(name, 0.0) for name in physical.standard])
     chi[physical.standard.index("FS1")] = 0.0
@@ -395,20 +509,32 @@ def test_standard_parameters_where_a_friction_is_zero(tx40) -> None:
 
 @pytest.mark.parametrize("weight", ["held-out", "auto"])
 def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, weight: str) -> None:
-    """The search goes on with the others; where none can be solved, the error is that of the solver."""
+    """The search goes on with the others; where none can be solved, the error is that of the
+    solver.
+    """
     import runtime.estimators.feasible as method
 
-    seen, solid, whole = simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60), replace_values(arm), method.fitted
-    settings = EstimateSettings("feasible", options={**PLAIN, "prior": "entropic", "weight": weight, "explain": False})
+    seen, solid, whole = (
+        simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60),
+        replace_values(arm),
+        method.fitted,
+    )
+    settings = EstimateSettings(
+        "feasible", options={**PLAIN, "prior": "entropic", "weight": weight, "explain": False}
+    )
 
     def failing(R, z, physical, options, weight=0.0):
         if weight > 1e-3:
-            raise InputError("the semidefinite program was not solved (Clarabel: InsufficientProgress)")
+            raise InputError(
+                "the semidefinite program was not solved (Clarabel: InsufficientProgress)"
+            )
         return whole(R, z, physical, options, weight)
 
     monkeypatch.setattr(method, "fitted", failing)
     found = estimate_of(seen, settings, model=solid)
-    assert found.status == "ok" and found.details["weight"] <= 1e-3 and found.details["masses"] == {}
+    assert (
+        found.status == "ok" and found.details["weight"] <= 1e-3 and found.details["masses"] == {}
+    )
 
 
 def test_values_given_in_part_pull_what_they_name(arm) -> None:
@@ -417,22 +543,49 @@ def test_values_given_in_part_pull_what_they_name(arm) -> None:
     partial = replace_values(arm)
     partial.VALUES = {name: x for name, x in partial.VALUES.items() if name.endswith("2")}
     found = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=partial)
-    assert found.status == "ok" and "(10 parameters of links have no value and stay free)" in found.message
-    with pytest.raises(SettingsError, match="needs all values of every link; the robot file has none of XX1"):
-        estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0, "prior": "entropic"}), model=partial)
+    assert (
+        found.status == "ok"
+        and "(10 parameters of links have no value and stay free)" in found.message
+    )
+    with pytest.raises(
+        SettingsError, match="needs all values of every link; the robot file has none of XX1"
+    ):
+        estimate_of(
+            seen,
+            EstimateSettings("feasible", options={"bootstrap": 0, "prior": "entropic"}),
+            model=partial,
+        )
 
 
 def test_masses_have_the_range_of_all_physical_robots(arm) -> None:
-    """Bounds of the same program: a mass in its range explains the record, beyond it none does; one that is given is determined."""
+    """Bounds of the same program: a mass in its range explains the record, beyond it none does; one
+    that is given is determined.
+    """
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.3, N=60)
     wide = estimate_of(seen, FEASIBLE, model=arm)
     mass = wide.details["masses"]["M2"]
-    assert mass["lowest"] <= mass["value"] <= mass["highest"] and not wide.details["masses"]["M1"]["determined"]
+    assert (
+        mass["lowest"] <= mass["value"] <= mass["highest"]
+        and not wide.details["masses"]["M1"]["determined"]
+    )
     inside, outside = (
-        estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M2": bound}}), model=arm)
+        estimate_of(
+            seen,
+            EstimateSettings("feasible", options={**PLAIN, "bounds": {"M2": bound}}),
+            model=arm,
+        )
         for bound in ([1.05 * mass["lowest"], 1.1 * mass["lowest"]], [0, 0.8 * mass["lowest"]])
     )
     assert inside.residual_norm <= 1.0101 * wide.residual_norm < outside.residual_norm
-    assert ",NOT determined: " in next(line for line in standard_csv(wide).splitlines() if line.startswith("M1,"))
-    given = estimate_of(seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M1": [4, 4.2]}}), model=arm)
+    assert ",NOT determined: " in next(
+        line for line in standard_csv(wide).splitlines() if line.startswith("M1,")
+    )
+    given = estimate_of(
+        seen, EstimateSettings("feasible", options={**PLAIN, "bounds": {"M1": [4, 4.2]}}), model=arm
+    )
     assert given.details["masses"]["M1"]["determined"] and "M1" not in given.message
+
+
+def test_prismatic_joints_without_limits_move_by_one_metre() -> None:
+    """SCARA: 2.27 m, not the 6.34 m of a travel of +-pi m, by which robots weigh up to 50.9 t."""
+    assert reach_of(symgen.model("scara")) == pytest.approx(2.27, abs=0.01)

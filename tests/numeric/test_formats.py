@@ -1,6 +1,8 @@
-"""One measured record in every format gives the same bits where the study declares the rate, and the same parameters to 1e-9 from its time stamps.
+"""One measured record in every format gives the same bits where the study declares the rate, and
+the same parameters to 1e-9 from its time stamps.
 
-The TX40 record, one sample in five, motor side. The whole record is run by `python tests/numeric/test_formats.py`.
+The TX40 record, one sample in five, motor side. The whole record is run by `python
+tests/numeric/test_formats.py`.
 """
 
 import gzip
@@ -22,7 +24,20 @@ from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
 from runtime.settings.study import study_from_mapping
 
-FORMATS = ("csv", "csv.gz", "parquet", "mat 5", "mat 7", "mat 7.3", "npz", "npy", "ros1", "sqlite3", "mcap", "bare mcap")
+FORMATS = (
+    "csv",
+    "csv.gz",
+    "parquet",
+    "mat 5",
+    "mat 7",
+    "mat 7.3",
+    "npz",
+    "npy",
+    "ros1",
+    "sqlite3",
+    "mcap",
+    "bare mcap",
+)
 JOINTS = [f"joint_{j}" for j in range(1, 7)]
 START = 1_718_000_000_000_000_000  # ns, of the stamps of the bags
 KEEP = 5
@@ -31,11 +46,18 @@ KEEP = 5
 def write(kind, folder, t, q, tau):
     """The record as a file of this kind, and the names of its columns in a study."""
     path = folder / f"record_{kind.replace(' ', '_').replace('.', '_')}"
-    named = {"t": t, **{f"q{j + 1}": q[:, j] for j in range(6)}, **{f"tau{j + 1}": tau[:, j] for j in range(6)}}
+    named = {
+        "t": t,
+        **{f"q{j + 1}": q[:, j] for j in range(6)},
+        **{f"tau{j + 1}": tau[:, j] for j in range(6)},
+    }
     columns = {"q": [f"q{j + 1}" for j in range(6)], "tau": [f"tau{j + 1}" for j in range(6)]}
     if kind.startswith("csv"):
         path = path.with_suffix(f".{kind}")
-        lines = [",".join(named), *(",".join(map(repr, row)) for row in np.column_stack(list(named.values())).tolist())]
+        lines = [
+            ",".join(named),
+            *(",".join(map(repr, row)) for row in np.column_stack(list(named.values())).tolist()),
+        ]
         data = "\n".join(lines).encode()
         path.write_bytes(gzip.compress(data, 1) if kind.endswith("gz") else data)
     elif kind == "parquet":
@@ -52,11 +74,15 @@ def write(kind, folder, t, q, tau):
         path = path.with_suffix(".mat")
         with h5py.File(path, "w", userblock_size=512) as archive:
             for name, x in {"t": t[:, None], "q": q, "tau": tau}.items():
-                archive.create_dataset(name, data=x.T, compression="gzip").attrs["MATLAB_class"] = np.bytes_("double")
+                archive.create_dataset(name, data=x.T, compression="gzip").attrs["MATLAB_class"] = (
+                    np.bytes_("double")
+                )
         columns = {"q": ["q"], "tau": ["tau"]}
     elif kind.startswith("mat"):
         path = path.with_suffix(".mat")
-        scipy.io.savemat(path, {"t": t[:, None], "q": q, "tau": tau}, do_compression=kind.endswith("7"))
+        scipy.io.savemat(
+            path, {"t": t[:, None], "q": q, "tau": tau}, do_compression=kind.endswith("7")
+        )
         columns = {"q": ["q"], "tau": ["tau"]}
     else:
         stamps = START + np.rint(t * 1e9).astype(np.int64)
@@ -66,11 +92,21 @@ def write(kind, folder, t, q, tau):
 
 
 def estimates(model, path, columns, rate, *, stamps):
-    """Estimates of all and of the essential parameters; from the time stamps, or at the rate that the study declares."""
-    time = {"columns": {**columns, "t": "1" if path.suffix == ".npy" else "t"}} if stamps else {"columns": columns, "rate": rate}
-    study = study_from_mapping({**dataset_study("tx40"), "record": {"files": str(path), "side": "motor", **time}})
+    """Estimates of all and of the essential parameters; from the time stamps, or at the rate that
+    the study declares.
+    """
+    time = (
+        {"columns": {**columns, "t": "1" if path.suffix == ".npy" else "t"}}
+        if stamps
+        else {"columns": columns, "rate": rate}
+    )
+    study = study_from_mapping(
+        {**dataset_study("tx40"), "record": {"files": str(path), "side": "motor", **time}}
+    )
     (record,) = read_records(study.record, model)
-    found = essential_of(observe(model, record, study), study.essential, study.estimate, model=model)
+    found = essential_of(
+        observe(model, record, study), study.essential, study.estimate, model=model
+    )
     return found.all_parameters, found.estimate
 
 
@@ -92,13 +128,20 @@ def measured():
 def tx40(tx40_data):
     q, tau = measured()
     rate = 5000 / KEEP
-    return load_model(Path(__file__).parents[2] / "generated" / "tx40.py"), rate, q[::KEEP], tau[::KEEP]
+    return (
+        load_model(Path(__file__).parents[2] / "generated" / "tx40.py"),
+        rate,
+        q[::KEEP],
+        tau[::KEEP],
+    )
 
 
 @pytest.fixture(scope="module")
 def reference(tx40, tmp_path_factory):
     model, rate, q, tau = tx40
-    path, columns = write("npz", tmp_path_factory.mktemp("reference"), np.arange(len(q)) / rate, q, tau)
+    path, columns = write(
+        "npz", tmp_path_factory.mktemp("reference"), np.arange(len(q)) / rate, q, tau
+    )
     return estimates(model, path, columns, rate, stamps=False)
 
 
@@ -116,19 +159,28 @@ def test_every_format_gives_the_same_estimate(tx40, reference, tmp_path, kind):
 
 
 def whole_record(folder):
-    """All 45000 samples: whether the bits are those of the dataset, and the largest difference from the time stamps."""
+    """All 45000 samples: whether the bits are those of the dataset, and the largest difference from
+    the time stamps.
+    """
     model = load_model(Path(__file__).parents[2] / "generated" / "tx40.py")
     q, tau = measured()
     (record,) = read_records(study_from_mapping(dataset_study("tx40")).record, model)
     study = study_from_mapping(dataset_study("tx40"))
-    found = essential_of(observe(model, record, study), study.essential, study.estimate, model=model)
+    found = essential_of(
+        observe(model, record, study), study.essential, study.estimate, model=model
+    )
     expected = [found.all_parameters, found.estimate]
     for kind in FORMATS:
         path, columns = write(kind, folder, np.arange(len(q)) / 5000, q, tau)
         declared = estimates(model, path, columns, 5000, stamps=False)
         stamped = estimates(model, path, columns, 5000, stamps=True)
-        difference = max(np.abs(one.X / other.X - 1).max() for one, other in zip(stamped, expected, strict=True))
-        print(f"{kind:10} same bits: {[bits(x) for x in declared] == [bits(x) for x in expected]}, from time stamps {difference:.1e}")
+        difference = max(
+            np.abs(one.X / other.X - 1).max() for one, other in zip(stamped, expected, strict=True)
+        )
+        print(
+            f"{kind:10} same bits: {[bits(x) for x in declared] == [bits(x) for x in expected]}, "
+            f"from time stamps {difference:.1e}"
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""Friction curves against simulated laws, the published asymmetric friction of EMPS, and the TX40 record."""
+"""Friction curves against simulated laws, the published asymmetric friction of EMPS, and the TX40
+record.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +11,9 @@ import pytest
 from campaign import campaign
 
 from runtime import InputError, Record, observe
-from runtime.estimators.methods import estimate_of
 from runtime.identification.friction import friction_curves, own_friction
 from runtime.identification.residuals import correlation_time, residual_correlation
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
@@ -22,7 +24,9 @@ from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0
-STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": None, "decimate": {"factor": 5}}, "rows": {"trim": 5}})
+STUDY = study_from_mapping(
+    {"signals": {"median": 1, "lowpass": None, "decimate": {"factor": 5}}, "rows": {"trim": 5}}
+)
 
 
 def emitted(name: str):
@@ -39,7 +43,9 @@ def simulated(arm, law, noise: float = 0.05, seconds: float = 40.0, seed: int = 
     t = np.arange(round(seconds * RATE)) / RATE
     w = 2 * np.pi * np.array([[0.11, 0.27, 0.61], [0.13, 0.31, 0.71]])[:, :, None]
     a = np.array([1.6, 0.7, 0.25])[:, None]
-    q, qd, qdd = ((a * x).sum(axis=1).T for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)))
+    q, qd, qdd = (
+        (a * x).sum(axis=1).T for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
+    )
     X = arm.base_parameters(arm.VALUES)
     rest = X.copy()
     for j in range(2):
@@ -59,7 +65,11 @@ def test_own_friction_of_a_joint(arm) -> None:
     named = [[arm.BASE_PARAMETERS[k] for k in own_friction(arm, j)] for j in range(2)]
     assert named == [["FV1", "FS1", "OFFSET1"], ["FV2", "FS2", "OFFSET2"]]
     tx40 = emitted("tx40")
-    assert [tx40.BASE_PARAMETERS[k] for k in own_friction(tx40, 5)] == ["FV6", "FS6", "OFFSET6"]  # FVM6 and FSM6 act on joint 5 too
+    assert [tx40.BASE_PARAMETERS[k] for k in own_friction(tx40, 5)] == [
+        "FV6",
+        "FS6",
+        "OFFSET6",
+    ]  # FVM6 and FSM6 act on joint 5 too
 
 
 def test_plain_friction_is_left_alone(arm) -> None:
@@ -79,7 +89,11 @@ def test_stribeck_friction_is_found(arm) -> None:
 
     record, fit = simulated(arm, law)
     for curve in friction_curves(arm, [record], STUDY, fit):
-        assert curve.law_name.startswith("stribeck") and "Stribeck effect" in curve.note and curve.label == curve.law_name
+        assert (
+            curve.law_name.startswith("stribeck")
+            and "Stribeck effect" in curve.note
+            and curve.label == curve.law_name
+        )
         stribeck = next(law for law in curve.laws if law.name == "stribeck")
         for name, value in {"FS": 0.8, "FV": 0.5, "FST": 0.6, "VS": 0.3}.items():
             assert abs(stribeck.parameters[name] - value) < 4 * stribeck.sigma[name] + 5e-3, name
@@ -87,17 +101,25 @@ def test_stribeck_friction_is_found(arm) -> None:
 
 
 def test_friction_under_load_is_found(arm) -> None:
-    record, fit = simulated(arm, lambda v, rigid: coulomb(v, rigid) + 0.1 * np.sign(v) * np.abs(rigid))
+    record, fit = simulated(
+        arm, lambda v, rigid: coulomb(v, rigid) + 0.1 * np.sign(v) * np.abs(rigid)
+    )
     for curve in friction_curves(arm, [record], STUDY, fit):
         assert curve.law_name in ("load", "stribeck+load")
         load = next(law for law in curve.laws if law.name == "load")
-        assert load.parameters["FL"] == pytest.approx(0.1, abs=0.005) and load.held_out < 0.9 * curve.laws[0].held_out
+        assert (
+            load.parameters["FL"] == pytest.approx(0.1, abs=0.005)
+            and load.held_out < 0.9 * curve.laws[0].held_out
+        )
 
 
 def test_two_records_are_one_curve(arm) -> None:
     record, fit = simulated(arm, coulomb, seconds=15.0)
     other, _ = simulated(arm, coulomb, seconds=15.0, seed=1)
-    one, two = friction_curves(arm, [record], STUDY, fit)[0], friction_curves(arm, [record, other], STUDY, fit)[0]
+    one, two = (
+        friction_curves(arm, [record], STUDY, fit)[0],
+        friction_curves(arm, [record, other], STUDY, fit)[0],
+    )
     assert len(two.v) == 2 * len(one.v) and two.laws[0].sigma["FV"] < one.laws[0].sigma["FV"]
 
 
@@ -112,7 +134,9 @@ def test_correlation_time_of_known_noise() -> None:
 
 
 def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
-    """Janot, Gautier and Brunot (2019): Fv+ 166.7061, Fc+ 20.1440, Fv- 240.4236, Fc- 20.6277 with M fitted too; here M is held."""
+    """Janot, Gautier and Brunot (2019): Fv+ 166.7061, Fc+ 20.1440, Fv- 240.4236, Fc- 20.6277 with M
+    fitted too; here M is held.
+    """
     emps = emitted("emps")
     study = study_from_mapping(dataset_study("emps"))
     records = read_records(study.record, emps)
@@ -126,15 +150,27 @@ def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
 
 @campaign
 def test_tx40_record(tx40_data) -> None:
-    """Held out, joint 3 goes from 12.7 to 8.4 % with load and a bend towards standstill; no joint has a Stribeck peak."""
+    """Held out, joint 3 goes from 12.7 to 8.4 % with load and a bend towards standstill; no joint
+    has a Stribeck peak.
+    """
     tx40 = emitted("tx40")
     study = study_from_mapping(dataset_study("tx40"))
     records = read_records(study.record, tx40)
-    curves = friction_curves(tx40, records, study, estimate_of(observe(tx40, records[0], study), model=tx40))
+    curves = friction_curves(
+        tx40, records, study, estimate_of(observe(tx40, records[0], study), model=tx40)
+    )
     assert [curve.joint for curve in curves] == list("123456")
     assert all(curve.law.held_out < curve.laws[0].held_out for curve in curves)
-    assert curves[2].law_name == "stribeck+load" and curves[2].law.held_out < 0.7 * curves[2].laws[0].held_out
-    assert all(curve.law.parameters["FST"] < 0 and "no Stribeck peak" in curve.note and "(no peak)" in curve.label for curve in curves)
+    assert (
+        curves[2].law_name == "stribeck+load"
+        and curves[2].law.held_out < 0.7 * curves[2].laws[0].held_out
+    )
+    assert all(
+        curve.law.parameters["FST"] < 0
+        and "no Stribeck peak" in curve.note
+        and "(no peak)" in curve.label
+        for curve in curves
+    )
     png = plots.png(friction_figure(curves))
     assert png[:4] == b"\x89PNG"
     page = render(Page("friction", "", [friction_section(curves)]))

@@ -1,4 +1,6 @@
-"""The fused kernels against scipy, entry by entry and ends included, and their least squares against lstsq."""
+"""The fused kernels against scipy, entry by entry and ends included, and their least squares
+against lstsq.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +17,22 @@ from scipy.signal import cheby1, sosfiltfilt
 
 from oracles.random_robots import random_robot
 from runtime.errors import InputError
-from runtime.model.compile_cache import NotCompiledError, cache_folder
+from runtime.model.compile_cache import NotCompiledError
 from runtime.model.compiled import CompiledModel
-from runtime.observation.filters import filtered_states, kept_samples
+from runtime.model.loading import cache_folder
 from runtime.resolution.c import kernels as fused
-from runtime.resolution.c.kernels import FilteredStates, Positions, Room, SignalEntries, constant_values, decimated
+from runtime.resolution.c.kernels import (
+    FilteredStates,
+    Positions,
+    Room,
+    SignalEntries,
+    constant_values,
+    decimated,
+)
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.settings.study import Decimate, Lowpass, Signals
+from runtime.signals.filters import filtered_states, kept_samples
 from symgen.description import load_robot
 
 pytestmark = needs_compiler
@@ -38,7 +48,7 @@ def cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         own_cache(tmp_path_factory.mktemp("cache"), patch)
         yield
-    own_cache(cache_folder(), pytest.MonkeyPatch())
+    own_cache(cache_folder().parent, pytest.MonkeyPatch())
 
 
 @pytest.fixture(scope="module")
@@ -50,14 +60,18 @@ def walk(N: int, n: int, seed: int = 0) -> Array:
     """A position record, shape (N, n): slow motion and measurement noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(N)[:, None] / RATE
-    return np.sin(t * rng.uniform(2, 9, n) + rng.uniform(0, 6, n)) * rng.uniform(0.5, 2, n) + 1e-5 * rng.standard_normal((N, n))
+    return np.sin(t * rng.uniform(2, 9, n) + rng.uniform(0, 6, n)) * rng.uniform(
+        0.5, 2, n
+    ) + 1e-5 * rng.standard_normal((N, n))
 
 
 def test_the_kernels_pass_their_own_check():
     assert unavailable() == ""
 
 
-def filtered(q: Array, signals: Signals, room: Room | None = None, rate: float = RATE, **moved: object) -> FilteredStates:
+def filtered(
+    q: Array, signals: Signals, room: Room | None = None, rate: float = RATE, **moved: object
+) -> FilteredStates:
     """States of positions q, shape (N, n)."""
     room = room or Room()
     return FilteredStates(Positions(q, signals.median, room), rate, signals, room, **moved)
@@ -81,7 +95,9 @@ def test_states_are_those_of_scipy(n, N, signals, order):
     q = walk(N, n)
     found = filtered(np.asarray(q, order=order), signals)
     expected = filtered_states(q, RATE, signals)
-    for x, right in zip(found.rows(slice(0, N)), (expected.q, expected.qd, expected.qdd), strict=True):
+    for x, right in zip(
+        found.rows(slice(0, N)), (expected.q, expected.qd, expected.qdd), strict=True
+    ):
         if platform.machine() == "x86_64":  # the same operations in the same order
             np.testing.assert_array_equal(x, right.T)
         np.testing.assert_allclose(x, right.T, rtol=0, atol=1e-14 * max(1, np.abs(right).max()))
@@ -108,7 +124,9 @@ def store(entries: SignalEntries, y: Array) -> Array:
 def scipy_decimate(u: Array, factor: int, phase: str, padding: str) -> Array:
     """Chebyshev I forward and backward over all samples, then the kept ones."""
     sos = cheby1(8, 0.05, 0.8 / factor, output="sos")
-    return sosfiltfilt(sos, u, axis=-1, padlen=27 if padding == "scipy" else 24)[..., kept_samples(u.shape[-1], factor, phase)]
+    return sosfiltfilt(sos, u, axis=-1, padlen=27 if padding == "scipy" else 24)[
+        ..., kept_samples(u.shape[-1], factor, phase)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -127,7 +145,11 @@ def scipy_decimate(u: Array, factor: int, phase: str, padding: str) -> Array:
 )
 def test_decimated_signals_are_those_of_scipy(N, factor, phase, padding, planar):
     q = walk(N + 40, 2, seed=factor)
-    settings, samples, room = Decimate(factor=factor, phase=phase, padding=padding), slice(17, 17 + N), Room()
+    settings, samples, room = (
+        Decimate(factor=factor, phase=phase, padding=padding),
+        slice(17, 17 + N),
+        Room(),
+    )
     states = filtered(q, PLAIN, room)
     entries = SignalEntries(planar, planar.BASE_PARAMETERS)
     y = decimated(entries, states, samples, factor, settings, constant_values(planar, {}), room)
@@ -141,10 +163,14 @@ def test_decimated_signals_are_those_of_scipy(N, factor, phase, padding, planar)
 
 @pytest.mark.parametrize("seed", sampled([1, 4, 9], 1))
 def test_random_robots_entry_by_entry(seed, tmp_path):
-    """Prismatic joints, trees, couplings; some columns only, in an order of their own; other constants than the file's."""
+    """Prismatic joints, trees, couplings; some columns only, in an order of their own; other
+    constants than the file's.
+    """
     model = in_c(random_robot(seed), tmp_path)
     n, room, rng = len(model.JOINTS), Room(), np.random.default_rng(seed)
-    names = tuple(rng.permutation(model.BASE_PARAMETERS)[: max(2, len(model.BASE_PARAMETERS) - 3)].tolist())
+    names = tuple(
+        rng.permutation(model.BASE_PARAMETERS)[: max(2, len(model.BASE_PARAMETERS) - 3)].tolist()
+    )
     changed = {name: value + 0.1 for name, value in list(model.CONSTANTS.items())[:1]}
     q, samples = walk(700, n, seed), slice(3, 690)
     states, entries = filtered(q, Signals(median=1), room), SignalEntries(model, names)
@@ -152,17 +178,31 @@ def test_random_robots_entry_by_entry(seed, tmp_path):
     D = model.module.regressor(expected.q, expected.qd, expected.qdd, **changed).transpose(2, 1, 0)
     D = np.ascontiguousarray(D[[model.BASE_PARAMETERS.index(name) for name in names]])
     for factor in (1, 12):
-        y = decimated(entries, states, samples, factor, Decimate(factor=factor), constant_values(model, changed), room)
+        y = decimated(
+            entries,
+            states,
+            samples,
+            factor,
+            Decimate(factor=factor),
+            constant_values(model, changed),
+            room,
+        )
         right = D if factor == 1 else scipy_decimate(D, factor, "first", "scipy")
         largest = np.abs(D).max(axis=(1, 2), keepdims=True)
         assert np.all(np.abs(store(entries, y) - right) <= 1e-12 * largest)
 
 
-def system(planar: CompiledModel, K: int, seed: int) -> tuple[SignalEntries, Array, Array, Array, Array]:
+def system(
+    planar: CompiledModel, K: int, seed: int
+) -> tuple[SignalEntries, Array, Array, Array, Array]:
     """SignalEntries, made-up signals, torques and mask; W in the rows that the mask keeps."""
     rng = np.random.default_rng(seed)
     entries = SignalEntries(planar, planar.BASE_PARAMETERS)
-    y, Y, mask = rng.standard_normal((len(entries.wanted), K)), rng.standard_normal((2, K)), rng.random((2, K)) < 0.8
+    y, Y, mask = (
+        rng.standard_normal((len(entries.wanted), K)),
+        rng.standard_normal((2, K)),
+        rng.random((2, K)) < 0.8,
+    )
     D = store(entries, y)
     return entries, y, Y, mask, np.vstack([D[:, j, mask[j]].T for j in range(2)])
 
@@ -185,7 +225,9 @@ def test_least_squares_of_kept_rows(K, planar):
         np.testing.assert_allclose(fit.residual_norms, norms, rtol=1e-12)
         assert np.linalg.cond(unit) / 3 < fit.kappa < 3 * np.linalg.cond(unit)
     factor = rows.factor()
-    assert [joint.rows for joint in factor.joints] == [int(mask[j].sum() + mask2[j].sum()) for j in range(2)]
+    assert [joint.rows for joint in factor.joints] == [
+        int(mask[j].sum() + mask2[j].sum()) for j in range(2)
+    ]
 
 
 def test_the_condition_decides_which_way_is_taken(planar):
@@ -201,7 +243,11 @@ def test_the_condition_decides_which_way_is_taken(planar):
         if unit > 1e5 or unit < 3e3:  # pairs of columns that never meet in one joint stay apart
             assert fit.method == ("triangular factor" if unit > 1e5 else "normal equations")
         residual = np.linalg.norm(Y[mask] - W @ fit.X)
-        assert np.isclose(residual, np.linalg.norm(Y[mask] - W @ np.linalg.lstsq(W, Y[mask], rcond=None)[0]), rtol=1e-10), method
+        assert np.isclose(
+            residual,
+            np.linalg.norm(Y[mask] - W @ np.linalg.lstsq(W, Y[mask], rcond=None)[0]),
+            rtol=1e-10,
+        ), method
     near[second] = 0  # a column without effect
     assert least_squares(KeptRows(entries, [(near, Y, mask)], Room())).method == "triangular factor"
 
@@ -226,10 +272,16 @@ def test_refusals(planar):
 
 
 def test_another_interface_is_refused(tmp_path):
-    (tmp_path / "other.c").write_text(fused.SOURCE.read_text().replace(f"#define ABI {fused.ABI}", "#define ABI 77"))
+    (tmp_path / "other.c").write_text(
+        fused.SOURCE.read_text().replace(f"#define ABI {fused.ABI}", "#define ABI 77")
+    )
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))))
     (tmp_path / "kernels.c").write_text((tmp_path / "other.c").read_text())
-    subprocess.run([compiler, "-std=c11", "-O0", "-shared", "-fPIC", "kernels.c", "-o", "other.so"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [compiler, "-std=c11", "-O0", "-shared", "-fPIC", "kernels.c", "-o", "other.so"],
+        cwd=tmp_path,
+        check=True,
+    )
     with pytest.raises(NotCompiledError, match="interface 77"):
         fused._opened(tmp_path / "other.so")
 
@@ -240,22 +292,40 @@ def test_subnormal_numbers_survive():
 
 
 @pytest.mark.parametrize("compiler", [c for c in ("gcc", "clang") if shutil.which(c)])
-@pytest.mark.parametrize("variant", ["", *(pytest.param(flag, marks=campaign) for flag in ("-DPORTABLE", "-DSCALAR", "-DDOUBLES=8"))])
+@pytest.mark.parametrize(
+    "variant",
+    [
+        "",
+        *(pytest.param(flag, marks=campaign) for flag in ("-DPORTABLE", "-DSCALAR", "-DDOUBLES=8")),
+    ],
+)
 def test_no_warnings(compiler, variant, tmp_path):
-    """As it is compiled, without the parts for one processor, and as a compiler without vector types reads it."""
+    """As it is compiled, without the parts for one processor, and as a compiler without vector
+    types reads it.
+    """
     flags = [*fused.FUSED_FLAGS, *WARNINGS, *([variant] if variant else [])]
     done = subprocess.run(
-        [compiler, *flags, str(fused.SOURCE), "-o", str(tmp_path / "fused.so")], capture_output=True, text=True, check=False
+        [compiler, *flags, str(fused.SOURCE), "-o", str(tmp_path / "fused.so")],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @campaign
-@pytest.mark.parametrize("variant", ["-DPORTABLE", *(pytest.param(flag, marks=campaign) for flag in ("-DSCALAR", "-O1"))])
+@pytest.mark.parametrize(
+    "variant", ["-DPORTABLE", *(pytest.param(flag, marks=campaign) for flag in ("-DSCALAR", "-O1"))]
+)
 def test_clean_under_sanitizers_and_the_same_numbers(variant, tmp_path):
-    """A driver with arrays of exact size, which prints a checksum of every result; the plain loops give the same to rounding."""
+    """A driver with arrays of exact size, which prints a checksum of every result; the plain loops
+    give the same to rounding.
+    """
     sums = {}
-    for flags in (["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", variant], ["-O3"]):
+    for flags in (
+        ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", variant],
+        ["-O3"],
+    ):
         (tmp_path / "kernels.c").write_text(fused.SOURCE.read_text())
         (tmp_path / "driver.c").write_text(DRIVER)
         compiler = next(filter(None, map(shutil.which, ("gcc", "clang", "cc"))))
@@ -265,7 +335,9 @@ def test_clean_under_sanitizers_and_the_same_numbers(variant, tmp_path):
             pytest.skip("no sanitizer libraries")
         assert built.returncode == 0, built.stderr
         environment = {**os.environ, "ASAN_OPTIONS": "detect_leaks=0"}  # the driver frees nothing
-        done = subprocess.run([str(tmp_path / "driver")], capture_output=True, text=True, check=False, env=environment)
+        done = subprocess.run(
+            [str(tmp_path / "driver")], capture_output=True, text=True, check=False, env=environment
+        )
         assert (done.returncode, done.stderr) == (0, "")
         sums[len(flags)] = np.array(done.stdout.split(), dtype=float)
     first, second = sums.values()

@@ -1,4 +1,6 @@
-"""Records of one robot agree within their stated deviations, and those of two robots do not: size and power on simulated pairs."""
+"""Records of one robot agree within their stated deviations, and those of two robots do not: size
+and power on simulated pairs.
+"""
 
 import numpy as np
 import pytest
@@ -19,12 +21,17 @@ def arm():
 
 
 def record(model, X, rng, rate=400.0, duration=20.0):
-    """Five sines per joint; torque noise of 5 %, coloured up to 5 Hz, so that neighbouring rows are not independent."""
+    """Five sines per joint; torque noise of 5 %, coloured up to 5 Hz, so that neighbouring rows are
+    not independent.
+    """
     t = np.arange(0, duration, 1 / rate)
     w, phase = 2 * np.pi * rng.uniform(0.1, 1.2, (2, 5)), rng.uniform(0, 2 * np.pi, (2, 5))
     a = 0.5 * rng.standard_normal((2, 5)) / (1 + w / 3)
     angle = w[:, :, None] * t + phase[:, :, None]
-    q, qd, qdd = (np.einsum("jk,jkt->tj", a * w**n, f(angle)) for n, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x))))
+    q, qd, qdd = (
+        np.einsum("jk,jkt->tj", a * w**n, f(angle))
+        for n, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x)))
+    )
     tau = model.inverse_dynamics(q, qd, qdd, X)
     noise = lfilter(*butter(1, 5, fs=rate), rng.standard_normal(tau.shape), axis=0)
     return runtime.Record(t, q, tau + 0.05 * tau.std(axis=0) * noise / noise.std(axis=0), rate=rate)
@@ -38,14 +45,23 @@ def pairs(model, count):
     for k in range(count):
         rng = np.random.default_rng([7, k])
         a, b, c = (runtime.observe(model, record(model, x, rng), STUDY) for x in (X, X, other))
-        yield tuple(homogeneity({"first": a, "second": second}, model.BASE_PARAMETERS, model=model) for second in (b, c))
+        yield tuple(
+            homogeneity({"first": a, "second": second}, model.BASE_PARAMETERS, model=model)
+            for second in (b, c)
+        )
 
 
 def rates(found):
-    """Shares of the pairs of one robot, and of two, that are said to differ, and of those of two that name the parameter."""
+    """Shares of the pairs of one robot, and of two, that are said to differ, and of those of two
+    that name the parameter.
+    """
     same, differ = zip(*found, strict=True)
     named = [any(d.parameter == "ZZ1R" for d in one.disagreements) for one in differ]
-    return np.mean([not one.agree for one in same]), np.mean([not one.agree for one in differ]), np.mean(named)
+    return (
+        np.mean([not one.agree for one in same]),
+        np.mean([not one.agree for one in differ]),
+        np.mean(named),
+    )
 
 
 def test_ten_pairs(arm):
@@ -55,7 +71,9 @@ def test_ten_pairs(arm):
 
 @campaign
 def test_size_and_power(arm):
-    """200 pairs: 5 % stated, between 2 and 9 % at 99 %; a parameter off by 10 % is found in nine of ten, and named in two of three."""
+    """200 pairs: 5 % stated, between 2 and 9 % at 99 %; a parameter off by 10 % is found in nine of
+    ten, and named in two of three.
+    """
     size, power, named = rates(pairs(arm, 200))
     assert size <= 0.09 and power >= 0.9 and named >= 0.66
 
@@ -64,21 +82,33 @@ def test_names_the_record_of_three(arm):
     X = np.asarray(arm.base_parameters(arm.VALUES))
     other = X * np.where(np.array(arm.BASE_PARAMETERS) == "MX1R", 1.2, 1.0)
     rng = np.random.default_rng(3)
-    parts = {name: runtime.observe(arm, record(arm, x, rng), STUDY) for name, x in (("monday", X), ("tuesday", other), ("friday", X))}
+    parts = {
+        name: runtime.observe(arm, record(arm, x, rng), STUDY)
+        for name, x in (("monday", X), ("tuesday", other), ("friday", X))
+    }
     found = homogeneity(parts, arm.BASE_PARAMETERS, model=arm)
-    assert not found.agree and (found.disagreements[0].record, found.disagreements[0].parameter) == ("tuesday", "MX1R")
+    assert not found.agree and (
+        found.disagreements[0].record,
+        found.disagreements[0].parameter,
+    ) == ("tuesday", "MX1R")
     assert "tuesday: MX1R" in found.text and "do NOT agree" in found.text
 
 
 def test_a_record_at_rest_is_left_out_and_told(arm):
-    """One whose rows do not determine the parameters is named; of the two others nothing is concluded from it."""
+    """One whose rows do not determine the parameters is named; of the two others nothing is
+    concluded from it.
+    """
     X = np.asarray(arm.base_parameters(arm.VALUES))
     rng = np.random.default_rng(4)
     a, b, c = (record(arm, X, rng) for _ in range(3))
     still = runtime.Record(c.t, np.tile(c.q[:1], (len(c), 1)), c.tau, rate=c.rate)
-    parts = {name: runtime.observe(arm, x, STUDY) for name, x in (("a", a), ("b", b), ("still", still))}
+    parts = {
+        name: runtime.observe(arm, x, STUDY) for name, x in (("a", a), ("b", b), ("still", still))
+    }
     found = homogeneity(parts, arm.BASE_PARAMETERS, model=arm)
-    assert found.records == ("a", "b") and found.untested[0].startswith("still, which alone does not determine")
+    assert found.records == ("a", "b") and found.untested[0].startswith(
+        "still, which alone does not determine"
+    )
     alone = homogeneity({"a": parts["a"], "still": parts["still"]}, arm.BASE_PARAMETERS, model=arm)
     assert "cannot be told" in alone.text and np.isnan(alone.p)
 

@@ -1,4 +1,6 @@
-"""Record files made to do harm: bombs, names that lead elsewhere, tables that compute, bytes that are none of the format. All are refused by name."""
+"""Record files made to do harm: bombs, names that lead elsewhere, tables that compute, bytes that
+are none of the format. All are refused by name.
+"""
 
 import gzip
 import io
@@ -27,7 +29,10 @@ from runtime.settings.study import study_from_mapping
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20
-MEMORY, BOMB = 100 * 2**20, 200 * 2**20  # bytes that the process which reads a file may hold, here, and twice that
+MEMORY, BOMB = (
+    100 * 2**20,
+    200 * 2**20,
+)  # bytes that the process which reads a file may hold, here, and twice that
 N = 30
 STAMPS = np.arange(1, N + 1) * 5_000_000
 MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2)), np.ones((N, 2)))}
@@ -42,11 +47,16 @@ def smaller(monkeypatch):
 
 
 def refused(read, said, peak=60e6):
-    """`read` raises an InputError that says so, never holds `peak` bytes, and no process that it starts holds 400 MB.
+    """`read` raises an InputError that says so, never holds `peak` bytes, and no process that it
+    starts holds 400 MB.
 
-    A process begins with the peak of the one that starts it: where other tests have made that a large one, only more than that is found.
+    A process begins with the peak of the one that starts it: where other tests have made that a
+    large one, only more than that is found.
     """
-    before = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    before = max(
+        resource.getrusage(who).ru_maxrss
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     tracemalloc.start()
     try:
         with pytest.raises(InputError, match=said):
@@ -54,7 +64,9 @@ def refused(read, said, peak=60e6):
         assert tracemalloc.get_traced_memory()[1] < peak
     finally:
         tracemalloc.stop()
-    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < max(400e6, 1.05 * 1024 * before)
+    assert 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < max(
+        400e6, 1.05 * 1024 * before
+    )
 
 
 def record(path, **others):
@@ -64,10 +76,14 @@ def record(path, **others):
 ONE = {"rate": 1, "columns": {"q": ["q1"], "tau": ["q1"]}}
 
 
-REFUSED = "needs more than .* of memory|takes more than .* of processor time|damaged, or not a whole bag"  # by the process that reads
+# by the process that reads
+REFUSED = (
+    "needs more than .* of memory|takes more than .* of processor time|damaged, or not a whole bag"
+)
 
 
-# --- bombs ------------------------------------------------------------------------------------------------------------
+# --- bombs
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_gzip_bomb(tmp_path):
@@ -78,8 +94,13 @@ def test_gzip_bomb(tmp_path):
 
 
 def test_zip_bomb_in_npz(tmp_path):
-    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as packed, packed.open("q1.npy", "w", force_zip64=True) as member:
-        np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (BEYOND // 8,)})
+    with (
+        zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as packed,
+        packed.open("q1.npy", "w", force_zip64=True) as member,
+    ):
+        np.lib.format.write_array_header_1_0(
+            member, {"descr": "<f8", "fortran_order": False, "shape": (BEYOND // 8,)}
+        )
         for _ in range(BEYOND // 2**20):
             member.write(bytes(2**20))
     refused(lambda: record(tmp_path / "a.npz", **ONE), "unpacks to 34 MiB or more")
@@ -87,7 +108,9 @@ def test_zip_bomb_in_npz(tmp_path):
 
 def test_npz_that_declares_more_than_it_holds(tmp_path):
     content = io.BytesIO()
-    np.lib.format.write_array_header_1_0(content, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    np.lib.format.write_array_header_1_0(
+        content, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)}
+    )
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as packed:
         packed.writestr("q1.npy", content.getvalue())
     with pytest.raises(InputError, match="not an archive of plain arrays"):
@@ -95,9 +118,16 @@ def test_npz_that_declares_more_than_it_holds(tmp_path):
 
 
 def mcap_with(chunk, compression, size, tail=b""):
-    """An unindexed MCAP file of one chunk that says it unpacks to `size` bytes; tail : records after it."""
+    """An unindexed MCAP file of one chunk that says it unpacks to `size` bytes; tail : records
+    after it.
+    """
     name = compression.encode()
-    content = struct.pack("<QQQII", 0, 0, size, 0, len(name)) + name + struct.pack("<Q", len(chunk)) + chunk
+    content = (
+        struct.pack("<QQQII", 0, 0, size, 0, len(name))
+        + name
+        + struct.pack("<Q", len(chunk))
+        + chunk
+    )
     header = struct.pack("<I", 4) + b"ros2" + struct.pack("<I", 0)
     footer = struct.pack("<QQI", 0, 0, 0)
     magic = b"\x89MCAP0\r\n"
@@ -140,7 +170,9 @@ def test_ros1_chunk_bomb(tmp_path, kind):
     start = data.index(b"compression=") + len(b"compression=" + kind.encode())
     start += len(b"\x08\x00\x00\x00size=....") if data[start + 4 : start + 8] == b"size" else 0
     (length,) = struct.unpack_from("<I", data, start)
-    path.write_bytes(data[:start] + struct.pack("<I", len(bomb)) + bomb + data[start + 4 + length :])
+    path.write_bytes(
+        data[:start] + struct.pack("<I", len(bomb)) + bomb + data[start + 4 + length :]
+    )
     shift = len(bomb) - length
     data = bytearray(path.read_bytes())
     place = data.index(b"index_pos=") + len(b"index_pos=")
@@ -161,14 +193,20 @@ def test_zstd_bomb_in_a_ros2_bag(tmp_path, kind):
     refused(lambda: open_table(path), REFUSED)
 
 
-# --- tables that compute, definitions that a bag brings along -----------------------------------------------------------
+# --- tables that compute, definitions that a bag brings along
+# -----------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     "script",
     [
-        "ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS SELECT id, topic_id, timestamp, zeroblob(1000000000) AS data FROM m;",
-        "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+        (
+            "ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS SELECT id, topic_id, "
+            "timestamp, "
+            "zeroblob(1000000000) AS data FROM m;"
+        ),
+        "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, "
+        "timestamp INTEGER, "
         "data BLOB GENERATED ALWAYS AS (zeroblob(1000000000)));",
         "DROP TABLE message_definitions; CREATE VIEW Message_Definitions AS SELECT 1 AS id;",
     ],
@@ -205,7 +243,9 @@ def test_quality_of_service_in_a_channel(tmp_path):
     """Of a chunk, and of the summary."""
     text = b"[" * 3000
     metadata = b"".join(struct.pack("<I", len(x)) + x for x in (b"offered_qos_profiles", text))
-    channel = struct.pack("<HH", 1, 0) + b"".join(struct.pack("<I", len(x)) + x for x in (b"/j", b"cdr", metadata))
+    channel = struct.pack("<HH", 1, 0) + b"".join(
+        struct.pack("<I", len(x)) + x for x in (b"/j", b"cdr", metadata)
+    )
     record = struct.pack("<BQ", 4, len(channel)) + channel
     for chunk, tail in ((record, b""), (b"", record)):
         (tmp_path / "a.mcap").write_bytes(mcap_with(chunk, "", len(chunk), tail))
@@ -221,17 +261,31 @@ def test_mcap_summary_that_begins_nowhere(tmp_path):
     refused(lambda: open_table(path), REFUSED)
 
 
-# --- names that lead elsewhere ------------------------------------------------------------------------------------------
+# --- names that lead elsewhere
+# ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "name", ["../secret.db3", "/etc/passwd", "run/../../secret.db3", "..", ".", "", "a\\..\\b", "run_0.db3?mode=rwc", ".hidden"]
+    "name",
+    [
+        "../secret.db3",
+        "/etc/passwd",
+        "run/../../secret.db3",
+        "..",
+        ".",
+        "",
+        "a\\..\\b",
+        "run_0.db3?mode=rwc",
+        ".hidden",
+    ],
 )
 def test_files_of_a_bag_stay_in_its_folder(tmp_path, name):
     path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
     shutil.copy(next(path.glob("*.db3")), tmp_path / "secret.db3")
     text = (path / "metadata.yaml").read_text()
-    (path / "metadata.yaml").write_text(re.sub(r"(relative_file_paths:\s*\n\s*- ).*", lambda m: m[1] + repr(name), text))
+    (path / "metadata.yaml").write_text(
+        re.sub(r"(relative_file_paths:\s*\n\s*- ).*", lambda m: m[1] + repr(name), text)
+    )
     refused(lambda: open_table(path), "expected a file of this folder")
 
 
@@ -260,7 +314,10 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("rosbag2_bagfile_information: 1", "no mapping rosbag2_bagfile_information"),
         ("rosbag2_bagfile_information: {relative_file_paths: 5}", "names no file"),
         (
-            "rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, compression_format: rar}",
+            (
+                "rosbag2_bagfile_information: {relative_file_paths: [x], compression_mode: file, "
+                "compression_format: rar}"
+            ),
             "there is no such file in the folder",
         ),
         ("\x00", "not YAML"),
@@ -279,7 +336,8 @@ def test_a_pipe_is_no_bag(tmp_path):
         refused(lambda name=name: open_table(tmp_path / name), "a pipe or a device")
 
 
-# --- damaged files ------------------------------------------------------------------------------------------------------
+# --- damaged files
+# ------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -305,7 +363,9 @@ def test_truncated_bags(tmp_path, whole):
 
 
 @campaign  # by default: tests/fuzz, formats bag, mcap, db3
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(data=st.data())
 def test_spoiled_bags(tmp_path, whole, data):
     """8 bytes anywhere: numbers or an InputError, nothing else."""

@@ -1,4 +1,6 @@
-"""`runtime.identify` and `runtime.report` from Python: records and streams mixed, records of one name, everything asked for in one result."""
+"""`runtime.identify` and `runtime.report` from Python: records and streams mixed, records of one
+name, everything asked for in one result.
+"""
 
 import json
 import pydoc
@@ -12,15 +14,20 @@ import pytest
 from campaign import campaign
 
 import runtime
+import runtime.rows.prepared
 from runtime import InputError
 from runtime.identification.assessment import assess
+from runtime.limits import LIMIT
 from runtime.records.provenance import origin, record_names
+from runtime.records.record import Origin
 from runtime.records.stream import RecordStream
 from runtime.settings.location import located, study_text
-from runtime.settings.study import study_from_mapping
+from runtime.settings.study import Lowpass, Signals, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-STUDY = study_from_mapping({"signals": {"lowpass": {"cutoff": 20}}, "cestac": {"runs": 2, "delta": "2*pi/5000"}})
+STUDY = study_from_mapping(
+    {"signals": {"lowpass": {"cutoff": 20}}, "cestac": {"runs": 2, "delta": "2*pi/5000"}}
+)
 
 
 @pytest.fixture(scope="module")
@@ -35,43 +42,77 @@ def measured(model, seed, name="run"):
     w = 2 * np.pi * np.array([[0.3, 0.4], [0.7, 0.9], [1.6, 1.3]])[:, None]
     amplitude = np.array([[0.8, 0.9], [0.4, 0.3], [0.1, 0.15]])[:, None]
     phase = w * t + rng.uniform(0, 2 * np.pi, (3, 1, 2))
-    q, qd, qdd = (amplitude * np.sin(phase)).sum(0), (amplitude * w * np.cos(phase)).sum(0), -(amplitude * w**2 * np.sin(phase)).sum(0)
-    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + 0.05 * rng.standard_normal(q.shape)
+    q, qd, qdd = (
+        (amplitude * np.sin(phase)).sum(0),
+        (amplitude * w * np.cos(phase)).sum(0),
+        -(amplitude * w**2 * np.sin(phase)).sum(0),
+    )
+    tau = model.inverse_dynamics(
+        q, qd, qdd, model.base_parameters(model.VALUES)
+    ) + 0.05 * rng.standard_normal(q.shape)
     return runtime.Record(t[:, 0], q, tau, name=name)
 
 
 def test_one_record_without_a_study(model):
     """The five lines of a notebook: every part of the result, as text and as HTML."""
     result = runtime.identify(model, measured(model, 0))
-    assert result.estimate.names == model.BASE_PARAMETERS and result.model_estimate is result.essential.estimate
-    assert result.checklist.state in ("good", "doubtful", "no") and len(result.checklist.checks) >= 8
+    assert (
+        result.estimate.names == model.BASE_PARAMETERS
+        and result.model_estimate is result.essential.estimate
+    )
+    assert (
+        result.checklist.state in ("good", "doubtful", "no") and len(result.checklist.checks) >= 8
+    )
     for shown in (result, result.checklist, result.estimate):
         root = ElementTree.fromstring(shown._repr_html_())
         assert root.find("table") is not None
-    assert result.verdict in str(result) and str(result.checklist).startswith(result.checklist.answer)
+    assert result.verdict in str(result) and str(result.checklist).startswith(
+        result.checklist.answer
+    )
 
 
 def test_work_is_done_once(model, monkeypatch):
-    """Coupled drives: two evaluations of W serve all four couplings, each with one pass of the filters; W beside its torques is factored once."""
+    """Coupled drives: two evaluations of W serve all four couplings, each with one pass of the
+    filters; W beside its torques is factored once.
+    """
     evaluated, filtered, factored, positions = [], [], [], measured(model, 0)
 
     def regressor(q, qd, qdd, **options):
         evaluated.append(len(q))
         return model.regressor(q, qd, qdd, **options)
 
-    drives = {"ratio": [[10.0, 0.0], [5.0, 10.0]], "offset": [0.0, 0.0], "torque_constant": [1.0, 1.0]}
+    drives = {
+        "ratio": [[10.0, 0.0], [5.0, 10.0]],
+        "offset": [0.0, 0.0],
+        "torque_constant": [1.0, 1.0],
+    }
     coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
     keep = {"filtered_states": filtered, "factor": factored}
-    for place in ("runtime.observation.states.filtered_states", "runtime.observation.system.factor"):
+    for place in (
+        "runtime.rows.prepared.filtered_states",
+        "runtime.rows.observation.factor",
+    ):
         calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
-        monkeypatch.setattr(place, lambda *given, calls=calls, real=real: calls.append(given) or real(*given))
-    study = study_from_mapping({"record": {"files": "run.npz", "side": "motor"}, "signals": {"lowpass": {"cutoff": 20}}})
+        monkeypatch.setattr(
+            place, lambda *given, calls=calls, real=real: calls.append(given) or real(*given)
+        )
+    study = study_from_mapping(
+        {"record": {"files": "run.npz", "side": "motor"}, "signals": {"lowpass": {"cutoff": 20}}}
+    )
     result = runtime.identify(coupled, positions, study)
     N = len(positions)
-    assert set(result.coupling) == {"both", "position", "torque", "none"} and result.coupling["both"] is result.estimate
-    assert sum(count for count in evaluated if count > 64) == 2 * N and len(filtered) == 2  # 64 states tell equal entries apart
+    assert (
+        set(result.coupling) == {"both", "position", "torque", "none"}
+        and result.coupling["both"] is result.estimate
+    )
+    assert (
+        sum(count for count in evaluated if count > 64) == 2 * N and len(filtered) == 2
+    )  # 64 states tell equal entries apart
     W = result.observation.W
-    assert [Y is result.observation.Y for of, Y, *_ in factored if of is W] == [True, False]  # and the torques of the coupling `position`
+    assert [Y is result.observation.Y for of, Y, *_ in factored if of is W] == [
+        True,
+        False,
+    ]  # and the torques of the coupling `position`
     assert sum(len(of) == len(W) for of, *_ in factored) == 4  # one for each coupling
 
 
@@ -85,8 +126,29 @@ def test_records_and_streams_are_fitted_together(model):
     assert [one.rows for one in mixed.record_errors] == [one.rows for one in whole.record_errors]
 
 
+def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
+    """Identification, plausibility, delay, friction, and the advice on encoders share what the
+    filters of the study made of the record; none is filtered twice by the same settings.
+    """
+    passes, real = [], runtime.rows.prepared.filtered_states
+
+    def counted(q, rate, signals):
+        passes.append((signals.median, signals.lowpass))
+        return real(q, rate, signals)
+
+    monkeypatch.setattr("runtime.rows.prepared.filtered_states", counted)
+    lowpass = Lowpass(cutoff=5)
+    study = replace(STUDY, signals=Signals(median=1, lowpass=lowpass))
+    result = assess(model, measured(model, 0), study)
+    assert result.plausibility is not None and result.friction and result.advice is not None
+    assert result.resolution is not None and str(result) and result.time_stamps is not None
+    assert passes.count((1, lowpass)) == 1, passes
+
+
 def test_records_of_one_name_stay_apart(model):
-    """Keyed by name, the second of two further records overwrote the first, and time stamps were those of the last."""
+    """Keyed by name, the second of two further records overwrote the first, and time stamps were
+    those of the last.
+    """
     first, second = measured(model, 3), measured(model, 4)
     assert record_names([first, second, first]) == ("run", "run (2)", "run (3)")
     result = runtime.identify(model, first, STUDY, further=[first, second])
@@ -95,7 +157,10 @@ def test_records_of_one_name_stay_apart(model):
     both = runtime.identify(model, [first, second], STUDY)
     assert both.name == "run, run (2)" and both.estimate.provenance["records"] == ["run", "run (2)"]
     assert [one.name for one in both.record_errors] == ["run", "run (2)"]
-    stamped = [SimpleNamespace(name="run", time="uniform"), SimpleNamespace(name="run", time="a gap")]
+    stamped = [
+        replace(first, name="run", origin=Origin(time="uniform")),
+        replace(first, name="run", origin=Origin(time="a gap")),
+    ]
     assert origin(stamped)["time"] == {"run": "uniform", "run (2)": "a gap"}
 
 
@@ -104,7 +169,7 @@ def test_records_of_one_name_stay_apart(model):
 def test_long_records_are_sampled_by_the_model_of_runs(model, monkeypatch, long):
     """That model is asked for once, and only then; what is sampled is the same."""
     asked = []
-    monkeypatch.setattr("runtime.identification.assessment.LONG", long)
+    monkeypatch.setattr(LIMIT, "LONG_RECORD", long)
     result = assess(model, measured(model, 5), STUDY, runs=lambda: asked.append(1) or model)
     assert len(asked) == (long == 0) and result.advice is not None and result.resolution is not None
 
@@ -113,28 +178,49 @@ def test_long_records_are_sampled_by_the_model_of_runs(model, monkeypatch, long)
 def test_report_writes_what_the_verbs_write(model, tmp_path):
     result = assess(model, measured(model, 5), STUDY, encoder=(1e-4,))
     assert result.missing == () and result.feasibility is not None and len(result.friction) == 2
-    assert result.checklist.checks[-1].state != "open" and result.checklist.checks[-2].state != "open"
+    assert (
+        result.checklist.checks[-1].state != "open" and result.checklist.checks[-2].state != "open"
+    )
     paths = runtime.report(result, str(tmp_path / "out"))
     names = {path.name for path in paths}
-    assert {"report.html", "estimate.json", "friction.png", "advice.json", "cestac.json", "study.yaml", "parameters.tex"} <= names
+    assert {
+        "report.html",
+        "estimate.json",
+        "friction.png",
+        "advice.json",
+        "cestac.json",
+        "study.yaml",
+        "parameters.tex",
+    } <= names
     assert names == {path.name for path in (tmp_path / "out").iterdir()}
     written = json.loads((tmp_path / "out" / "estimate.json").read_text())
-    assert written["X"] == result.estimate.X.tolist() and written["feasibility"]["feasible"] and len(written["friction"]) == 2
+    assert (
+        written["X"] == result.estimate.X.tolist()
+        and written["feasibility"]["feasible"]
+        and len(written["friction"]) == 2
+    )
     study = runtime.report(result.resolution, tmp_path / "resolution", study=STUDY)
-    assert "resolution.png" in {path.name for path in study} and "report.html" in {path.name for path in study}
+    assert "resolution.png" in {path.name for path in study} and "report.html" in {
+        path.name for path in study
+    }
     with pytest.raises(TypeError, match="float is no result that is written"):
         runtime.report(1.0, tmp_path / "wrong")
     assert not (tmp_path / "wrong").exists()
 
 
 def test_files_of_a_study_follow_it(tmp_path):
-    """Relative to the folder where it is written; the file of the controller's reference stayed behind."""
+    """Relative to the folder where it is written; the file of the controller's reference stayed
+    behind.
+    """
     study = study_from_mapping({
         "record": {"files": ["q.csv", "tau.csv"]}, "validate": {"record": {"files": ["b.csv"]}},
         "payload": {"record": {"files": ["loaded.csv"]}}, "controller": {"reference": {"file": "motion.csv"}},
     })  # fmt: skip
     here = located(study, tmp_path / "in")
-    assert here.record[0].files == (str(tmp_path / "in" / "q.csv"), str(tmp_path / "in" / "tau.csv"))
+    assert here.record[0].files == (
+        str(tmp_path / "in" / "q.csv"),
+        str(tmp_path / "in" / "tau.csv"),
+    )
     text = study_text(here, tmp_path / "out")
     for file in ("q.csv", "tau.csv", "b.csv", "loaded.csv", "motion.csv"):
         assert f"../in/{file}" in text
@@ -147,22 +233,33 @@ def test_undetermined_parameters_end_the_assessment(model):
     record = measured(model, 6)
     still = replace(record, q=np.column_stack([record.q[:, 0], np.zeros(len(record))]))
     result = assess(model, still, STUDY)
-    assert not result.determined and result.checklist.state == "no" and "does not determine" in result.missing[0]
+    assert (
+        not result.determined
+        and result.checklist.state == "no"
+        and "does not determine" in result.missing[0]
+    )
 
 
 def test_torques_that_are_currents_are_asked_about(model):
-    """Currents of a drive of 12 N m/A run like the torques of the file's values at a twelfth of their size; true torques raise no question."""
+    """Currents of a drive of 12 N m/A run like the torques of the file's values at a twelfth of
+    their size; true torques raise no question.
+    """
     record = measured(model, 0)
     assert not any("currents" in sentence for sentence in runtime.identify(model, record).warnings)
     result = runtime.identify(model, runtime.Record(record.t, record.q, record.tau / 12))
     (question,) = (sentence for sentence in result.warnings if "currents" in sentence)
     assert (
-        question.startswith("the torques of joint 1, 2 run like those of the values in the robot file at 0.08")
+        question.startswith(
+            "the torques of joint 1, 2 run like those of the values in the robot file at 0.08"
+        )
         and "units.tau: A" in question
     )
     bare = SimpleNamespace(**{**vars(model), "VALUES": {}})
     assert not any(
-        "currents" in sentence for sentence in runtime.identify(bare, runtime.Record(record.t, record.q, record.tau / 12)).warnings
+        "currents" in sentence
+        for sentence in runtime.identify(
+            bare, runtime.Record(record.t, record.q, record.tau / 12)
+        ).warnings
     )
 
 
@@ -170,15 +267,24 @@ def test_records_that_do_not_belong_together_are_told_in_a_sentence(model):
     """A record with other joints, one of another robot, and one that rests."""
     record = measured(model, 1)
     other = runtime.Record(
-        record.t, np.column_stack([record.q, record.q[:, :1]]), np.column_stack([record.tau, record.tau[:, :1]]), name="other"
+        record.t,
+        np.column_stack([record.q, record.q[:, :1]]),
+        np.column_stack([record.tau, record.tau[:, :1]]),
+        name="other",
     )
     for given in ({"records": other}, {"records": record, "further": [other]}):
-        with pytest.raises(InputError, match="other: 3 joints; planar_2r has 2: a record of another robot"):
+        with pytest.raises(
+            InputError, match="other: 3 joints; planar_2r has 2: a record of another robot"
+        ):
             runtime.identify(model, study=STUDY, **given)
     still = replace(record, q=np.tile(record.q[:1], (len(record), 1)), name="still")
     moving = replace(STUDY, rows=replace(STUDY.rows, low_speed=0.01))
     with pytest.raises(
-        InputError, match=r"still: none of its \d+ rows per joint is used: rows.trim leaves out 3?\d, rows.low_speed leaves out"
+        InputError,
+        match=(
+            r"still: none of its \d+ rows per joint is used: rows.trim leaves out 3?\d, "
+            r"rows.low_speed leaves out"
+        ),
     ):
         runtime.identify(model, [record, still], moving)
     heavier = replace(measured(model, 2), tau=3 * measured(model, 2).tau, name="heavier")
@@ -191,7 +297,9 @@ def test_joints_of_which_no_row_is_left_are_told(model):
     """low_speed in degrees a second: too few rows for any test, and one sentence says why."""
     record = measured(model, 1)
     fastest = np.abs(np.gradient(record.q[:, 1], 1 / record.rate)).max()
-    result = runtime.identify(model, record, replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest))))
+    result = runtime.identify(
+        model, record, replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest)))
+    )
     assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
     assert result.estimate.status == "rank-deficient"
 
@@ -205,7 +313,27 @@ def test_the_status_of_every_method_decides(model):
         and result.ranking.startswith("Predicts a part of the record")
     )
     bad = replace(
-        result, estimate=replace(result.estimate, status="not-converged", message="DIDIM has not converged after 3 passes. More.")
+        result,
+        estimate=replace(
+            result.estimate,
+            status="not-converged",
+            message="DIDIM has not converged after 3 passes. More.",
+        ),
     )
     assert not bad.usable and bad.checklist.state == "no"
-    assert bad.verdict == "No values of planar_2r: ols ended with status not-converged. DIDIM has not converged after 3 passes."
+    assert bad.verdict == (
+        "No values of planar_2r: ols ended with status not-converged. DIDIM has not converged "
+        "after 3 passes."
+    )
+
+
+def test_a_number_in_the_name_of_a_record_is_kept(model):
+    """ "run (2)" was reported as "run"; pieces of one record at gaps share its sentence."""
+    first = measured(model, 1)
+    names = ("run (2)", "gap (1 of 2)", "gap (2 of 2)")
+    stamps = [replace(first, name=name, origin=Origin(time="regular")) for name in names]
+    result = runtime.identify(model, stamps)
+    assert [text.split(":")[0] for text in result.time_stamps] == [
+        "Time stamps of run (2)",
+        "Time stamps of gap",
+    ]

@@ -1,4 +1,6 @@
-"""Robust least squares: against a minimisation of Huber's and Tukey's criteria, on outliers, on the EMPS record."""
+"""Robust least squares: against a minimisation of Huber's and Tukey's criteria, on outliers, on the
+EMPS record.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +14,11 @@ from scipy.optimize import least_squares
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.irls import slope, weight
-from runtime.estimators.methods import estimate_of
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
-from runtime.observation.observation import observe
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
+from runtime.rows.observe import observe
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 HUBER = EstimateSettings(method="irls")
@@ -40,7 +42,9 @@ def test_exact_data_give_the_parameters(settings):
 
 @pytest.mark.parametrize(("settings", "loss"), [(HUBER, "huber"), (TUKEY, "tukey")])
 def test_minimum_of_the_criterion(settings, loss):
-    """scipy minimises sum rho(e/S) with the scales found; rows are many, so that leverage hardly counts."""
+    """scipy minimises sum rho(e/S) with the scales found; rows are many, so that leverage hardly
+    counts.
+    """
     seen = with_outliers()
     found = estimate_of(seen, settings)
     S = np.repeat(found.details["scales"], seen.rows)
@@ -49,7 +53,13 @@ def test_minimum_of_the_criterion(settings, loss):
     def tukey(z):
         v = np.minimum(z, 1.0)
         inside = z < 1
-        return np.array([(1 - (1 - v) ** 3) / 3, np.where(inside, (1 - v) ** 2, 0), np.where(inside, -2 * (1 - v), 0)])
+        return np.array(
+            [
+                (1 - (1 - v) ** 3) / 3,
+                np.where(inside, (1 - v) ** 2, 0),
+                np.where(inside, -2 * (1 - v), 0),
+            ]
+        )
 
     minimum = least_squares(
         lambda X: (seen.Y - seen.W @ X) / S,
@@ -69,18 +79,31 @@ def test_outliers_count_less_and_are_told(settings):
     assert np.linalg.norm(found.X - TRUE) < 0.25 * np.linalg.norm(plain.X - TRUE)
     assert found.details["down_weighted"]["2"] > 0.045 > 0.02 > found.details["down_weighted"]["1"]
     assert "joint 2" in found.message and "Share of rows" in found.message
-    assert Estimate.from_json(found.to_json()).details["down_weighted"] == found.details["down_weighted"]
+    assert (
+        Estimate.from_json(found.to_json()).details["down_weighted"]
+        == found.details["down_weighted"]
+    )
 
 
 @campaign
 @pytest.mark.parametrize("settings", [HUBER, pytest.param(TUKEY, marks=pytest.mark.campaign)])
 def test_normal_noise_costs_five_per_cent_and_sigma_matches_the_scatter(settings):
-    runs = [estimate_of(observation(N=400, rate=40.0, noise=(0.3, 0.2), seed=k), settings) for k in range(150)]
+    runs = [
+        estimate_of(observation(N=400, rate=40.0, noise=(0.3, 0.2), seed=k), settings)
+        for k in range(150)
+    ]
     scatter = np.std([run.X for run in runs], axis=0, ddof=1)
     ratio = scatter / np.mean([run.sigma for run in runs], axis=0)
     assert np.all((ratio > 0.8) & (ratio < 1.25))  # 150 runs: 6 % one sigma
-    assert np.median(np.mean([run.sigma_corrected for run in runs], axis=0) / scatter) == pytest.approx(1, abs=0.15)
-    weighted = [estimate_of(observation(N=400, rate=40.0, noise=(0.3, 0.2), seed=k), EstimateSettings(method="wls")).X for k in range(150)]
+    assert np.median(
+        np.mean([run.sigma_corrected for run in runs], axis=0) / scatter
+    ) == pytest.approx(1, abs=0.15)
+    weighted = [
+        estimate_of(
+            observation(N=400, rate=40.0, noise=(0.3, 0.2), seed=k), EstimateSettings(method="wls")
+        ).X
+        for k in range(150)
+    ]
     efficiency = np.median(np.var(weighted, axis=0) / np.var([run.X for run in runs], axis=0))
     assert 0.88 < efficiency < 1.01  # 95 % by the tuning constants
 
@@ -97,7 +120,9 @@ def test_weights_are_psi_over_u():
     u = np.array([-9.0, -2.0, -0.3, 0.3, 1.0, 4.0])
     for loss, c in (("huber", 1.345), ("tukey", 4.685)):
         step = 1e-6
-        difference = (weight(u + step, loss, c) * (u + step) - weight(u - step, loss, c) * (u - step)) / (2 * step)
+        difference = (
+            weight(u + step, loss, c) * (u + step) - weight(u - step, loss, c) * (u - step)
+        ) / (2 * step)
         assert np.allclose(slope(u, loss, c), difference, atol=1e-6)
 
 
@@ -105,8 +130,15 @@ def test_rank_loss_and_bad_options():
     seen = observation()
     lost = replace(seen, W=np.column_stack([seen.W[:, 0], seen.W[:, :-1]]))
     assert estimate_of(lost, HUBER).status == "rank-deficient"
-    assert estimate_of(with_outliers(), EstimateSettings(method="irls", options={"passes": 1})).status == "not-converged"
-    for options, words in (({"loss": "cauchy"}, "huber"), ({"tuning": -1}, "tuning: -1; expected more than 0"), ({"k": 1}, "tuning")):
+    assert (
+        estimate_of(with_outliers(), EstimateSettings(method="irls", options={"passes": 1})).status
+        == "not-converged"
+    )
+    for options, words in (
+        ({"loss": "cauchy"}, "huber"),
+        ({"tuning": -1}, "tuning: -1; expected more than 0"),
+        ({"k": 1}, "tuning"),
+    ):
         with pytest.raises(SettingsError, match=words):
             estimate_of(seen, EstimateSettings(method="irls", options=options))
     with pytest.raises(SettingsError, match="its own weights"):

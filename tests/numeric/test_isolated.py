@@ -1,4 +1,6 @@
-"""The process that reads a file: it ends alone, is ended where it takes too long or too much, and answers one request at a time."""
+"""The process that reads a file: it ends alone, is ended where it takes too long or too much, and
+answers one request at a time.
+"""
 
 import gc
 import os
@@ -40,8 +42,14 @@ def alive(table):
 def test_it_gives_what_the_format_gives(path, table):
     plain = open_parquet(Source(path))
     groups = [["a"], [], ["b", "a"]]
-    assert isinstance(table, IsolatedTable) and table.names == plain.names and table.samples(groups) == N
-    assert table.widths(groups) == plain.widths(groups) == [1, 0, 2] and table.row(3) == plain.row(3)
+    assert (
+        isinstance(table, IsolatedTable)
+        and table.names == plain.names
+        and table.samples(groups) == N
+    )
+    assert table.widths(groups) == plain.widths(groups) == [1, 0, 2] and table.row(3) == plain.row(
+        3
+    )
     for x, y in zip(table.read(groups), plain.read(groups), strict=True):
         np.testing.assert_array_equal(x, y)
     for block, other in zip(table.blocks(groups, 7), plain.blocks(groups, 7), strict=True):
@@ -84,7 +92,12 @@ def test_a_column_that_is_missing_leaves_it_alive(table):
 
 
 @pytest.mark.parametrize(
-    ("number", "said"), [(signal.SIGSEGV, "ends with SIGSEGV"), (signal.SIGABRT, "ends with SIGABRT"), (signal.SIGXCPU, "processor time")]
+    ("number", "said"),
+    [
+        (signal.SIGSEGV, "ends with SIGSEGV"),
+        (signal.SIGABRT, "ends with SIGABRT"),
+        (signal.SIGXCPU, "processor time"),
+    ],
 )
 def test_a_library_that_ends_its_process(table, number, said):
     table.idle.popen.send_signal(number)
@@ -96,7 +109,10 @@ def test_a_library_that_ends_its_process(table, number, said):
 
 def test_too_much_memory_or_time(path, monkeypatch):
     monkeypatch.setattr(isolated, "MEMORY", 2**20)
-    with pytest.raises(InputError, match=r"^x\.parquet: (needs more than 1 MiB of memory|damaged, or not a Parquet file)"):
+    with pytest.raises(
+        InputError,
+        match=r"^x\.parquet: (needs more than 1 MiB of memory|damaged, or not a Parquet file)",
+    ):
         open_table(path).read([["a", "b"]])
     monkeypatch.undo()
     monkeypatch.setattr(isolated, "SECONDS", -1)
@@ -107,5 +123,8 @@ def test_too_much_memory_or_time(path, monkeypatch):
 
 def test_limits_grow_with_the_file():
     sizes = [0, 10**6, 10**8, 10**10]
-    assert all(one.memory < other.memory and one.seconds < other.seconds for one, other in pairwise(map(Limits.of, sizes)))
+    assert all(
+        one.memory < other.memory and one.seconds < other.seconds
+        for one, other in pairwise(map(Limits.of, sizes))
+    )
     assert Limits.of(51 * 10**6).memory < 750e6

@@ -1,4 +1,6 @@
-"""Names of joints, from a URDF to columns, tables, JSON and the page of a report; symbols in formulas stay q1, q2."""
+"""Names of joints, from a URDF to columns, tables, JSON and the page of a report; symbols in
+formulas stay q1, q2.
+"""
 
 import json
 
@@ -16,8 +18,15 @@ NAMES = ("shoulder_$pan", "elbow <2> $é")  # as files may have them
 
 def arm(folder):
     """A URDF of two joints with these names, and its model."""
-    parts = [link("base"), joint(NAMES[0], "revolute", "base", "a", "0 0 0.1", axis="0 1 0"), link("a", 3.0, "0.1 0 0.02")]
-    parts += [joint(NAMES[1].replace("<", "&lt;"), "revolute", "a", "b", "0.4 0 0", axis="0 1 0"), link("b", 1.0, "0.1 0 0")]
+    parts = [
+        link("base"),
+        joint(NAMES[0], "revolute", "base", "a", "0 0 0.1", axis="0 1 0"),
+        link("a", 3.0, "0.1 0 0.02"),
+    ]
+    parts += [
+        joint(NAMES[1].replace("<", "&lt;"), "revolute", "a", "b", "0.4 0 0", axis="0 1 0"),
+        link("b", 1.0, "0.1 0 0"),
+    ]
     (folder / "arm.urdf").write_text(robot("arm", *parts), encoding="utf-8")
     return symgen.model(folder / "arm.urdf")
 
@@ -28,11 +37,26 @@ def identified(folder):
     t = np.arange(1500)[:, None] / 200
     w = 2 * np.pi * np.array([[0.3, 0.4], [0.9, 1.1]])[:, None]
     q, qd, qdd = np.sin(w * t).sum(0), (w * np.cos(w * t)).sum(0), (-(w**2) * np.sin(w * t)).sum(0)
-    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(model.VALUES)) + 0.02 * np.random.default_rng(0).standard_normal(q.shape)
-    header = ",".join(["time", *(f"{name}.pos" for name in NAMES), *(f"tau_{name}" for name in NAMES)])
-    np.savetxt(folder / "log.csv", np.column_stack([t, q, tau]), delimiter=",", header=header, comments="", encoding="utf-8")
-    study = runtime.Study(record={"files": str(folder / "log.csv"), "columns": {"t": "time", "q": "names"}})
-    return model, runtime.identify(model, runtime.read_record(study.record[0], model), study, friction=True)
+    tau = model.inverse_dynamics(
+        q, qd, qdd, model.base_parameters(model.VALUES)
+    ) + 0.02 * np.random.default_rng(0).standard_normal(q.shape)
+    header = ",".join(
+        ["time", *(f"{name}.pos" for name in NAMES), *(f"tau_{name}" for name in NAMES)]
+    )
+    np.savetxt(
+        folder / "log.csv",
+        np.column_stack([t, q, tau]),
+        delimiter=",",
+        header=header,
+        comments="",
+        encoding="utf-8",
+    )
+    study = runtime.Study(
+        record={"files": str(folder / "log.csv"), "columns": {"t": "time", "q": "names"}}
+    )
+    return model, runtime.identify(
+        model, runtime.read_record(study.record[0], model), study, friction=True
+    )
 
 
 def test_names_of_a_urdf_reach_every_result(tmp_path):
@@ -41,9 +65,15 @@ def test_names_of_a_urdf_reach_every_result(tmp_path):
     text, _ = write_robot(symgen.load_robot(tmp_path / "arm.urdf"), "arm.yaml")
     assert dict(parse_robot(text.encode(), "arm.yaml").labels) == model.LABELS
     said, told = f"1 {NAMES[0]}", f"2 {NAMES[1]}"
-    assert [joint.joint for joint in result.estimate.per_joint] == [said, told] and f"\n{told} " in result.to_text()
+    assert [joint.joint for joint in result.estimate.per_joint] == [
+        said,
+        told,
+    ] and f"\n{told} " in result.to_text()
     written = json.loads(result.to_json())
-    assert written["per_joint"][1]["joint"] == told and written["provenance"]["labels"] == {"q1": NAMES[0], "q2": NAMES[1]}
+    assert written["per_joint"][1]["joint"] == told and written["provenance"]["labels"] == {
+        "q1": NAMES[0],
+        "q2": NAMES[1],
+    }
     assert [curve.joint for curve in result.friction] == [said, told]
 
 

@@ -1,4 +1,6 @@
-"""Columns of a record beside positions and torques: known torques are subtracted and said, feed-forward torques are kept, wherever they lie."""
+"""Columns of a record beside positions and torques: known torques are subtracted and said,
+feed-forward torques are kept, wherever they lie.
+"""
 
 import copy
 import pickle
@@ -10,6 +12,7 @@ import scipy.io
 
 from runtime import Record, read_record
 from runtime.errors import InputError
+from runtime.records.provenance import origin
 from runtime.records.reading_by_blocks import open_stream
 from runtime.settings.study import study_from_mapping
 
@@ -26,7 +29,9 @@ def settings(**record):
 
 @pytest.mark.parametrize("place", ["one", "torques", "apart", "third"])
 def test_known_torques_are_found_subtracted_and_said(tmp_path, place):
-    """In the one file, in that of the torques, in one of their own beside one or two others; by blocks as at once."""
+    """In the one file, in that of the torques, in one of their own beside one or two others; by
+    blocks as at once.
+    """
     both, known = {"q": Q, "tau": TAU}, {"cb": BALANCE}
     files = {
         "one": [both | known],
@@ -36,37 +41,54 @@ def test_known_torques_are_found_subtracted_and_said(tmp_path, place):
     }[place]
     for k, arrays in enumerate(files):
         np.savez(tmp_path / f"{k}.npz", **arrays)
-    given = settings(files=[f"{k}.npz" for k in range(len(files))], columns={"q": "q", "tau": "tau", "tau_known": [0, "cb"]})
+    given = settings(
+        files=[f"{k}.npz" for k in range(len(files))],
+        columns={"q": "q", "tau": "tau", "tau_known": [0, "cb"]},
+    )
     record = read_record(given, folder=tmp_path)
-    np.testing.assert_array_equal(record.tau, LEFT)
+    np.testing.assert_array_equal(record.torque, LEFT)
     np.testing.assert_array_equal(record.tau_known[:, 1], BALANCE)
-    assert record.known == f"known torques subtracted: up to {BALANCE.max():.4g} of joint 2 (N m or N)"
-    blocks = [tau for _, _, tau, _ in open_stream(given, folder=tmp_path, block=16).blocks()]
-    np.testing.assert_array_equal(np.vstack(blocks), LEFT)
+    assert (
+        record.subtracted
+        == f"known torques subtracted: up to {BALANCE.max():.4g} of joint 2 (N m or N)"
+    )
+    stream = open_stream(given, folder=tmp_path, block=16)
+    np.testing.assert_array_equal(np.vstack([tau for _, _, tau, _ in stream.blocks()]), LEFT)
+    assert origin([stream])["known_torques"] == origin([record])["known_torques"]
 
 
 def test_records_keep_what_was_subtracted_once():
-    """A changed record is not subtracted from twice, and one that travels to another process is the same."""
+    """A changed record is not subtracted from twice, and one that travels to another process is the
+    same.
+    """
     record = Record(T, Q, TAU, tau_known=np.stack([0 * T, BALANCE], axis=1), tau_ff=TAU)
-    np.testing.assert_array_equal(record.tau, LEFT)
-    np.testing.assert_array_equal(replace(record, name="b").tau, LEFT)
+    np.testing.assert_array_equal(record.torque, LEFT)
+    np.testing.assert_array_equal(replace(record, name="b").torque, LEFT)
     for same in (copy.copy(record), pickle.loads(pickle.dumps(record))):  # noqa: S301
-        np.testing.assert_array_equal(same.tau, LEFT)
+        np.testing.assert_array_equal(same.torque, LEFT)
         np.testing.assert_array_equal(same.tau_known, record.tau_known)
         np.testing.assert_array_equal(same.tau_ff, TAU)
-        assert same.known == record.known
+        assert same.subtracted == record.subtracted
     with pytest.raises(InputError, match=r"tau_known \(40,\), q \(40, 2\); expected the same"):
         Record(T, Q, TAU, tau_known=BALANCE)
 
 
 def test_structures_of_matlab_by_their_fields(tmp_path):
-    """Transposed arrays in structures, as controllers store them; a structure itself, and an array of structures, are refused by name."""
+    """Transposed arrays in structures, as controllers store them; a structure itself, and an array
+    of structures, are refused by name.
+    """
     log = {"t": T, "pos": {"motor": Q.T}, "torque": TAU.T, "text": "abc"}
-    scipy.io.savemat(tmp_path / "a.mat", {"rec": log, "many": np.array([(1.0,), (2.0,)], dtype=[("x", "f8")])})
+    scipy.io.savemat(
+        tmp_path / "a.mat", {"rec": log, "many": np.array([(1.0,), (2.0,)], dtype=[("x", "f8")])}
+    )
     columns = {"t": "rec.t", "q": "rec.pos.motor", "tau": "rec.torque"}
     record = read_record(settings(files="a.mat", columns=columns), folder=tmp_path)
     np.testing.assert_array_equal(record.q, Q)
     np.testing.assert_array_equal(record.tau, TAU)
-    for name, said in (("rec.pos", r"struct of rec\.pos\.motor"), ("many", "struct array"), ("rec.text", "char")):
+    for name, said in (
+        ("rec.pos", r"struct of rec\.pos\.motor"),
+        ("many", "struct array"),
+        ("rec.text", "char"),
+    ):
         with pytest.raises(InputError, match=said):
             read_record(settings(files="a.mat", columns={**columns, "q": name}), folder=tmp_path)

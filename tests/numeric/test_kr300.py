@@ -1,4 +1,6 @@
-"""The measured KUKA KR300: A is fitted, B predicted; no worse than a careful first identification by the README of the record, and ordered rightly."""
+"""The measured KUKA KR300: A is fitted, B predicted; no worse than a careful first identification
+by the README of the record, and ordered rightly.
+"""
 
 from dataclasses import replace
 
@@ -10,12 +12,14 @@ from campaign import campaign
 import runtime
 import symgen
 from runtime.errors import InputError
-from runtime.estimators.methods import estimate_of
 from runtime.identification.validation import prediction_errors
+from runtime.loop.methods import estimate_of
 from runtime.records.reading import read_records
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
-pytestmark = pytest.mark.skipif(not (kr300.DATA / "A.mat").is_file(), reason=f"no record in {kr300.DATA}")
+pytestmark = pytest.mark.skipif(
+    not (kr300.DATA / "A.mat").is_file(), reason=f"no record in {kr300.DATA}"
+)
 
 
 @pytest.fixture(scope="module")
@@ -24,38 +28,50 @@ def robot(tmp_path_factory):
     path = tmp_path_factory.mktemp("kr300") / "kr300.yaml"
     path.write_text(kr300.robot_text())
     model = symgen.model(path)
-    return model, *(read_records(study_from_mapping(kr300.study(name)).record, model)[0] for name in "AB")
+    return model, *(
+        read_records(study_from_mapping(kr300.study(name)).record, model)[0] for name in "AB"
+    )
 
 
 def balanced(record):
     """The record with the torque of the counterbalance known."""
     known = kr300.counterbalance(record.q)
-    return runtime.Record(record.t, record.q, record.tau, rate=record.rate, name=record.name, files=record.files, tau_known=known)
+    return replace(record, tau_known=known)
 
 
 def errors(model, A, B, study, method="ols", **options):
     """Errors on A, fitted, and on B, predicted, in %."""
-    fit = estimate_of(runtime.observe(model, A, study), EstimateSettings(method, options=options), model=model)
+    fit = estimate_of(
+        runtime.observe(model, A, study), EstimateSettings(method, options=options), model=model
+    )
     return fit.relative_error, prediction_errors(runtime.observe(model, B, study), fit)[0], fit
 
 
 def test_structures_of_the_file_and_the_source_agree(robot):
-    """Torques of the CAD values with 150 kg, with friction fitted and the counterbalance known, leave 2.4 % of A by the README; 200 kg leave 5.2 %."""
+    """Torques of the CAD values with 150 kg, with friction fitted and the counterbalance known,
+    leave 2.4 % of A by the README; 200 kg leave 5.2 %.
+    """
     model, A, _ = robot
     observation = runtime.observe(model, balanced(A), study_from_mapping(kr300.study()))
-    friction = [k for k, name in enumerate(observation.names) if name.startswith(("FV", "FS", "OFFSET"))]
+    friction = [
+        k for k, name in enumerate(observation.names) if name.startswith(("FV", "FS", "OFFSET"))
+    ]
     for load, expected in ((150.0, 2.4), (200.0, 5.2)):
         X = np.asarray(model.base_parameters(kr300.values(load)))
         X[friction] = 0
         left = observation.Y - observation.W @ X
         F = observation.W[:, friction]
         left -= F @ np.linalg.lstsq(F, left, rcond=None)[0]
-        assert 100 * np.linalg.norm(left) / np.linalg.norm(observation.Y) == pytest.approx(expected, abs=0.15)
+        assert 100 * np.linalg.norm(left) / np.linalg.norm(observation.Y) == pytest.approx(
+            expected, abs=0.15
+        )
 
 
 @campaign
 def test_errors_are_those_of_a_careful_identification(robot):
-    """README of the record: OLS 3.22 and 21.4 %, feasible 3.36 and 10.8, with the counterbalance 2.30 and 7.4, all rows 12.3 and 25.1."""
+    """README of the record: OLS 3.22 and 21.4 %, feasible 3.36 and 10.8, with the counterbalance
+    2.30 and 7.4, all rows 12.3 and 25.1.
+    """
     model, A, B = robot
     careful, default = (study_from_mapping(kr300.study(careful=own)) for own in (True, False))
     assert errors(model, A, B, default)[0] <= 12.3
@@ -65,45 +81,72 @@ def test_errors_are_those_of_a_careful_identification(robot):
     assert own <= 3.40 and other <= 10.8
     own, other, known = errors(model, balanced(A), balanced(B), careful, "feasible", bootstrap=0)
     assert own <= 2.30 and other <= 7.4
-    assert known.details["weight"] > plain.details["weight"]  # values count for more where the model is whole
+    assert (
+        known.details["weight"] > plain.details["weight"]
+    )  # values count for more where the model is whole
     assert "Values of the robot file as prior, euclidean" in known.message
 
 
 def test_a_mass_that_the_record_does_not_determine_is_told(robot, tmp_path):
-    """Without values: no motion of axis 1 tells the mass of link 1, and every physical robot within the range explains A as well."""
+    """Without values: no motion of axis 1 tells the mass of link 1, and every physical robot within
+    the range explains A as well.
+    """
     _, A, B = robot
     model, study = symgen.model(kr300.DATA / "kr300.yaml"), study_from_mapping(kr300.study())
     own, other, fit = errors(model, A, B, study, "feasible", bootstrap=0)
     assert own <= 3.36 and other <= 10.8 and fit.details["options"]["prior"] == "none"
     masses = fit.details["masses"]
     assert (
-        not any(mass["determined"] for mass in masses.values()) and "M1" in fit.message and "no values to use by themselves" in fit.message
+        not any(mass["determined"] for mass in masses.values())
+        and "M1" in fit.message
+        and "no values to use by themselves" in fit.message
     )
     assert masses["M1"]["lowest"] < 1 and masses["M2"]["highest"] > 2 * masses["M2"]["lowest"]
     bounded = estimate_of(
-        runtime.observe(model, A, study), EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": [800, 1600]}), model=model
+        runtime.observe(model, A, study),
+        EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": [800, 1600]}),
+        model=model,
     )
-    assert 800 - 1e-6 <= sum(bounded.details["standard"][f"M{j}"] for j in range(1, 7)) <= 1600 + 1e-6
+    assert (
+        800 - 1e-6 <= sum(bounded.details["standard"][f"M{j}"] for j in range(1, 7)) <= 1600 + 1e-6
+    )
     assert bounded.details["masses"]["M2"]["highest"] <= 1600
 
 
 @campaign
 def test_one_call_finds_the_best_treatment(robot):
-    """Judged on the same rows: the counterbalance known, then without rest, then all rows; the verdicts in that order."""
+    """Judged on the same rows: the counterbalance known, then without rest, then all rows; the
+    verdicts in that order.
+    """
     model, A, B = robot
     careful, default = (study_from_mapping(kr300.study(careful=own)) for own in (True, False))
     ranking = runtime.compare(
-        model, {"all rows": (default, A, B), "without rest": (careful, A, B), "counterbalance": (careful, balanced(A), balanced(B))}
+        model,
+        {
+            "all rows": (default, A, B),
+            "without rest": (careful, A, B),
+            "counterbalance": (careful, balanced(A), balanced(B)),
+        },
     )
     assert list(ranking.results) == ["counterbalance", "without rest", "all rows"]
     assert ranking.verdict.startswith("Predicts B best: counterbalance (feasible parameters, 58)")
     states = [result.checklist.state for result in ranking.results.values()]
     assert states == ["doubtful", "doubtful", "no"]
     best = ranking.best
-    assert best.model_columns == "feasible" and best.prediction_error < 4 and best.ranking.startswith("Predicts B best: feasible (58)")
+    assert (
+        best.model_columns == "feasible"
+        and best.prediction_error < 4
+        and best.ranking.startswith("Predicts B best: feasible (58)")
+    )
     assert "known torques subtracted: up to" in "".join(best.time_stamps)
     assert not best.homogeneity.agree and best.homogeneity.disagreements[0].record == "B"
     with pytest.raises(InputError, match="no validation record"):
         runtime.compare(model, {"a": (careful, A, ()), "b": (careful, A, B)})
     with pytest.raises(InputError, match=r"expected the same"):
-        runtime.compare(model, {"a": (careful, A, B), "b": (careful, A, replace(B, t=B.t[:-9], q=B.q[:-9], tau=B.tau[:-9]))})
+        runtime.compare(
+            model,
+            {
+                "a": (careful, A, B),
+                "b": (careful, A, replace(B, t=B.t[:-9], q=B.q[:-9], tau=B.tau[:-9])),
+            },
+        )

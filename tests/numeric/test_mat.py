@@ -1,4 +1,6 @@
-"""MATLAB files of every version: the same columns, what is no array refused by name, nothing followed out of the file."""
+"""MATLAB files of every version: the same columns, what is no array refused by name, nothing
+followed out of the file.
+"""
 
 import struct
 import zlib
@@ -38,7 +40,9 @@ def stacked(table, names):
 
 
 def matlab(archive, name, x, kind="double"):
-    """An array as MATLAB writes it: by columns, scalars and vectors with two dimensions, its class beside it."""
+    """An array as MATLAB writes it: by columns, scalars and vectors with two dimensions, its class
+    beside it.
+    """
     x = np.atleast_2d(x)
     archive.create_dataset(name, data=x.T).attrs["MATLAB_class"] = np.bytes_(kind)
 
@@ -73,7 +77,16 @@ def everything(archive):
 
 def test_version_73_reads_as_version_7(read_mat):
     stream = BytesIO()
-    scipy.io.savemat(stream, {"t": T[:, None], "row": T[None, :], "q": Q, "gain": 2.5, "counts": (1000 * Q).astype(np.int32)})
+    scipy.io.savemat(
+        stream,
+        {
+            "t": T[:, None],
+            "row": T[None, :],
+            "q": Q,
+            "gain": 2.5,
+            "counts": (1000 * Q).astype(np.int32),
+        },
+    )
     old, new = read_mat(stream.getvalue(), "a.mat"), read_mat(file_73(everything), "a.mat")
     for names in (["t", "q"], ["row"], ["counts"]):
         np.testing.assert_array_equal(stacked(new, names), stacked(old, names))
@@ -87,17 +100,26 @@ def test_version_73_reads_as_version_7(read_mat):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("cell", "a MATLAB cell"), ("log", "a MATLAB struct"), ("text", "a MATLAB char"), ("sparse", "a MATLAB sparse matrix")],
+    [
+        ("cell", "a MATLAB cell"),
+        ("log", "a MATLAB struct"),
+        ("text", "a MATLAB char"),
+        ("sparse", "a MATLAB sparse matrix"),
+    ],
 )
 def test_what_is_no_array_is_refused_by_name(read_mat, name, said):
     stream = BytesIO()
     cell = np.empty((1, 1), dtype=object)
     cell[0, 0] = T
-    scipy.io.savemat(stream, {"cell": cell, "log": {"x": T}, "text": "abc", "sparse": scipy.sparse.eye(3)})
+    scipy.io.savemat(
+        stream, {"cell": cell, "log": {"x": T}, "text": "abc", "sparse": scipy.sparse.eye(3)}
+    )
     for data in (stream.getvalue(), file_73(everything)):
         with pytest.raises(InputError) as e:
             stacked(read_mat(data, "a.mat"), [name])
-        assert f"column '{name}'" in str(e.value) and said.split()[-2 if "sparse" in name else -1] in str(e.value)
+        assert f"column '{name}'" in str(e.value) and said.split()[
+            -2 if "sparse" in name else -1
+        ] in str(e.value)
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -153,18 +175,36 @@ def test_links_are_not_followed(read_mat, tmp_path):
 def compressed(kind, content, zeros=0):
     """An element of version 7: zlib of an array whose numbers are `zeros` bytes of nothing."""
     packer = zlib.compressobj(1)
-    parts = [packer.compress(struct.pack("<II", 14, len(content) + 8 + zeros) + content + struct.pack("<II", kind, zeros))]
+    parts = [
+        packer.compress(
+            struct.pack("<II", 14, len(content) + 8 + zeros)
+            + content
+            + struct.pack("<II", kind, zeros)
+        )
+    ]
     parts += [packer.compress(bytes(2**20)) for _ in range(zeros // 2**20)]
     data = b"".join([*parts, packer.flush()])
-    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(data)) + data
+    return (
+        b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(data)) + data
+    )
 
 
 @campaign
 def test_bombs_are_refused(tmp_path):
-    """Of more than the limit from a few kilobytes: an array that is declared and never stored, and a compressed one."""
-    declared = file_73(lambda archive: archive.create_dataset("q", (10**12, 6), "f8", chunks=(1000, 6), compression="gzip"))
+    """Of more than the limit from a few kilobytes: an array that is declared and never stored, and
+    a compressed one.
+    """
+    declared = file_73(
+        lambda archive: archive.create_dataset(
+            "q", (10**12, 6), "f8", chunks=(1000, 6), compression="gzip"
+        )
+    )
     zeros = 500 * 2**20
-    head = struct.pack("<IIII", 6, 8, 6, 0) + struct.pack("<IIii", 5, 8, zeros // 8, 1) + struct.pack("<IIq", 1, 1, ord("q"))
+    head = (
+        struct.pack("<IIII", 6, 8, 6, 0)
+        + struct.pack("<IIii", 5, 8, zeros // 8, 1)
+        + struct.pack("<IIq", 1, 1, ord("q"))
+    )
     for data in (declared, compressed(9, head, zeros)):
         assert len(data) < 3_000_000
         (tmp_path / "a.mat").write_bytes(data)
@@ -176,19 +216,26 @@ def test_without_h5py(tmp_path, monkeypatch):
     (tmp_path / "h5py.py").write_text("raise ImportError")
     (tmp_path / "a.mat").write_bytes(file_73(everything))
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(InputError, match=r"a\.mat: a MATLAB file needs an optional library: pip install symgen\[tables\]"):
+    with pytest.raises(
+        InputError,
+        match=r"a\.mat: a MATLAB file needs an optional library: pip install symgen\[tables\]",
+    ):
         open_table(tmp_path / "a.mat")
 
 
 @campaign  # by default: tests/fuzz, format mat
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(st.data())
 def test_damaged_files_are_named(tmp_path, data):
     """Cut short or with 8 bytes changed: numbers or an InputError."""
     stream = BytesIO()
     scipy.io.savemat(stream, {"q": Q, "x": {"y": T}}, do_compression=True)
     for whole in (stream.getvalue(), file_73(lambda archive: matlab(archive, "q", Q))):
-        spoiled = bytearray(whole[: data.draw(st.integers(0, len(whole)))] if data.draw(st.booleans()) else whole)
+        spoiled = bytearray(
+            whole[: data.draw(st.integers(0, len(whole)))] if data.draw(st.booleans()) else whole
+        )
         if spoiled:
             place = data.draw(st.integers(0, len(spoiled) - 1))
             spoiled[place : place + 8] = data.draw(st.binary(min_size=8, max_size=8))

@@ -1,4 +1,6 @@
-"""Normal equations by joint: the digits they keep, against least squares in extended precision; blocks change nothing."""
+"""Normal equations by joint: the digits they keep, against least squares in extended precision;
+blocks change nothing.
+"""
 
 from functools import lru_cache
 from pathlib import Path
@@ -6,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators.normal_equations import LIMIT, least_squares, normal, triangular
+from runtime.estimators.normal_equations import least_squares, normal, triangular
 from runtime.estimators.solution import solve
+from runtime.limits import LIMIT
 from runtime.model.generated import load_model
 
 N = 2003  # no multiple of a block
@@ -20,7 +23,9 @@ def model():
 
 @lru_cache
 def states(swing):
-    """q, qd, qdd, tau of a TX40 that swings slowly with the given amplitude, rad, with torque noise of 0.05 N m."""
+    """q, qd, qdd, tau of a TX40 that swings slowly with the given amplitude, rad, with torque noise
+    of 0.05 N m.
+    """
     rng = np.random.default_rng(1)
     t = np.linspace(0, 10, N)[:, None]
     q, qd, qdd = np.zeros((3, N, 6))
@@ -35,7 +40,9 @@ def states(swing):
 
 @lru_cache
 def extended(swing):
-    """Least squares by refinement with residuals in extended precision, from the triangular factor; kappa of W with unit columns; W, Y."""
+    """Least squares by refinement with residuals in extended precision, from the triangular factor;
+    kappa of W with unit columns; W, Y.
+    """
     q, qd, qdd, tau = states(swing)
     W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
     D = np.linalg.norm(W, axis=0)
@@ -75,16 +82,23 @@ def solved(given, **how):
     return least_squares(lambda: given, columns(), 60, **how)
 
 
-@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision on this machine")
+@pytest.mark.skipif(
+    np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision on this machine"
+)
 @pytest.mark.parametrize("swing", [3.0, 0.3, 0.1, 0.03])
 def test_digits_by_condition_number(swing):
-    """The table of the theory note (section 5): normal equations lose kappa^2 eps, one refinement gives the digits of QR back up to kappa 1e5."""
+    """The table of the theory note (section 5): normal equations lose kappa^2 eps, one refinement
+    gives the digits of QR back up to kappa 1e5.
+    """
     _, kappa, W, Y = extended(swing)
     eps = np.finfo(float).eps
     plain, once, twice = (solved(blocks(swing), refinements=k, limit=np.inf) for k in (0, 1, 2))
     by_lstsq = error(np.linalg.lstsq(W, Y, rcond=None)[0], swing)
     by_factor = error(solve(triangular(blocks(swing), columns(), model().BASE_PARAMETERS)).X, swing)
-    print(f"kappa {kappa:.1e}: lstsq {by_lstsq:.1e} factor {by_factor:.1e}", *(f"{error(x.X, swing):.1e}" for x in (plain, once, twice)))
+    print(
+        f"kappa {kappa:.1e}: lstsq {by_lstsq:.1e} factor {by_factor:.1e}",
+        *(f"{error(x.X, swing):.1e}" for x in (plain, once, twice)),
+    )
     assert error(plain.X, swing) < 10 * kappa**2 * eps
     assert error(once.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 2, 1e-14)
     assert error(twice.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 3, 1e-14)
@@ -117,7 +131,7 @@ def test_residual_norms_of_an_exact_fit():
 
 def test_ill_conditioned_rows_go_to_the_triangular_factor():
     found = solved(blocks(0.1))
-    assert found.method == "triangular factor" and found.kappa > LIMIT
+    assert found.method == "triangular factor" and found.kappa > LIMIT.NORMAL_EQUATIONS
     assert error(found.X, 0.1) < 1e-9
 
 
@@ -135,9 +149,16 @@ def test_factor_and_equations_have_the_gram_matrix_of_the_rows():
     q, qd, qdd, tau = states(3.0)
     whole = np.column_stack([model().observation_matrix(q, qd, qdd), tau.T.ravel()])
     rows = blocks(3.0, 333)
-    equations, factor = normal(rows, columns(), 60), triangular(rows, columns(), model().BASE_PARAMETERS)
+    equations, factor = (
+        normal(rows, columns(), 60),
+        triangular(rows, columns(), model().BASE_PARAMETERS),
+    )
     scale = np.outer(*2 * [np.linalg.norm(whole, axis=0)])
-    np.testing.assert_allclose(equations.A / scale[:60, :60], (whole.T @ whole / scale)[:60, :60], atol=1e-13)
-    np.testing.assert_allclose(equations.g / scale[:60, 60], (whole.T @ whole / scale)[:60, 60], atol=1e-13)
+    np.testing.assert_allclose(
+        equations.A / scale[:60, :60], (whole.T @ whole / scale)[:60, :60], atol=1e-13
+    )
+    np.testing.assert_allclose(
+        equations.g / scale[:60, 60], (whole.T @ whole / scale)[:60, 60], atol=1e-13
+    )
     np.testing.assert_allclose(factor.R.T @ factor.R / scale, whole.T @ whole / scale, atol=1e-13)
     assert factor.rows == 6 * N

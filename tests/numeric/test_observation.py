@@ -1,4 +1,6 @@
-"""The observed system: equal to the plain recipe, row bookkeeping, the steps that a resolution study repeats, several records as one."""
+"""The observed system: equal to the plain recipe, row bookkeeping, the steps that a resolution
+study repeats, several records as one.
+"""
 
 import ast
 import dataclasses
@@ -16,12 +18,19 @@ from runtime import Record, essential, estimate, load_model, observe
 from runtime.errors import InputError
 from runtime.identification.uncertainty import block_bootstrap
 from runtime.identification.validation import weak_directions
-from runtime.observation.filters import States, decimated, filtered_states
-from runtime.observation.observation import decimated_torque, observation_from_states, select_rows, stack
-from runtime.observation.qr_factor import factor
-from runtime.observation.regressor_signals import DecimatedSignals, decimated_columns, distinct_entries
+from runtime.records.record import Origin
 from runtime.records.stream import RecordStream
+from runtime.rows.factor import factor
+from runtime.rows.observation import stack
+from runtime.rows.prepared import decimated_torque, observation_from_states
+from runtime.rows.regressor import (
+    DecimatedSignals,
+    decimated_columns,
+    distinct_entries,
+)
+from runtime.rows.selection import select_rows
 from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
+from runtime.signals.filters import States, decimated, filtered_states
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE
@@ -34,11 +43,20 @@ def study(**sections):
 @pytest.fixture(scope="module")
 def record():
     q, qd, qdd = motion(T)
-    return Record(T, q, planar.regressor(q, qd, qdd) @ TRUE, rate=RATE, name="arm", files={"arm.csv": "ab" * 32})
+    return Record(
+        T,
+        q,
+        planar.regressor(q, qd, qdd) @ TRUE,
+        rate=RATE,
+        name="arm",
+        origin=Origin({"arm.csv": "ab" * 32}),
+    )
 
 
 def test_noise_free_data_return_the_parameters(record):
-    """1e-3: the low-pass at 50 Hz rounds sign(qd) and the derivatives are differences; both are errors of the method, not of the code."""
+    """1e-3: the low-pass at 50 Hz rounds sign(qd) and the derivatives are differences; both are
+    errors of the method, not of the code.
+    """
     o = observe(planar, record, study())
     X = np.linalg.lstsq(o.W, o.Y, rcond=None)[0]
     np.testing.assert_allclose(X, TRUE, rtol=1e-3, atol=1e-3)
@@ -53,7 +71,9 @@ def test_plain_recipe(record):
     W = scipy.signal.decimate(W, 8, zero_phase=True, axis=1)  # eq. (13): 0.8*1000/(2*50)
     assert o.W.shape == (2 * 750, 10) and o.rate == 125
     np.testing.assert_allclose(o.W, W.reshape(1500, -1), atol=1e-9)
-    np.testing.assert_allclose(o.Y.reshape(2, -1), scipy.signal.decimate(record.tau.T, 8, zero_phase=True), atol=1e-9)
+    np.testing.assert_allclose(
+        o.Y.reshape(2, -1), scipy.signal.decimate(record.tau.T, 8, zero_phase=True), atol=1e-9
+    )
     np.testing.assert_allclose(o.t[:750], T[::8])
     assert o.W.flags.f_contiguous
 
@@ -64,7 +84,8 @@ def test_a_spike_of_a_torque_is_no_measurement(record):
     tau[3000, 1] += 1e3
     spiked = Record(T, record.q, tau, rate=RATE)
     difference = [
-        np.abs(observe(planar, spiked, s).Y - observe(planar, record, s).Y).max() for s in (study(signals={"median": 3}), study())
+        np.abs(observe(planar, spiked, s).Y - observe(planar, record, s).Y).max()
+        for s in (study(signals={"median": 3}), study())
     ]
     assert difference[0] < 1e-2 * np.abs(record.tau).max() and difference[1] > 10
 
@@ -94,7 +115,11 @@ def test_opposite_and_constant_signals():
 
     structure = np.array([[1, 1], [1, 0], [0, 1], [1, 0]], dtype=bool)
     model = types.SimpleNamespace(
-        JOINTS=(1, 2), BASE_PARAMETERS=tuple("ABCD"), STRUCTURE=structure, store=lambda N: np.zeros((4, 2, N)), regressor=regressor
+        JOINTS=(1, 2),
+        BASE_PARAMETERS=tuple("ABCD"),
+        STRUCTURE=structure,
+        store=lambda N: np.zeros((4, 2, N)),
+        regressor=regressor,
     )
     entries = distinct_entries(model, {})
     assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
@@ -106,7 +131,9 @@ def test_opposite_and_constant_signals():
 
 
 def test_states_out_of_reach_are_not_merged():
-    """A loop that does not close at the random states gives nan there: every entry then stands for itself."""
+    """A loop that does not close at the random states gives nan there: every entry then stands for
+    itself.
+    """
 
     def regressor(q, qd, qdd, *, out=None):
         S = np.zeros((2, 1, len(q))) if out is None else out
@@ -131,18 +158,25 @@ def test_loops_that_do_not_close_at_random_states():
 
 
 def test_signals_are_those_found_over_a_finite_field():
-    """ENTRIES of the array target, derived exactly: the numbers find the same signals; constants are one signal there as here."""
+    """ENTRIES of the array target, derived exactly: the numbers find the same signals; constants
+    are one signal there as here.
+    """
     folder = Path(__file__).parents[2] / "generated"
     table = next(
-        n.value for n in ast.parse((folder / "tx40_xp.py").read_text()).body if isinstance(n, ast.Assign) and n.targets[0].id == "ENTRIES"
+        n.value
+        for n in ast.parse((folder / "tx40_xp.py").read_text()).body
+        if isinstance(n, ast.Assign) and n.targets[0].id == "ENTRIES"
     )
     exact = {(k, j): (s, c) for k, j, s, c in ast.literal_eval(table)}
-    e = distinct_entries(load_model(folder / "tx40.py"), {})
+    e = distinct_entries(load_model(folder / "tx40.py", trust=True), {})
     assert set(exact) == set(zip(e.k.tolist(), e.j.tolist(), strict=True))
     pairs = {
-        (w, *exact[k, j][:1], s * exact[k, j][1]) for k, j, w, s in zip(e.k.tolist(), e.j.tolist(), e.which.tolist(), e.sign, strict=True)
+        (w, *exact[k, j][:1], s * exact[k, j][1])
+        for k, j, w, s in zip(e.k.tolist(), e.j.tolist(), e.which.tolist(), e.sign, strict=True)
     }
-    assert len(pairs) == len(e.source) == len({s for s, _ in exact.values()})  # one to one, the sign of each signal apart
+    assert (
+        len(pairs) == len(e.source) == len({s for s, _ in exact.values()})
+    )  # one to one, the sign of each signal apart
 
 
 def test_blocks_equal_the_whole(record):
@@ -150,7 +184,8 @@ def test_blocks_equal_the_whole(record):
     states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
     np.testing.assert_array_equal(
-        DecimatedSignals(planar, entries, {}, None)(states), D[entries.k[entries.source], entries.j[entries.source]]
+        DecimatedSignals(planar, entries, {}, None)(states),
+        D[entries.k[entries.source], entries.j[entries.source]],
     )
 
 
@@ -180,7 +215,12 @@ def test_mask_of_samples_and_joints(record):
 def test_settings_are_written_in_full(record):
     o = observe(planar, record, study())
     assert o.settings["factor"] == 8
-    assert o.settings["signals"]["lowpass"] == {"cutoff": 50.0, "order": 4, "on": ["q", "qd"], "padding": "matlab"}
+    assert o.settings["signals"]["lowpass"] == {
+        "cutoff": 50.0,
+        "order": 4,
+        "on": ["q", "qd"],
+        "padding": "matlab",
+    }
     assert o.settings["rows"] == {"window": [None, None], "trim": 3, "low_speed": 0.0}
     assert o.files == {"arm.csv": "ab" * 32}
 
@@ -196,7 +236,9 @@ def test_steps_of_a_resolution_study(record):
     np.testing.assert_array_equal(same.W, whole.W)
     np.testing.assert_array_equal(same.Y, whole.Y)
     noise = 1e-3 * np.random.default_rng(1).choice([-1, 1], size=record.q.shape)
-    noisy = observation_from_states(planar, filtered_states(record.q + noise, RATE, s.signals), torque, selection)
+    noisy = observation_from_states(
+        planar, filtered_states(record.q + noise, RATE, s.signals), torque, selection
+    )
     np.testing.assert_array_equal(noisy.Y, whole.Y)
     assert noisy.rows == whole.rows and not np.allclose(noisy.W, whole.W, atol=1e-6)
 
@@ -209,19 +251,26 @@ def test_constants_in_place_of_the_robot_file(record):
 def test_wanted_columns_alone(record):
     names = ["FS2", "ZZ2", "ZZ1R"]
     some, every = observe(planar, record, study(), columns=names), observe(planar, record, study())
-    np.testing.assert_allclose(some.W, every.columns(names).W, rtol=0, atol=1e-13 * np.abs(every.W).max())  # sums in another order
+    np.testing.assert_allclose(
+        some.W, every.columns(names).W, rtol=0, atol=1e-13 * np.abs(every.W).max()
+    )  # sums in another order
     assert some.names == tuple(names)
     with pytest.raises(InputError, match="no column FV9"):
         observe(planar, record, study(), columns=["FV9"])
 
 
 def test_no_filters_at_all(record):
-    o = observe(planar, record, study(signals={"median": 1, "lowpass": None, "decimate": None}, rows={"trim": 0}))
+    o = observe(
+        planar,
+        record,
+        study(signals={"median": 1, "lowpass": None, "decimate": None}, rows={"trim": 0}),
+    )
     np.testing.assert_array_equal(o.Y, record.tau.T.ravel())
     assert o.W.shape == (2 * N, 10)
 
 
-# --- selecting and stacking -------------------------------------------------------------------------------------------
+# --- selecting and stacking
+# -------------------------------------------------------------------------------------------
 
 
 def test_columns_and_windows(record):
@@ -230,7 +279,9 @@ def test_columns_and_windows(record):
     np.testing.assert_array_equal(some.W, o.W[:, [8, 0]])
     first, second = o.between(None, 3.0), o.between(np.nextafter(3.0, 4), None)
     assert tuple(np.add(first.rows, second.rows)) == o.rows
-    np.testing.assert_array_equal(np.concatenate([first.Y[first.joint(1)], second.Y[second.joint(1)]]), o.Y[o.joint(1)])
+    np.testing.assert_array_equal(
+        np.concatenate([first.Y[first.joint(1)], second.Y[second.joint(1)]]), o.Y[o.joint(1)]
+    )
     with pytest.raises(InputError, match="no column FV9; there are ZZ1R"):
         o.columns(["FV9"])
     with pytest.raises(InputError, match=r"no row in \[100, 200\] s"):
@@ -239,10 +290,19 @@ def test_columns_and_windows(record):
 
 def test_records_and_streams_in_one_list_are_all_read(record):
     s = study(rows={"low_speed": 0.2})
-    both, alone = observe(planar, [record, RecordStream(record, 500)], s), observe(planar, record, s)
-    assert both.rows == tuple(2 * k for k in alone.rows) and set(both.record) == {0, 1} and both.reduced is None
+    both, alone = (
+        observe(planar, [record, RecordStream(record, 500)], s),
+        observe(planar, record, s),
+    )
+    assert (
+        both.rows == tuple(2 * k for k in alone.rows)
+        and set(both.record) == {0, 1}
+        and both.reduced is None
+    )
     for k in range(2):
-        np.testing.assert_allclose(both.of_record(k).W, alone.W, rtol=0, atol=1e-10 * np.abs(alone.W).max())
+        np.testing.assert_allclose(
+            both.of_record(k).W, alone.W, rtol=0, atol=1e-10 * np.abs(alone.W).max()
+        )
     assert np.array_equal(observe(planar, [record, record], s).W, stack([alone, alone]).W)
     with pytest.raises(InputError, match="no record"):
         observe(planar, [], s)
@@ -253,13 +313,17 @@ def test_records_and_streams_in_one_list_are_all_read(record):
 def test_rows_are_factored_once(record, monkeypatch):
     """Estimates, essential parameters and deviations read one factor."""
     calls = []
-    monkeypatch.setattr("runtime.observation.system.factor", lambda *given: calls.append(1) or factor(*given))
+    monkeypatch.setattr(
+        "runtime.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
+    )
     o = observe(planar, record, study())
     fits = estimate(planar, o), essential(planar, o)
     weak_directions(o)
     block_bootstrap(o, EstimateSettings(), fits[1].estimate)
     assert len(calls) == 1 and fits[1].all_parameters.names == fits[0].names
-    assert np.array_equal(fits[1].all_parameters.X, fits[0].X) and np.array_equal(estimate(planar, record, study()).X, fits[0].X)
+    assert np.array_equal(fits[1].all_parameters.X, fits[0].X) and np.array_equal(
+        estimate(planar, record, study()).X, fits[0].X
+    )
 
 
 def test_stack_is_joint_major(record):
@@ -267,11 +331,17 @@ def test_stack_is_joint_major(record):
     b = observe(planar, record, study(rows={"window": [3.0, 6.0]}))
     o = stack([a, b, b])
     assert o.rows == tuple(np.add(a.rows, np.add(b.rows, b.rows)))
-    np.testing.assert_array_equal(o.W[o.joint(1)], np.vstack([a.W[a.joint(1)], b.W[b.joint(1)], b.W[b.joint(1)]]))
+    np.testing.assert_array_equal(
+        o.W[o.joint(1)], np.vstack([a.W[a.joint(1)], b.W[b.joint(1)], b.W[b.joint(1)]])
+    )
     np.testing.assert_array_equal(o.W[o.record == 1], b.W)
     assert sorted(set(o.record)) == [0, 1, 2]
     assert o.dropped["trim"] == (18, 18)
-    assert [s["rows"]["window"] for s in o.settings["records"]] == [[0.0, 2.0], [3.0, 6.0], [3.0, 6.0]]
+    assert [s["rows"]["window"] for s in o.settings["records"]] == [
+        [0.0, 2.0],
+        [3.0, 6.0],
+        [3.0, 6.0],
+    ]
     assert stack([a]).W.shape == a.W.shape and "records" not in stack([b, b]).settings
     nested = stack([stack([a, b]), b])
     np.testing.assert_array_equal(nested.record[nested.joint(0)], o.record[o.joint(0)])
@@ -292,13 +362,17 @@ def test_stack_refuses(record):
         stack([a, a.columns(["FV1"])])
 
 
-# --- refusals ---------------------------------------------------------------------------------------------------------
+# --- refusals
+# ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("sections", "said"),
     [
-        ({"rows": {"window": [10, 20]}}, "no sample in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s"),
+        (
+            {"rows": {"window": [10, 20]}},
+            "no sample in rows.window [10.0, 20.0] s; the record spans [0, 5.999] s",
+        ),
         ({"rows": {"window": [0, 0.02], "trim": 0}}, "needs more than 27"),
         ({"rows": {"trim": 400}}, "rows.trim leaves out 800"),
         ({"rows": {"low_speed": 100}}, "rows per joint is used: rows.trim leaves out"),

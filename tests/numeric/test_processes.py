@@ -23,7 +23,12 @@ def threads(context, key):
         mark.touch()
     while mark and not mark.exists():
         time.sleep(0.01)
-    return key, context["offset"] + key, os.getpid(), [os.environ.get(name) for name in BLAS_THREADS]
+    return (
+        key,
+        context["offset"] + key,
+        os.getpid(),
+        [os.environ.get(name) for name in BLAS_THREADS],
+    )
 
 
 def failing(context, key):
@@ -87,7 +92,12 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(code)
     here = os.pathsep.join(str(Path(__file__).parents[k]) for k in range(3))
-    process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": here})
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": here},
+    )
     worker = int(process.stdout.readline())
     process.kill()
     process.communicate()
@@ -124,7 +134,9 @@ def test_results_in_the_order_of_the_keys():
 def test_here_in_order():
     own = {"offset": 10, "own": os.getpid()}
     for workers in (0, 1):
-        assert [r[:3] for r in results(threads, own, range(4), workers)] == [(k, 10 + k, os.getpid()) for k in range(4)]
+        assert [r[:3] for r in results(threads, own, range(4), workers)] == [
+            (k, 10 + k, os.getpid()) for k in range(4)
+        ]
 
 
 def test_here_and_elsewhere_with_one_blas_thread(tmp_path):

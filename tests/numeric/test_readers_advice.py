@@ -1,4 +1,6 @@
-"""Advice on real encoders, read as positions and as counts, on a simulated record of the planar arm."""
+"""Advice on real encoders, read as positions and as counts, on a simulated record of the planar
+arm.
+"""
 
 from dataclasses import replace
 
@@ -6,13 +8,15 @@ import numpy as np
 from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
-from runtime.observation.filters import filtered_states
+from runtime.limits import LIMIT
 from runtime.reporting.resolution_advice import advice_section
 from runtime.resolution.advice import crossing
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
-from runtime.resolution.readers import RATIO, RealEncoders, curves
+from runtime.resolution.readers import RealEncoders, curves
+from runtime.rows.prepared import prepared
 from runtime.settings.study import CestacSettings, Rows, Study
+from runtime.signals.filters import filtered_states
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
 STUDY = Study(
@@ -26,17 +30,24 @@ PART = replace(RECORD, t=RECORD.t[:2500], q=RECORD.q[:2500], tau=RECORD.tau[:250
 
 
 def test_quadrature_over_the_phase_is_the_mean_of_cestac():
-    """Against 60 runs of CESTAC, three deviations of their mean, 20 % (10 % of Delta) and 0.3; for one encoder of two alike."""
+    """Against 60 runs of CESTAC, three deviations of their mean, 20 % (10 % of Delta) and 0.3; for
+    one encoder of two alike.
+    """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
-    real = RealEncoders(planar, [RECORD], STUDY, NAMES, None, {}, "lowpass")
+    real = RealEncoders(
+        planar, [prepared(planar, RECORD, STUDY)], STUDY, NAMES, None, {}, "lowpass"
+    )
     change = real.asked(STEP)
     level = found.levels[0]
     sampled = 100 * (level.mean / found.reference.X - 1)
     assert np.allclose(real.reference, found.reference.X, rtol=1e-9)
-    assert np.all(np.abs(change - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3)
+    assert np.all(
+        np.abs(change - sampled) < 3 * level.half_width_percent / 2 + 0.2 * np.abs(sampled) + 0.3
+    )
     alone = real.sampled((1,), STEP, 40)
     assert np.all(
-        np.abs(real.change(real.nodes(STEP, (0, 1)), (1,))[0] - alone.change) < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3
+        np.abs(real.change(real.nodes(STEP, (0, 1)), (1,))[0] - alone.change)
+        < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3
     )
 
 
@@ -44,13 +55,22 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
 def test_steps_by_both_readers():
     advice = advise(planar, RECORD, STUDY, encoders=("all", "2"))
     positions, counts = advice.real
-    assert (positions.reader, counts.reader) == ("lowpass", "counts") and advice.encoders is positions.encoders
+    assert (positions.reader, counts.reader) == (
+        "lowpass",
+        "counts",
+    ) and advice.encoders is positions.encoders
     assert [encoder.label for encoder in counts.encoders] == ["all", "2"]
     coarse = [reader.encoders[0].limits[1].delta for reader in advice.real]
     assert coarse[1] > 3 * coarse[0]
     for limit in positions.encoders[0].limits:
-        assert limit.sampled is not None and abs(limit.error / limit.percent - 1) < 0.4 + limit.half_width / limit.percent
-    assert advice.real[0].encoders[0].limits[0].delta <= min(encoder.limits[0].delta for encoder in positions.encoders[1:]) * 1.05
+        assert (
+            limit.sampled is not None
+            and abs(limit.error / limit.percent - 1) < 0.4 + limit.half_width / limit.percent
+        )
+    assert (
+        advice.real[0].encoders[0].limits[0].delta
+        <= min(encoder.limits[0].delta for encoder in positions.encoders[1:]) * 1.05
+    )
 
 
 def test_side_by_side_in_words():
@@ -62,12 +82,18 @@ def test_side_by_side_in_words():
         asked=(STEP, 10.0),
     )
     text = str(advice)
-    assert "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
+    assert (
+        "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
+    )
     assert "Real encoders read as counts: With every encoder alike" in advice.verdict
-    assert set(advice_section(advice).tables[0].header) >= {"encoder", "positions, 5 %", "counts, 1 %"}
+    assert set(advice_section(advice).tables[0].header) >= {
+        "encoder",
+        "positions, 5 %",
+        "counts, 1 %",
+    }
     assert '"real"' in advice.to_json()
     delta = advice.encoders[0].delta
-    assert np.allclose(delta[1:] / delta[:-1], RATIO)  # nothing locks
+    assert np.allclose(delta[1:] / delta[:-1], LIMIT.READER_RATIO)  # nothing locks
     name, e = advice.worst(0)
     assert (
         f"read as positions: largest predicted change {e:.2f} % ({name})" in text
@@ -76,23 +102,40 @@ def test_side_by_side_in_words():
 
 
 def test_no_step_is_advised_where_no_parameter_is_determined():
-    advice = advise(planar, PART, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,))
+    advice = advise(
+        planar, PART, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,)
+    )
     assert not advice.deciding and not advice.negative
-    assert "read as counts: no parameter has a %sigma of at most 10 %" in advice.verdict and "no step makes" not in advice.verdict
+    assert (
+        "read as counts: no parameter has a %sigma of at most 10 %" in advice.verdict
+        and "no step makes" not in advice.verdict
+    )
     assert "not judged on this record" in str(advice) and not advice_section(advice).images
 
 
 def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
-    """Joint 1 to and fro at 2 rad/s: at 2 mrad a sample of 1 ms is one step, and the error of its counts stands still."""
+    """Joint 1 to and fro at 2 rad/s: at 2 mrad a sample of 1 ms is one step, and the error of its
+    counts stands still.
+    """
     triangle = np.abs((RECORD.t * 2 / 3) % 2 - 1) * 3
-    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(triangle))  # else its positions would lie on a lattice of 2 mrad themselves
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(
+        len(triangle)
+    )  # else its positions would lie on a lattice of 2 mrad themselves
     q = np.column_stack([triangle + noise, RECORD.q[:, 1]])
     states = filtered_states(q, RECORD.rate, STUDY.signals)
-    record = replace(RECORD, q=q, tau=planar.inverse_dynamics(states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)))
-    real = RealEncoders(planar, [record], STUDY, NAMES, None, {}, "lowpass")
+    record = replace(
+        RECORD,
+        q=q,
+        tau=planar.inverse_dynamics(
+            states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)
+        ),
+    )
+    real = RealEncoders(
+        planar, [prepared(planar, record, STUDY)], STUDY, NAMES, None, {}, "lowpass"
+    )
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
-    monkeypatch.setattr("runtime.resolution.readers.UP", 2)
+    monkeypatch.setattr(LIMIT, "READER_UP", 2)
     delta, _ = curves(real, {"1": (0,)}, 1.7e-3, [0])["1"]
     ratio = delta[1:] / delta[:-1]
     near = (delta[1:] > 1.9e-3) & (delta[:-1] < 2.1e-3)
@@ -100,7 +143,9 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
 
 
 class Scattered:
-    """A change of e = step % whose mean over few phases is one deviation too large, 1.6 % of one phase; encoder 2 rests."""
+    """A change of e = step % whose mean over few phases is one deviation too large, 1.6 % of one
+    phase; encoder 2 rests.
+    """
 
     reader, names, finest, coarsest = "counts", ("FV1",), 0.1, np.array([1e3, np.inf])
 
@@ -116,13 +161,20 @@ class Scattered:
 def test_more_phases_at_the_steps_beside_a_limit():
     delta, change = curves(Scattered(), {"all": (0, 1)}, 1.0, [0])["all"]
     e, deviation = np.abs(change[:, 0, 0]), dict(zip(delta, change[:, 1, 0], strict=True))
-    assert deviation[1.5] == deviation[2.25] == 0.8 and max(deviation[delta[delta < 1].max()], deviation[1.0]) < 0.3
-    assert 0.6 < crossing(delta, e, 1.0) < 1 and 4.4 < crossing(delta, e, 5.0) < 5  # 0.2 and 4.2 by the few
+    assert (
+        deviation[1.5] == deviation[2.25] == 0.8
+        and max(deviation[delta[delta < 1].max()], deviation[1.0]) < 0.3
+    )
+    assert (
+        0.6 < crossing(delta, e, 1.0) < 1 and 4.4 < crossing(delta, e, 5.0) < 5
+    )  # 0.2 and 4.2 by the few
 
 
 def test_a_record_that_is_coarse_itself_sets_the_finest_step():
     d = 1e-3
     coarse = replace(PART, q=d * np.round(PART.q / d))
-    found = advise(planar, coarse, replace(STUDY, rows=Rows(trim=5)), encoders=("2",), confirm=False)
+    found = advise(
+        planar, coarse, replace(STUDY, rows=Rows(trim=5)), encoders=("2",), confirm=False
+    )
     steps = [delta for reader in found.real for delta in reader.encoders[0].delta]
     assert steps and min(steps) >= 5 * d * (1 - 1e-9)

@@ -1,9 +1,11 @@
-"""Records and the reading of them: units and sides explicit, every bad input named with file, column and line."""
+"""Records and the reading of them: units and sides explicit, every bad input named with file,
+column and line.
+"""
 
 import gzip
 import hashlib
 from copy import copy
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +18,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.model.drives import Drives
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import open_stream
+from runtime.records.record import Origin
 from runtime.settings.study import RecordSettings, study_from_mapping
 
 N, RATE = 60, 200.0
@@ -26,7 +29,11 @@ TAU = np.stack([T, T**2], axis=1)
 
 def robot(drives):
     """A model with these drives."""
-    given = {"ratio": drives.ratio, "offset": drives.offset, "torque_constant": drives.torque_constant}
+    given = {
+        "ratio": drives.ratio,
+        "offset": drives.offset,
+        "torque_constant": drives.torque_constant,
+    }
     return SimpleNamespace(NAME="arm", JOINTS=tuple(range(drives.n)), DRIVES=given)
 
 
@@ -36,7 +43,10 @@ def settings(**record):
 
 def write_csv(path, header="t,q1,q2,tau1,tau2", rows=None, delimiter=","):
     rows = np.column_stack([T, Q, TAU]) if rows is None else rows
-    lines = [delimiter.join(format(x, ".17g") if not isinstance(x, str) else x for x in row) for row in rows]
+    lines = [
+        delimiter.join(format(x, ".17g") if not isinstance(x, str) else x for x in row)
+        for row in rows
+    ]
     text = "\n".join(([header] if header else []) + lines) + "\n"
     path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
     return path
@@ -53,7 +63,8 @@ def cells():
     return [list(row) for row in np.column_stack([T, Q, TAU])]
 
 
-# --- the record itself ------------------------------------------------------------------------------------------------
+# --- the record itself
+# ------------------------------------------------------------------------------------------------
 
 
 def test_record_is_a_read_only_copy():
@@ -112,7 +123,11 @@ def late(t):
         (
             T + 0.5 * (np.arange(N) >= 30),
             None,
-            "59 samples in 0.29 s, 1 pause aside, are 200 Hz, 1/median step is 200 Hz. Remedy: one Record for each piece",
+            (
+                "59 samples in 0.29 s, 1 pause aside, are 200 Hz, 1/median step is 200 Hz. Remedy: "
+                "one "
+                "Record for each piece"
+            ),
         ),
         (
             T + np.random.default_rng(0).uniform(-0.4, 0.4, N) / RATE,
@@ -129,20 +144,59 @@ def test_stamps_that_are_no_clock_are_refused(t, rate, said):
 
 
 def test_jitter_is_allowed_where_it_is_said():
-    assert Record(late(T), Q, TAU, jitter=0.4).rate == pytest.approx(RATE, rel=1e-2)
-    (jittered,) = (replace(Record(late(T), Q, TAU, jitter=0.4), name="again"),)
-    assert jittered.jitter == 0.4
+    jittered = Record(late(T), Q, TAU, origin=Origin(jitter=0.4))
+    assert jittered.rate == pytest.approx(RATE, rel=1e-2)
+    assert replace(jittered, name="again").origin.jitter == 0.4
 
 
-# --- names ------------------------------------------------------------------------------------------------------------
+def test_a_changed_record_loses_no_field():
+    """At most ten fields, and each of them is there after `replace`."""
+    drives = Drives(np.diag([10.0, 20.0]), np.zeros(2), np.ones(2), "none")
+    record = Record(
+        T,
+        Q,
+        TAU,
+        rate=RATE,
+        name="run",
+        q_r=Q + 1,
+        tau_ff=TAU + 1,
+        tau_known=TAU / 2,
+        missing=np.arange(len(T) * 2).reshape(-1, 2) % 7 == 0,
+        origin=Origin({"a.csv": "00"}, "regular", 0.3, drives),
+    )
+    assert len(fields(Record)) <= 10
+    np.testing.assert_array_equal(record.torque, TAU / 2)
+    for field in fields(Record):
+        same = replace(record, **{field.name: getattr(record, field.name)})
+        for other in fields(Record):
+            before, after = getattr(record, other.name), getattr(same, other.name)
+            if isinstance(before, np.ndarray):
+                np.testing.assert_array_equal(before, after)
+            else:
+                assert before is after or before == after, (field.name, other.name)
+    moved = replace(record, q=Q + 0.5)
+    np.testing.assert_array_equal(moved.torque, TAU / 2)
+    assert moved.subtracted == record.subtracted != ""
+
+
+# --- names
+# ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("files", "names", "keys"),
     [
         (["log.1.csv", "log.2.csv"], ["log.1", "log.2"], ["log.1.csv", "log.2.csv"]),
-        (["day1/run.csv", "day2/run.csv"], ["day1/run", "day2/run"], ["day1/run.csv", "day2/run.csv"]),
-        (["a/x/run.csv", "b/x/run.csv", "c.csv"], ["a/x/run", "b/x/run", "c"], ["a/x/run.csv", "b/x/run.csv", "c.csv"]),
+        (
+            ["day1/run.csv", "day2/run.csv"],
+            ["day1/run", "day2/run"],
+            ["day1/run.csv", "day2/run.csv"],
+        ),
+        (
+            ["a/x/run.csv", "b/x/run.csv", "c.csv"],
+            ["a/x/run", "b/x/run", "c"],
+            ["a/x/run.csv", "b/x/run.csv", "c.csv"],
+        ),
         (["run.csv", "run.csv"], ["run", "run (2)"], ["run.csv", "run.csv"]),
     ],
 )
@@ -171,10 +225,15 @@ def test_errors_name_the_file(tmp_path):
         with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record has at least 10"):
             read(settings(files="short.csv"), folder=tmp_path)
         with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
-            read(settings(files="run.csv"), SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None), folder=tmp_path)
+            read(
+                settings(files="run.csv"),
+                SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None),
+                folder=tmp_path,
+            )
 
 
-# --- by a path alone --------------------------------------------------------------------------------------------------
+# --- by a path alone
+# --------------------------------------------------------------------------------------------------
 
 
 def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, emps_data, tx40_data):
@@ -190,18 +249,27 @@ def test_a_file_a_study_and_a_dataset_are_read_by_name(tmp_path, monkeypatch, em
         read_record("nothing")
     with pytest.raises(InputError, match="has no drives"):
         read_record("tx40")
-    (tmp_path / "two.yaml").write_text("record: [{files: [run.csv]}, {files: [run.csv], name: b}]\n")
-    with pytest.raises(InputError, match="2 records or pieces between gaps; read_records gives them all: run, b"):
+    (tmp_path / "two.yaml").write_text(
+        "record: [{files: [run.csv]}, {files: [run.csv], name: b}]\n"
+    )
+    with pytest.raises(
+        InputError, match="2 records or pieces between gaps; read_records gives them all: run, b"
+    ):
         read_record("two.yaml")
 
 
-# --- kinds of files ---------------------------------------------------------------------------------------------------
+# --- kinds of files
+# ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.txt"])
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
 def test_plain_file_needs_no_column_names(tmp_path, name, delimiter):
-    path = write_csv(tmp_path / name, header=delimiter.join(["t", "q1", "q2", "tau1", "tau2"]), delimiter=delimiter)
+    path = write_csv(
+        tmp_path / name,
+        header=delimiter.join(["t", "q1", "q2", "tau1", "tau2"]),
+        delimiter=delimiter,
+    )
     record = read_record(settings(files=path.name), folder=tmp_path)
     np.testing.assert_array_equal(record.q, Q)
     np.testing.assert_array_equal(record.tau, TAU)
@@ -220,12 +288,16 @@ def test_two_files_of_one_name_keep_both_hashes(tmp_path):
     for folder, header, x in (("a", "q1,q2", Q), ("b", "tau1,tau2", TAU)):
         (tmp_path / folder).mkdir()
         write_csv(tmp_path / folder / "x.csv", header=header, rows=x)
-    assert set(read_record(settings(files=["a/x.csv", "b/x.csv"], rate=RATE), folder=tmp_path).files) == {"a/x.csv", "b/x.csv"}
+    assert set(
+        read_record(settings(files=["a/x.csv", "b/x.csv"], rate=RATE), folder=tmp_path).files
+    ) == {"a/x.csv", "b/x.csv"}
 
 
 def test_file_without_header_counts_its_columns(tmp_path):
     write_csv(tmp_path / "a.csv", header="")
-    record = read_record(settings(files="a.csv", columns={"t": 1, "q": [2, 3], "tau": [4, 5]}), folder=tmp_path)
+    record = read_record(
+        settings(files="a.csv", columns={"t": 1, "q": [2, 3], "tau": [4, 5]}), folder=tmp_path
+    )
     np.testing.assert_array_equal(record.q, Q)
 
 
@@ -233,7 +305,9 @@ def test_two_files_with_equal_column_names(tmp_path):
     write_csv(tmp_path / "q.csv", header="Joint_1,Joint_2", rows=Q)
     write_csv(tmp_path / "tau.csv", header="# torques\nJoint_1,Joint_2", rows=TAU)
     columns = {"q": ["Joint_1", "Joint_2"], "tau": ["Joint_1", "Joint_2"]}
-    record = read_record(settings(files=["q.csv", "tau.csv"], columns=columns, rate=RATE), folder=tmp_path)
+    record = read_record(
+        settings(files=["q.csv", "tau.csv"], columns=columns, rate=RATE), folder=tmp_path
+    )
     np.testing.assert_array_equal(record.q, Q)
     np.testing.assert_array_equal(record.tau, TAU)
     np.testing.assert_allclose(record.t, T)
@@ -242,9 +316,21 @@ def test_two_files_with_equal_column_names(tmp_path):
 
 def test_arrays_of_npz_and_mat(tmp_path):
     np.savez(tmp_path / "a.npz", t=T, q=Q, tau=TAU, note=np.array("text"))
-    scipy.io.savemat(tmp_path / "a.mat", {"t": T[None, :], "pos": Q, "u1": TAU[:, :1], "u2": TAU[:, 1:], "gain": 2.0, "s": {"x": 1}})
-    a = read_record(settings(files="a.npz", columns={"t": "t", "q": "q", "tau": "tau"}), folder=tmp_path)
-    b = read_record(settings(files="a.mat", columns={"t": "t", "q": "pos", "tau": ["u1", "u2"]}, scale={"tau": "gain"}), folder=tmp_path)
+    scipy.io.savemat(
+        tmp_path / "a.mat",
+        {"t": T[None, :], "pos": Q, "u1": TAU[:, :1], "u2": TAU[:, 1:], "gain": 2.0, "s": {"x": 1}},
+    )
+    a = read_record(
+        settings(files="a.npz", columns={"t": "t", "q": "q", "tau": "tau"}), folder=tmp_path
+    )
+    b = read_record(
+        settings(
+            files="a.mat",
+            columns={"t": "t", "q": "pos", "tau": ["u1", "u2"]},
+            scale={"tau": "gain"},
+        ),
+        folder=tmp_path,
+    )
     np.testing.assert_array_equal(a.q, b.q)
     np.testing.assert_array_equal(2 * a.tau, b.tau)
 
@@ -255,7 +341,8 @@ def test_pickled_objects_are_refused(tmp_path):
         read_record(settings(files="a.npz"), folder=tmp_path)
 
 
-# --- units and sides --------------------------------------------------------------------------------------------------
+# --- units and sides
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -271,16 +358,22 @@ def test_pickled_objects_are_refused(tmp_path):
 )
 def test_position_units(tmp_path, units, extra, factor):
     write_csv(tmp_path / "a.csv")
-    np.testing.assert_allclose(read_record(settings(files="a.csv", units=units, **extra), folder=tmp_path).q, Q * factor)
+    np.testing.assert_allclose(
+        read_record(settings(files="a.csv", units=units, **extra), folder=tmp_path).q, Q * factor
+    )
 
 
 def test_time_in_milliseconds(tmp_path):
     write_csv(tmp_path / "a.csv", rows=np.column_stack([1000 * T, Q, TAU]))
-    assert read_record(settings(files="a.csv", units={"t": "ms"}), folder=tmp_path).rate == pytest.approx(RATE)
+    assert read_record(
+        settings(files="a.csv", units={"t": "ms"}), folder=tmp_path
+    ).rate == pytest.approx(RATE)
 
 
 def test_torque_constants(tmp_path):
-    """A and V are turned into torque by the constant of the settings, then of the drives; N*m by none."""
+    """A and V are turned into torque by the constant of the settings, then of the drives; N*m by
+    none.
+    """
     write_csv(tmp_path / "a.csv")
     drives = Drives(np.array([[10.0, 0], [5, 20]]), 0.0, [0.1, 0.2])
 
@@ -288,16 +381,26 @@ def test_torque_constants(tmp_path):
         return read_record(settings(files="a.csv", **record), robot(drives), folder=tmp_path).tau
 
     np.testing.assert_allclose(tau(side="motor"), TAU @ drives.ratio)
-    np.testing.assert_allclose(tau(side="motor", units={"tau": "A"}), (TAU * [0.1, 0.2]) @ drives.ratio)
-    np.testing.assert_allclose(tau(side="motor", units={"tau": ["A", "N*m"]}), (TAU * [0.1, 1]) @ drives.ratio)
-    np.testing.assert_allclose(tau(side="motor", units={"tau": "A"}, torque_constant=3), (3 * TAU) @ drives.ratio)
-    np.testing.assert_allclose(tau(side="joint", units={"tau": "V"}, torque_constant=[3, 4]), TAU * [3, 4])
+    np.testing.assert_allclose(
+        tau(side="motor", units={"tau": "A"}), (TAU * [0.1, 0.2]) @ drives.ratio
+    )
+    np.testing.assert_allclose(
+        tau(side="motor", units={"tau": ["A", "N*m"]}), (TAU * [0.1, 1]) @ drives.ratio
+    )
+    np.testing.assert_allclose(
+        tau(side="motor", units={"tau": "A"}, torque_constant=3), (3 * TAU) @ drives.ratio
+    )
+    np.testing.assert_allclose(
+        tau(side="joint", units={"tau": "V"}, torque_constant=[3, 4]), TAU * [3, 4]
+    )
     with pytest.raises(InputError, match=r"set record\.torque_constant"):
         tau(side="joint", units={"tau": "A"})
 
 
 def test_joint_angles_beside_motor_currents(tmp_path):
-    """The side of the torques may be another than that of the positions: both mixtures give what a record of one side gives."""
+    """The side of the torques may be another than that of the positions: both mixtures give what a
+    record of one side gives.
+    """
     drives = Drives(np.array([[10.0, 0], [5, -20]]), [0.1, -0.3], [0.1, 0.2])
     motor = drives.motor_position(Q)
     write_csv(tmp_path / "joint.csv")
@@ -321,9 +424,18 @@ def test_joint_angles_beside_motor_currents(tmp_path):
 @pytest.mark.parametrize(
     ("record", "said"),
     [
-        ({"torque_constant": 0.1}, r"record\.torque_constant: given, but units\.tau is N\*m; say mA"),
-        ({"counts_per_revolution": 4096, "units": {"q": "deg"}}, r"record\.counts_per_revolution: given, but units\.q is deg; say counts"),
-        ({"columns": {"q": ["a", "a"]}}, r"record\.columns\.q: 'a' twice; expected one column per joint"),
+        (
+            {"torque_constant": 0.1},
+            r"record\.torque_constant: given, but units\.tau is N\*m; say mA",
+        ),
+        (
+            {"counts_per_revolution": 4096, "units": {"q": "deg"}},
+            r"record\.counts_per_revolution: given, but units\.q is deg; say counts",
+        ),
+        (
+            {"columns": {"q": ["a", "a"]}},
+            r"record\.columns\.q: 'a' twice; expected one column per joint",
+        ),
     ],
 )
 def test_settings_that_contradict_each_other(record, said):
@@ -342,8 +454,14 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
             "holds the torques and p.csv the positions",
             {"files": ["tau.csv", "p.csv"], "columns": {"q": ["a", "b"], "tau": ["tau1", "tau2"]}},
         ),
-        (r"60 samples of positions in a\.csv, 57 of torques in tau\.csv; cut", {"files": ["a.csv", "tau.csv"]}),
-        (r"1 columns of positions \(q1\), 2 of torques \(tau1, tau2\)", {"files": "a.csv", "columns": {"q": "q1"}}),
+        (
+            r"60 samples of positions in a\.csv, 57 of torques in tau\.csv; cut",
+            {"files": ["a.csv", "tau.csv"]},
+        ),
+        (
+            r"1 columns of positions \(q1\), 2 of torques \(tau1, tau2\)",
+            {"files": "a.csv", "columns": {"q": "q1"}},
+        ),
     ):
         with pytest.raises(InputError, match=said):
             read_record(settings(**record), folder=tmp_path)
@@ -352,13 +470,25 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
 @pytest.mark.parametrize("delimiter", [";", "\t", " "])
 @pytest.mark.parametrize("header", [True, False])
 def test_decimal_commas(tmp_path, delimiter, header):
-    """Decimal commas where `record.decimal` says so, in memory and by blocks; the names in a header keep theirs."""
-    rows = [[format(x, ".17g").replace(".", ",") for x in row] for row in np.column_stack([1000 * T, Q, TAU])]
+    """Decimal commas where `record.decimal` says so, in memory and by blocks; the names in a header
+    keep theirs.
+    """
+    rows = [
+        [format(x, ".17g").replace(".", ",") for x in row]
+        for row in np.column_stack([1000 * T, Q, TAU])
+    ]
     top = "t,ms;q,1;q,2;tau,1;tau,2".replace(";", delimiter) if header else ""
     write_csv(tmp_path / "a.csv", header=top, rows=rows, delimiter=delimiter)
-    columns = {"t": "t,ms", "q": ["q,1", "q,2"], "tau": ["tau,1", "tau,2"]} if header else {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
+    columns = (
+        {"t": "t,ms", "q": ["q,1", "q,2"], "tau": ["tau,1", "tau,2"]}
+        if header
+        else {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
+    )
     given = settings(files="a.csv", columns=columns, units={"t": "ms"}, decimal=",")
-    whole, stream = read_record(given, folder=tmp_path), open_stream(given, folder=tmp_path, block=25)
+    whole, stream = (
+        read_record(given, folder=tmp_path),
+        open_stream(given, folder=tmp_path, block=25),
+    )
     np.testing.assert_array_equal(whole.q, Q)
     np.testing.assert_array_equal(whole.tau, TAU)
     np.testing.assert_array_equal(np.concatenate([q for _, q, _, _ in stream.blocks()]), Q)
@@ -370,20 +500,38 @@ NAMES = "t;q1;q2;tau1;tau2\n"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (NAMES + "0;0,1;0,2;1;2\n", "line 2: '0,1'; expected a number; write decimals with a point, or set record.decimal: ','"),
+        (
+            NAMES + "0;0,1;0,2;1;2\n",
+            (
+                "line 2: '0,1'; expected a number; write decimals with a point, or set "
+                "record.decimal: "
+                "','"
+            ),
+        ),
         (
             NAMES.replace(";", ",") + "0,0,1,0,2,1,2\n",
-            "line 2: 7 fields; expected 5 (t, q1, q2, tau1, tau2); if decimals are written with commas, separate columns by semicolons "
+            "line 2: 7 fields; expected 5 (t, q1, q2, tau1, tau2); if decimals are written with "
+            "commas, separate columns by semicolons "
             "and set record.decimal: ','",
         ),
-        (NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n", "line 2: 'ms'; expected a number; put # before a second line of names or units"),
+        (
+            NAMES + "ms;deg;deg;mA;mA\n0;0;0;0;0\n",
+            "line 2: 'ms'; expected a number; put # before a second line of names or units",
+        ),
         (
             NAMES + "10:00:00;0;0;0;0\n",
-            "line 2: '10:00:00'; expected a number; no date or time of day is read: write seconds, or give record.rate",
+            (
+                "line 2: '10:00:00'; expected a number; no date or time of day is read: write "
+                "seconds, "
+                "or give record.rate"
+            ),
         ),
         (
             "Log of cell\n" + NAMES + "0;0;0;0;0\n",
-            "line 2: 1 fields; expected 3 (Log, of, cell); put # before lines that are neither names nor numbers",
+            (
+                "line 2: 1 fields; expected 3 (Log, of, cell); put # before lines that are neither "
+                "names nor numbers"
+            ),
         ),
     ],
 )
@@ -397,19 +545,32 @@ def test_logs_as_offices_write_them(tmp_path, text, said):
 
 def test_a_title_of_as_many_words_as_columns_is_told(tmp_path):
     (tmp_path / "log.csv").write_text("Log of the cell and\nt q1 q2 tau1 tau2\n0 0 0 0 0\n")
-    with pytest.raises(InputError, match="the first line has Log, of, the, cell, and; put # before lines above the names"):
-        read_record(settings(files="log.csv", columns={"t": "t", "q": ["q1", "q2"], "tau": ["tau1", "tau2"]}), folder=tmp_path)
+    with pytest.raises(
+        InputError,
+        match="the first line has Log, of, the, cell, and; put # before lines above the names",
+    ):
+        read_record(
+            settings(
+                files="log.csv", columns={"t": "t", "q": ["q1", "q2"], "tau": ["tau1", "tau2"]}
+            ),
+            folder=tmp_path,
+        )
 
 
 def test_separators_of_thousands_are_no_decimals(tmp_path):
     (tmp_path / "log.csv").write_text(NAMES + "0,0;1.234;0;0;0\n0,1;1.235;0;0;0\n")
-    with pytest.raises(InputError, match=r"column 'q1', line 2: '1.234' holds a point, .* without separators of thousands"):
+    with pytest.raises(
+        InputError,
+        match=r"column 'q1', line 2: '1.234' holds a point, .* without separators of thousands",
+    ):
         read_record(settings(files="log.csv", decimal=","), folder=tmp_path)
 
 
 def test_a_log_of_another_encoding_says_how_to_save_it(tmp_path):
     (tmp_path / "log.csv").write_text("Winkel [°];q1\n", encoding="latin-1")
-    with pytest.raises(InputError, match=r"not a text file in UTF-8 .*; save it so \(Excel: CSV UTF-8"):
+    with pytest.raises(
+        InputError, match=r"not a text file in UTF-8 .*; save it so \(Excel: CSV UTF-8"
+    ):
         read_record(settings(files="log.csv"), folder=tmp_path)
 
 
@@ -417,9 +578,12 @@ def test_motor_side_needs_drives(tmp_path):
     write_csv(tmp_path / "a.csv")
     drives = Drives(np.diag([2.0, -4.0]), [0.1, 0.2], 1.0)
     np.testing.assert_allclose(
-        read_record(settings(files="a.csv", side="motor"), robot(drives), folder=tmp_path).q, Q / [2, -4] + [0.1, 0.2]
+        read_record(settings(files="a.csv", side="motor"), robot(drives), folder=tmp_path).q,
+        Q / [2, -4] + [0.1, 0.2],
     )
-    np.testing.assert_array_equal(read_record(settings(files="a.csv", side="joint"), robot(drives), folder=tmp_path).q, Q)
+    np.testing.assert_array_equal(
+        read_record(settings(files="a.csv", side="joint"), robot(drives), folder=tmp_path).q, Q
+    )
     with pytest.raises(InputError, match="has no drives"):
         read_record(settings(files="a.csv", side="motor"), folder=tmp_path)
 
@@ -430,13 +594,16 @@ def test_records_of_a_model(tmp_path):
 
     write_csv(tmp_path / "a.csv")
     write_csv(tmp_path / "b.csv")
-    both = study_from_mapping({"record": [{"files": "a.csv"}, {"files": "b.csv", "name": "second"}]}).record
+    both = study_from_mapping(
+        {"record": [{"files": "a.csv"}, {"files": "b.csv", "name": "second"}]}
+    ).record
     assert [r.name for r in read_records(both, planar_2r_model, folder=tmp_path)] == ["a", "second"]
     with pytest.raises(InputError, match="2 joints; emps has 1"):
         read_records(both, emps_model, folder=tmp_path)
 
 
-# --- bad files --------------------------------------------------------------------------------------------------------
+# --- bad files
+# --------------------------------------------------------------------------------------------------------
 
 
 def spoiled(i, j, value):
@@ -451,11 +618,17 @@ def spoiled(i, j, value):
         (spoiled(3, 2, "nan"), "a.csv, column 'q2', line 5: nan (1 such values in all)"),
         (spoiled(3, 2, ""), "a.csv, column 'q2', line 5: an empty field"),
         (spoiled(3, 4, "1.5x"), "a.csv, column 'tau2', line 5: '1.5x'; expected a number"),
-        (spoiled(3, 0, T[2]), "a.csv, column 't', line 5: time goes from 0.01 s to 0.01 s; expected increasing time"),
+        (
+            spoiled(3, 0, T[2]),
+            "a.csv, column 't', line 5: time goes from 0.01 s to 0.01 s; expected increasing time",
+        ),
         (spoiled(3, 0, T[3] + 0.3 / RATE), "not uniform"),
         ([*cells()[:20], *cells()[25:]], "a.csv, column 't', line 22: time is not uniform"),
         (cells()[:4], "at least 10"),
-        ([*cells()[:4], [1.0, 2.0, 3.0]], "a.csv, line 6: 3 fields; expected 5 (t, q1, q2, tau1, tau2)"),
+        (
+            [*cells()[:4], [1.0, 2.0, 3.0]],
+            "a.csv, line 6: 3 fields; expected 5 (t, q1, q2, tau1, tau2)",
+        ),
         ([], "a.csv: no line of numbers"),
     ],
 )
@@ -503,7 +676,9 @@ def test_wrong_number_of_joints(tmp_path):
 def test_different_lengths(tmp_path):
     write_csv(tmp_path / "q.csv", header="q1,q2", rows=Q)
     write_csv(tmp_path / "tau.csv", header="tau1,tau2", rows=TAU[:-1])
-    with pytest.raises(InputError, match=r"60 samples of positions in q\.csv, 59 of torques in tau\.csv"):
+    with pytest.raises(
+        InputError, match=r"60 samples of positions in q\.csv, 59 of torques in tau\.csv"
+    ):
         read_record(settings(files=["q.csv", "tau.csv"], rate=RATE), folder=tmp_path)
     np.savez(tmp_path / "a.npz", q1=Q[:, 0], q2=Q[1:, 1], tau1=T, tau2=T)
     with pytest.raises(InputError, match="different lengths: q1 60, q2 59"):
@@ -512,15 +687,23 @@ def test_different_lengths(tmp_path):
 
 def test_samples_run_along_the_longer_side(tmp_path):
     np.savez(tmp_path / "a.npz", q=Q.T, tau=np.asfortranarray(TAU.T), deep=np.zeros((2, 3, 4)))
-    record = read_record(settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path)
+    record = read_record(
+        settings(files="a.npz", rate=RATE, columns={"q": "q", "tau": "tau"}), folder=tmp_path
+    )
     np.testing.assert_array_equal(record.q, Q)
     np.testing.assert_array_equal(record.tau, TAU)
     np.save(tmp_path / "a.npy", np.vstack([Q.T, TAU.T]))
     np.testing.assert_array_equal(
-        read_record(settings(files="a.npy", rate=RATE, columns={"q": [1, 2], "tau": [3, 4]}), folder=tmp_path).tau, TAU
+        read_record(
+            settings(files="a.npy", rate=RATE, columns={"q": [1, 2], "tau": [3, 4]}),
+            folder=tmp_path,
+        ).tau,
+        TAU,
     )
     with pytest.raises(InputError, match="k columns of N samples"):
-        read_record(settings(files="a.npz", rate=RATE, columns={"q": "deep", "tau": "tau"}), folder=tmp_path)
+        read_record(
+            settings(files="a.npz", rate=RATE, columns={"q": "deep", "tau": "tau"}), folder=tmp_path
+        )
 
 
 @pytest.mark.parametrize(

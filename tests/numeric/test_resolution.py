@@ -1,4 +1,6 @@
-"""Resolution advisor: moments of filtered noise, friction that switches, predicted against sampled steps on EMPS and TX40."""
+"""Resolution advisor: moments of filtered noise, friction that switches, predicted against sampled
+steps on EMPS and TX40.
+"""
 
 import json
 from dataclasses import replace
@@ -9,19 +11,22 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, ModelError, SettingsError
+from runtime.limits import LIMIT
 from runtime.model.generated import load_model
-from runtime.observation.filters import decimated, filtered_states
-from runtime.observation.noise_gain import bandwidth
-from runtime.observation.observation import decimated_torque, observe
-from runtime.observation.position_errors import encoder_root, perturbation
-from runtime.observation.sign_errors import Switch, kernels, switched, switches
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.reporting.resolution_advice import advice_section
-from runtime.resolution.advice import AGREED, crossing, sampled
+from runtime.resolution.advice import crossing, sampled
 from runtime.resolution.advisor import ALL, Predictor, advise, torque_sigma
+from runtime.rows.observe import observe
+from runtime.rows.position_errors import perturbation
+from runtime.rows.prepared import decimated_torque
+from runtime.rows.sign_errors import Switch, kernels, switched, switches
 from runtime.settings.study import Decimate, Lowpass, Signals, study_from_mapping
+from runtime.signals.filters import decimated, filtered_states
+from runtime.signals.noise_gain import bandwidth
+from runtime.signals.states import encoder_drives
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 
@@ -62,47 +67,85 @@ def emps(emps_data):
 @pytest.fixture(scope="module")
 def emps_advice(emps):
     model, study, record = emps
-    return advise(model, record, replace(study, cestac=replace(study.cestac, runs=40)), asked=(1e-6, 1e-4))
+    return advise(
+        model, record, replace(study, cestac=replace(study.cestac, runs=40)), asked=(1e-6, 1e-4)
+    )
 
 
 @pytest.mark.parametrize(
     ("signals", "rate"),
     [
         (Signals(median=1, lowpass=Lowpass(cutoff=50)), 5000.0),
-        (Signals(median=1, lowpass=Lowpass(cutoff=100, on=("q",)), decimate=Decimate(factor=10, phase="last", padding="matlab")), 1000.0),
+        (
+            Signals(
+                median=1,
+                lowpass=Lowpass(cutoff=100, on=("q",)),
+                decimate=Decimate(factor=10, phase="last", padding="matlab"),
+            ),
+            1000.0,
+        ),
         (Signals(median=1, lowpass=None, decimate=None), 1000.0),
-        (Signals(median=1, lowpass=Lowpass(cutoff=4), decimate=Decimate(factor=40)), 5000.0),  # a response of more than 8192 samples
+        (
+            Signals(median=1, lowpass=Lowpass(cutoff=4), decimate=Decimate(factor=40)),
+            5000.0,
+        ),  # a response of more than 8192 samples
     ],
 )
 def test_moments_are_those_of_the_filters_as_they_run(signals, rate):
-    """One unit error far from the ends: the sum of squares of what it becomes is the variance of what unit white noise becomes."""
+    """One unit error far from the ends: the sum of squares of what it becomes is the variance of
+    what unit white noise becomes.
+    """
     N = 24001
     impulse = np.zeros((N, 1))
     impulse[N // 2] = 1.0
     states = filtered_states(impulse, rate, signals)
     x = np.stack([states.q[:, 0], states.qd[:, 0], states.qdd[:, 0]])
     band = bandwidth(signals, rate)
-    assert np.allclose(band.before, x @ x.T, rtol=1e-6, atol=1e-9 * np.sqrt(np.outer(np.diag(x @ x.T), np.diag(x @ x.T))))
+    assert np.allclose(
+        band.before,
+        x @ x.T,
+        rtol=1e-6,
+        atol=1e-9 * np.sqrt(np.outer(np.diag(x @ x.T), np.diag(x @ x.T))),
+    )
     factor = 1 if signals.decimate is None else (40 if rate == 5000 else 10)
-    phases = [decimated(np.roll(x, k, axis=1), factor, signals.decimate) for k in range(factor)]  # every phase of the kept samples
+    phases = [
+        decimated(np.roll(x, k, axis=1), factor, signals.decimate) for k in range(factor)
+    ]  # every phase of the kept samples
     after = sum(y @ y.T for y in phases)
-    assert np.allclose(band.after, after, rtol=1e-5, atol=1e-6 * np.sqrt(np.outer(np.diag(after), np.diag(after))))
+    assert np.allclose(
+        band.after, after, rtol=1e-5, atol=1e-6 * np.sqrt(np.outer(np.diag(after), np.diag(after)))
+    )
     lag = 7
     assert np.isclose(band.speed[lag], x[1, lag:] @ x[1, :-lag] / (x[1] @ x[1]), atol=1e-6)
 
 
 @pytest.mark.parametrize("half", [pytest.param(False, marks=pytest.mark.campaign), True])
 def test_a_switch_under_noise_against_sampling(half):
-    """sign(s) and max(s, 0) of a speed that rests, creeps and passes zero, 400 draws of filtered noise."""
+    """sign(s) and max(s, 0) of a speed that rests, creeps and passes zero, 400 draws of filtered
+    noise.
+    """
     signals, rate, N = Signals(median=1, lowpass=Lowpass(cutoff=50)), 2000.0, 16000
     factor = 16
     band = bandwidth(signals, rate)
     t = np.arange(N) / rate
-    s = np.where(t < 2, 0.002 * np.sin(40 * t), np.sin(2 * np.pi * 0.7 * (t - 2)) * np.where(t < 5, 0.02, 1.0))
+    s = np.where(
+        t < 2,
+        0.002 * np.sin(40 * t),
+        np.sin(2 * np.pi * 0.7 * (t - 2)) * np.where(t < 5, 0.02, 1.0),
+    )
     delta = 2e-4
     sigma = delta * np.sqrt(band.before[1, 1])
     switch = Switch(0, np.ones(1), 0.5, 0.0, 0.5) if half else Switch(0, np.ones(1), 0.0, 1.0, 0.0)
-    found = switched(switch, s, sigma, band.gain, kernels(band, N, factor), factor, signals.decimate, np.ones((1, N), dtype=bool))
+    found = switched(
+        switch,
+        s,
+        sigma,
+        band.gain,
+        kernels(band, N, factor),
+        factor,
+        signals.decimate,
+        np.ones((1, N), dtype=bool),
+    )
 
     def f(v):
         return np.maximum(v, 0) if half else np.sign(v)
@@ -119,7 +162,9 @@ def test_a_switch_under_noise_against_sampling(half):
     inner = slice(30, -30)
     shift, variance = draws.mean(axis=0) - clean, draws.var(axis=0)
     scale = np.linalg.norm(shift[inner])
-    assert np.linalg.norm((found.shift - shift)[inner]) < 0.1 * scale + 1.2 * np.sqrt(variance[inner].sum() / 400)
+    assert np.linalg.norm((found.shift - shift)[inner]) < 0.1 * scale + 1.2 * np.sqrt(
+        variance[inner].sum() / 400
+    )
     assert np.isclose(found.variance[0], variance.sum(), rtol=0.08)
     covariance = np.mean((draws - draws.mean(axis=0)) * noises, axis=0).sum()
     assert np.isclose((found.slope * delta**2 * band.after[1, 1]).sum(), covariance, rtol=0.06)
@@ -132,7 +177,9 @@ def test_switches_come_from_the_elements_of_the_model():
     assert coupled.joints == (4, 5) and tuple(coupled.G) == (0, 0, 0, 0, 1, 1) and coupled.jump == 1
     assert [TX40_COLUMNS[k] for k in found] == ["FS1", "FS2", "FS3", "FS4", "FS5", "FSM6"]
     s = np.array([-2.0, 3.0])
-    for switch in switches(both, both.BASE_PARAMETERS):  # values of the emitted columns, up to a constant
+    for switch in switches(
+        both, both.BASE_PARAMETERS
+    ):  # values of the emitted columns, up to a constant
         D = both.regressor(np.zeros((2, 1)), s[:, None], np.zeros((2, 1)))[:, 0, switch.column]
         f = switch.linear * s + switch.jump * np.sign(s) + switch.kink * np.abs(s)
         assert np.isclose(np.ptp(D), np.ptp(f)) and np.isclose(D[1] - D[0], f[1] - f[0])
@@ -146,29 +193,50 @@ def test_emps_steps_predicted_and_sampled(emps_advice):
         assert limit.half_width < 0.1 * limit.percent
         assert abs(limit.error / limit.percent - 1) < 0.1
     for point in first.sampled:
-        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
-        assert np.all(np.abs(point.change - at) < point.half_width + AGREED * np.abs(at))
+        at = np.array(
+            [
+                np.interp(np.log(point.delta), np.log(first.delta), change)
+                for change in first.change.T
+            ]
+        )
+        assert np.all(
+            np.abs(point.change - at) < point.half_width + LIMIT.PREDICTION_AGREES * np.abs(at)
+        )
 
 
 def test_advice_in_words_and_json(emps_advice):
     assert (
-        "up to Delta = 4.6e-06 m at the joints (M1R first; 40 runs there gave" in emps_advice.verdict
+        "up to Delta = 4.6e-06 m at the joints (M1R first; 40 runs there gave"
+        in emps_advice.verdict
         or "4.59e-06 m at the joints (M1R first; 40 runs" in emps_advice.verdict
     )
-    assert emps_advice.worst(0)[1] < 1 < 50 < emps_advice.worst(1)[1] and emps_advice.worst(1)[0] == "M1R"
+    assert (
+        emps_advice.worst(0)[1] < 1 < 50 < emps_advice.worst(1)[1]
+        and emps_advice.worst(1)[0] == "M1R"
+    )
     data = json.loads(emps_advice.to_json())
     assert data["deciding"] == ["M1R", "FV1", "FS1", "OFFSET1"] and len(data["encoders"]) == 1
     assert data["encoders"][0]["limits"][0]["percent"] == 1.0
     words = " ".join(emps_advice.assumptions)
-    assert all(word in words for word in ("two-point", "joint side", "1000 Hz", "100 Hz", "decimation by 10", "FS1"))
+    assert all(
+        word in words
+        for word in ("two-point", "joint side", "1000 Hz", "100 Hz", "decimation by 10", "FS1")
+    )
     assert "M1R" in emps_advice.to_table()
     section = advice_section(emps_advice)
-    assert section.images[0].svg.startswith(b"<?xml") and [len(table.rows) for table in section.tables] == [1, 4]
+    assert section.images[0].svg.startswith(b"<?xml") and [
+        len(table.rows) for table in section.tables
+    ] == [1, 4]
 
 
 def test_uniform_rounding_allows_root_three_more(emps, emps_advice):
     model, study, record = emps
-    uniform = advise(model, record, replace(study, cestac=replace(study.cestac, rounding="uniform")), confirm=False)
+    uniform = advise(
+        model,
+        record,
+        replace(study, cestac=replace(study.cestac, rounding="uniform")),
+        confirm=False,
+    )
     ratio = uniform.encoders[0].limits[1].delta / emps_advice.encoders[0].limits[1].delta
     assert np.isclose(ratio, np.sqrt(3), rtol=1e-3)
 
@@ -181,7 +249,10 @@ def test_torque_noise_adds_to_sigma_and_does_not_bias(emps, emps_advice):
     assert np.allclose(found, emps_advice.torque_sigma)
     rng = np.random.default_rng(0)
     noise = [
-        decimated_torque(rng.standard_normal((len(record), 1)), part.selection).ravel()[part.selection.mask.ravel()] for _ in range(300)
+        decimated_torque(rng.standard_normal((len(record), 1)), part.selection).ravel()[
+            part.selection.mask.ravel()
+        ]
+        for _ in range(300)
     ]
     X = np.linalg.lstsq(W.W, np.array(noise).T, rcond=None)[0]
     assert np.allclose(X.std(axis=1), found, rtol=0.15)
@@ -192,14 +263,27 @@ def test_torque_noise_adds_to_sigma_and_does_not_bias(emps, emps_advice):
 def test_tx40_steps_predicted_and_sampled(tx40_data):
     """All encoders and two single ones; every parameter that matters, not only the first."""
     model, study, record = opened("tx40")
-    advice = advise(model, record, replace(study, cestac=replace(study.cestac, runs=6)), columns=TX40_COLUMNS, encoders=(ALL, "2", "6"))
+    advice = advise(
+        model,
+        record,
+        replace(study, cestac=replace(study.cestac, runs=6)),
+        columns=TX40_COLUMNS,
+        encoders=(ALL, "2", "6"),
+    )
     assert [encoder.label for encoder in advice.encoders] == [ALL, "2", "6"]
     assert all(limit.agrees for encoder in advice.encoders for limit in encoder.limits)
     first = advice.encoders[0]
     decisive = [advice.names.index(name) for name in advice.deciding]
     for point in first.sampled[1:]:
-        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
-        off = np.abs(point.change - at) / (1.6 * point.half_width + AGREED * np.abs(at))  # 120 comparisons with 95 % intervals
+        at = np.array(
+            [
+                np.interp(np.log(point.delta), np.log(first.delta), change)
+                for change in first.change.T
+            ]
+        )
+        off = np.abs(point.change - at) / (
+            1.6 * point.half_width + LIMIT.PREDICTION_AGREES * np.abs(at)
+        )  # 120 comparisons with 95 % intervals
         assert np.all(off[decisive] < 1)
 
 
@@ -218,9 +302,13 @@ def test_what_no_prediction_goes_through_is_refused(emps):
     with pytest.raises(SettingsError, match="not linear"):
         advise(model, record, replace(study, cestac=replace(study.cestac, median=5)))
     with pytest.raises(SettingsError, match="covariance"):
-        advise(model, record, replace(study, estimate=replace(study.estimate, method="wls", weights="covariance")))
+        advise(
+            model,
+            record,
+            replace(study, estimate=replace(study.estimate, method="wls", weights="covariance")),
+        )
     with pytest.raises(SettingsError, match="no drives"):
-        encoder_root(load_model(GENERATED / "planar_2r.py"), replace(study, cestac=replace(study.cestac, side="motor")))
+        encoder_drives("motor", None, "cestac")
     with pytest.raises(InputError, match="no encoder 7"):
         advise(model, record, study, encoders=("7",))
     with pytest.raises(ModelError, match="ELEMENTS"):
@@ -228,35 +316,61 @@ def test_what_no_prediction_goes_through_is_refused(emps):
 
 
 def test_switches_follow_the_constants_given():
-    """A belt of ratio KR: friction of the motor acts along q2 + KR q1, at the ratio given, not that of the robot file."""
+    """A belt of ratio KR: friction of the motor acts along q2 + KR q1, at the ratio given, not that
+    of the robot file.
+    """
 
     def elements(*, KR=1.0):
         return {"FSM2": ("coulomb", "both", {1: KR, 2: 1.0})}
 
     belt = SimpleNamespace(NAME="belt", JOINTS=(1, 2), elements=elements, ELEMENTS=elements())
-    assert [switches(belt, ("FSM2",), constants)[0].G.tolist() for constants in (None, {"KR": 2.0})] == [[1.0, 1.0], [2.0, 1.0]]
+    assert [
+        switches(belt, ("FSM2",), constants)[0].G.tolist() for constants in (None, {"KR": 2.0})
+    ] == [[1.0, 1.0], [2.0, 1.0]]
 
 
 def test_where_a_curve_crosses():
     delta = np.array([1.0, 2.0, 4.0, 8.0])
     assert np.isclose(crossing(delta, 0.3 * delta**2, 1.0), np.sqrt(1 / 0.3))
-    assert np.isnan(crossing(delta, 0.001 * delta, 1.0)) and np.isnan(crossing(delta, 2 * delta, 1.0))
+    assert np.isnan(crossing(delta, 0.001 * delta, 1.0)) and np.isnan(
+        crossing(delta, 2 * delta, 1.0)
+    )
     found = sampled(1.0, np.array([[1.0], [3.0]]), np.array([4.0]))
-    assert np.isclose(found.change[0], -50) and np.isclose(found.half_width[0], 100 * 12.706204736 * np.sqrt(2) / np.sqrt(2) / 4)
+    assert np.isclose(found.change[0], -50) and np.isclose(
+        found.half_width[0], 100 * 12.706204736 * np.sqrt(2) / np.sqrt(2) / 4
+    )
 
 
 def test_weights_low_speed_and_several_records(emps):
-    """Rows of slow motion left out: what is left of the record has no sign to flip; two records add up; weights of one joint change nothing."""
+    """Rows of slow motion left out: what is left of the record has no sign to flip; two records add
+    up; weights of one joint change nothing.
+    """
     model, study, record = emps
     fast = replace(study, rows=replace(study.rows, low_speed=0.02))
     columns = ("M1R", "FV1", "FS1", "OFFSET1")
-    one = advise(model, record, replace(fast, cestac=replace(fast.cestac, runs=30)), columns=columns)
+    one = advise(
+        model, record, replace(fast, cestac=replace(fast.cestac, runs=30)), columns=columns
+    )
     first = one.encoders[0]
     for point in first.sampled:
-        at = np.array([np.interp(np.log(point.delta), np.log(first.delta), change) for change in first.change.T])
-        assert np.all(np.abs(point.change - at) < 1.3 * point.half_width + AGREED * np.abs(at))
+        at = np.array(
+            [
+                np.interp(np.log(point.delta), np.log(first.delta), change)
+                for change in first.change.T
+            ]
+        )
+        assert np.all(
+            np.abs(point.change - at)
+            < 1.3 * point.half_width + LIMIT.PREDICTION_AGREES * np.abs(at)
+        )
     both = advise(model, [record, record], fast, columns=columns, confirm=False)
-    weighted = advise(model, record, replace(fast, estimate=replace(fast.estimate, method="wls")), columns=columns, confirm=False)
+    weighted = advise(
+        model,
+        record,
+        replace(fast, estimate=replace(fast.estimate, method="wls")),
+        columns=columns,
+        confirm=False,
+    )
     for other in (both, weighted):
         assert np.allclose(other.encoders[0].change, first.change, rtol=1e-6, atol=1e-9)
 
@@ -265,21 +379,36 @@ def test_units_are_those_of_each_encoder(tmp_path):
     """Three joints of a SCARA turn and one slides: every step was printed in metres."""
     for name, text in generate_files(load_robot("scara")).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    model = load_model(tmp_path / "scara.py")
+    model = load_model(tmp_path / "scara.py", trust=True)
     rng, t = np.random.default_rng(0), np.arange(3000) / 1000
-    a, w, p = rng.uniform(0.1, 0.4, (4, 4)), rng.uniform(2.0, 9.0, (4, 4)), rng.uniform(0, 6, (4, 4))
+    a, w, p = (
+        rng.uniform(0.1, 0.4, (4, 4)),
+        rng.uniform(2.0, 9.0, (4, 4)),
+        rng.uniform(0, 6, (4, 4)),
+    )
     angle = t[:, None, None] * w + p
-    q, qd, qdd = (a * np.sin(angle)).sum(1), (a * w * np.cos(angle)).sum(1), -(a * w**2 * np.sin(angle)).sum(1)
-    tau = model.regressor(q, qd, qdd) @ rng.uniform(0.5, 2.0, len(model.BASE_PARAMETERS)) + 0.01 * rng.standard_normal((3000, 4))
+    q, qd, qdd = (
+        (a * np.sin(angle)).sum(1),
+        (a * w * np.cos(angle)).sum(1),
+        -(a * w**2 * np.sin(angle)).sum(1),
+    )
+    tau = model.regressor(q, qd, qdd) @ rng.uniform(
+        0.5, 2.0, len(model.BASE_PARAMETERS)
+    ) + 0.01 * rng.standard_normal((3000, 4))
     study = study_from_mapping(
-        {"signals": {"median": 1, "lowpass": {"cutoff": 20}, "decimate": {"factor": 10}}, "cestac": {"columns": "all"}}
+        {
+            "signals": {"median": 1, "lowpass": {"cutoff": 20}, "decimate": {"factor": 10}},
+            "cestac": {"columns": "all"},
+        }
     )
     advice = advise(model, Record(t, q, tau, rate=1000.0), study, confirm=False)
     assert [encoder.unit for encoder in advice.encoders] == ["rad or m", "rad", "rad", "rad", "m"]
     lines = advice.to_table().splitlines()
     assert "Delta, rad or m" in lines[0]
     for line, (label, turn) in zip(
-        lines[1:6], [("all", False), ("1, rad", True), ("2, rad", True), ("3, rad", True), ("4, m", False)], strict=True
+        lines[1:6],
+        [("all", False), ("1, rad", True), ("2, rad", True), ("3, rad", True), ("4, m", False)],
+        strict=True,
     ):
         assert line.startswith(label) and ("2*pi/" in line) == turn, line
     assert (

@@ -10,16 +10,22 @@ from runtime.resolution.rounding import rounded, signs, stream
 STEP = 0.02
 
 
-@pytest.mark.parametrize(("mode", "factor"), [("two-point", 1.0), ("gaussian", 1.0), ("uniform", 1 / 3), ("quantise", 1 / 3)])
+@pytest.mark.parametrize(
+    ("mode", "factor"),
+    [("two-point", 1.0), ("gaussian", 1.0), ("uniform", 1 / 3), ("quantise", 1 / 3)],
+)
 def test_variance_of_the_noise(mode, factor):
     x = np.linspace(-3, 5, 40000).reshape(20000, 2)
     noise = rounded(x, STEP, mode, stream(1, 0, 0)) - x
     assert noise.shape == x.shape
-    # the mean of n independent errors: five deviations; the variance: chi2 bounds are wide enough for the lighter tails of the others
+    # the mean of n independent errors: five deviations; the variance: chi2 bounds are wide enough
+    # for the lighter tails of the others
     assert abs(noise.mean()) < 5 * STEP * np.sqrt(factor / x.size)
     low, high = chi2.ppf([1e-4, 1 - 1e-4], x.size - 1) / (x.size - 1)
     assert low < noise.var() / (factor * STEP**2) < high
-    if mode != "quantise":  # there the mean error is the distance to the middle of the cell, which moves with x
+    if (
+        mode != "quantise"
+    ):  # there the mean error is the distance to the middle of the cell, which moves with x
         assert abs(np.corrcoef(noise.T)[0, 1]) < 0.03
         assert abs(np.corrcoef(noise[1:, 0], noise[:-1, 0])[0, 1]) < 0.03
 
@@ -48,7 +54,9 @@ def test_streams_depend_on_seed_and_key_alone():
 
 
 def test_a_real_encoder_has_one_phase_for_each_column():
-    """phi + k Delta, k to the nearest; over many steps the error is uniform and independent of the phase of others."""
+    """phi + k Delta, k to the nearest; over many steps the error is uniform and independent of the
+    phase of others.
+    """
     x = np.linspace(-3, 5, 40000)[:, None] * [1.0, -0.7, 0.3]
     y = rounded(x, STEP, "phase", stream(1, 0, 0))
     phases = y[0] / STEP % 1
@@ -56,11 +64,16 @@ def test_a_real_encoder_has_one_phase_for_each_column():
     assert np.abs(y - x).max() <= STEP / 2 * (1 + 1e-9)
     assert np.allclose((y - x).var(axis=0), STEP**2 / 12, rtol=0.03)
     alone = rounded(x[:, 0], STEP, "phase", stream(2, 0, 0))
-    assert alone.shape == (40000,) and abs(alone[0] - rounded(x[:, 0], STEP, "phase", stream(3, 0, 0))[0]) > 1e-6
+    assert (
+        alone.shape == (40000,)
+        and abs(alone[0] - rounded(x[:, 0], STEP, "phase", stream(3, 0, 0))[0]) > 1e-6
+    )
 
 
 def test_uneven_lines():
-    """Where the counts change is off the even lines by the stated deviation, and alike in every turn."""
+    """Where the counts change is off the even lines by the stated deviation, and alike in every
+    turn.
+    """
     step, turns = 2 * np.pi / 400, 3
     x = np.linspace(0, turns * 2 * np.pi, 400_000)
     y = rounded(x, step, "phase", stream(1, 0, 0), 0.1)

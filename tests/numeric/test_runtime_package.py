@@ -16,6 +16,22 @@ def test_public_names_exist():
 
 
 def test_importing_runtime_is_light():
-    heavy = ["numpy", "ruamel", "pooch", "pydantic", "sympy", "casadi", "matplotlib", "jinja2", "symgen", "generated"]
+    heavy = [
+        "numpy",
+        "ruamel",
+        "pooch",
+        "pydantic",
+        "sympy",
+        "casadi",
+        "matplotlib",
+        "jinja2",
+        "symgen",
+        "generated",
+    ]
     code = f"import runtime, sys; print([name for name in {heavy} if name in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )

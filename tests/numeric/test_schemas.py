@@ -29,26 +29,62 @@ def test_published_schemas_are_those_of_the_types(kind):
 
 
 def test_every_kind_is_published():
-    assert set(KINDS) == set(schemas()) == {p.name.partition(".")[0] for p in (ROOM / "schemas").glob("*.json")}
+    assert (
+        set(KINDS)
+        == set(schemas())
+        == {p.name.partition(".")[0] for p in (ROOM / "schemas").glob("*.json")}
+    )
 
 
 def statuses(tree):
-    """Texts that a module gives as the status of an Estimate: to the keyword or name `status`, or first in what a function returns as one."""
-    values = [node.value for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg == "status"]
+    """Texts that a module gives as the status of an Estimate: to the keyword or name `status`, or
+    first in what a function returns as one.
+    """
+    values = [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.keyword) and node.arg == "status"
+    ]
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple | ast.Name):
-            first = node.targets[0].elts[0] if isinstance(node.targets[0], ast.Tuple) else node.targets[0]
+            first = (
+                node.targets[0].elts[0]
+                if isinstance(node.targets[0], ast.Tuple)
+                else node.targets[0]
+            )
             values += [node.value] if isinstance(first, ast.Name) and first.id == "status" else []
-        if isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "Status" and node.value:
+        if (
+            isinstance(node, ast.AnnAssign)
+            and ast.unparse(node.annotation) == "Status"
+            and node.value
+        ):
             values.append(node.value)
-        if isinstance(node, ast.FunctionDef) and node.returns and "Status" in ast.unparse(node.returns):
-            values += [n.value.elts[0] for n in ast.walk(node) if isinstance(n, ast.Return) and isinstance(n.value, ast.Tuple)]
-    words = {n.value for value in values for n in ast.walk(value) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+        if (
+            isinstance(node, ast.FunctionDef)
+            and node.returns
+            and "Status" in ast.unparse(node.returns)
+        ):
+            values += [
+                n.value.elts[0]
+                for n in ast.walk(node)
+                if isinstance(n, ast.Return) and isinstance(n.value, ast.Tuple)
+            ]
+    words = {
+        n.value
+        for value in values
+        for n in ast.walk(value)
+        if isinstance(n, ast.Constant) and isinstance(n.value, str)
+    }
     return {word for word in words if re.fullmatch(r"[a-z]+(-[a-z]+)*", word)}
 
 
 def test_every_status_of_the_code_is_in_the_schema():
-    trees = [ast.parse(p.read_text(encoding="utf-8")) for p in (ROOM / "estimators").glob("*.py") if p.stem != "semidefinite"]
+    trees = [
+        ast.parse(p.read_text(encoding="utf-8"))
+        for room in ("estimators", "loop")
+        for p in (ROOM / room).glob("*.py")
+        if p.stem != "semidefinite"
+    ]
     written = set().union(*map(statuses, trees))
     known = json.loads(schema_text("estimate"))["properties"]["status"]["enum"]
     assert written == set(known) == set(get_args(Status))
@@ -59,7 +95,9 @@ def test_studies_follow_their_schema(name):
     schema = json.loads(schema_text("study"))
     written = {} if name is None else dataset_study(name)
     jsonschema.validate(written, schema)
-    jsonschema.validate(to_mapping(Study() if name is None else study_from_mapping(written)), schema)
+    jsonschema.validate(
+        to_mapping(Study() if name is None else study_from_mapping(written)), schema
+    )
 
 
 @pytest.mark.parametrize(
@@ -86,7 +124,9 @@ def test_editors_show_what_a_key_holds():
     definitions = json.loads(schema_text("study"))["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == "Cutoff frequency. [Hz]"
     for name, definition in definitions.items():
-        assert [key for key, value in definition["properties"].items() if "description" not in value] == [], name
+        assert [
+            key for key, value in definition["properties"].items() if "description" not in value
+        ] == [], name
 
 
 if __name__ == "__main__":

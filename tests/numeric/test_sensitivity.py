@@ -1,4 +1,6 @@
-"""Derivatives of a simulated closed loop by the base parameters against central differences of whole runs."""
+"""Derivatives of a simulated closed loop by the base parameters against central differences of
+whole runs.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,8 @@ import pytest
 from campaign import campaign
 
 from runtime import load_model
-from runtime.motion.reference import Reference, reference_of
-from runtime.motion.simulation import Simulator, parameters_of
+from runtime.loop.reference import Reference, reference_of
+from runtime.loop.simulation import Simulator, parameters_of
 from runtime.settings.controller import Controller
 from runtime.settings.schema import structure
 
@@ -21,16 +23,23 @@ CASCADE = {"kind": "cascade", "kp": 160.18, "kv": 243.45, "gain": 35.15}
 PID = {"kind": "pid", "kp": 2e5, "kd": 6e3, "ki": 4e5}
 
 
-def agree(simulator: Simulator, X: np.ndarray, reference: Reference, columns, tolerance: float) -> np.ndarray:
+def agree(
+    simulator: Simulator, X: np.ndarray, reference: Reference, columns, tolerance: float
+) -> np.ndarray:
     """Share of the deviation in q, qd, tau of every column; returns |qd| of the run."""
     found, tangent = simulator.sensitivity(X, reference)
     np.testing.assert_array_equal(found.q, simulator.run(X, reference, ideal=True).q)
     for k in columns:
         h = 1e-5 * max(abs(X[k]), 0.1)
-        up, down = (simulator.run(X + sign * h * np.eye(len(X))[k], reference, ideal=True) for sign in (1, -1))
+        up, down = (
+            simulator.run(X + sign * h * np.eye(len(X))[k], reference, ideal=True)
+            for sign in (1, -1)
+        )
         for name in ("q", "qd", "tau"):
             expected = (getattr(up, name) - getattr(down, name)) / (2 * h)
-            deviation = np.linalg.norm(getattr(tangent, name)[:, :, k] - expected) / np.linalg.norm(expected)
+            deviation = np.linalg.norm(getattr(tangent, name)[:, :, k] - expected) / np.linalg.norm(
+                expected
+            )
             assert deviation < tolerance, (simulator.model.BASE_PARAMETERS[k], name, deviation)
     return np.abs(found.qd)
 
@@ -45,7 +54,9 @@ def agree(simulator: Simulator, X: np.ndarray, reference: Reference, columns, to
     ids=["cascade", "industrial", "pid"],
 )
 def test_reversals_of_one_axis(settings):
-    """Five reversals, where the friction jumps and its instant moves: without that term the deviation is 5 %."""
+    """Five reversals, where the friction jumps and its instant moves: without that term the
+    deviation is 5 %.
+    """
     emps = load_model("emps", folder=GENERATED)
     t = np.arange(2500) / 1000
     reference = Reference.sampled((0.02 * np.sin(3.3 * t) + 0.01 * np.sin(7 * t))[:, None], 1000.0)
@@ -73,7 +84,9 @@ def test_six_joints_with_the_coupled_wrist():
         "kd": [2.5361, 4.1174, 1.1793, 0.5462, 0.5714, 0.1954],
         "gain": [35.24, 32.04, 23.94, 9.05, 15.5, 6.56],
     }
-    settings = structure(Controller, {"law": law, "rate": 5000, "reference": {"points": {"duration": 1.2}}})
+    settings = structure(
+        Controller, {"law": law, "rate": 5000, "reference": {"points": {"duration": 1.2}}}
+    )
     whole = reference_of(settings, tx40)
     reference = replace(whole, q=whole.q[:1500], qd=whole.qd[:1500], qdd=whole.qdd[:1500])
     truth = parameters_of(tx40, settings)

@@ -1,6 +1,8 @@
-"""Simulated TX40 records with a known truth, the `values` of the robot file, through the emitted module, decimation and least squares.
+"""Simulated TX40 records with a known truth, the `values` of the robot file, through the emitted
+module, decimation and least squares.
 
-The states are exact, so least squares is unbiased: noise-free torques give the parameters back, and over many records with torque
+The states are exact, so least squares is unbiased: noise-free torques give the parameters back, and
+over many records with torque
 noise the stated deviations are those of the scatter.
 """
 
@@ -13,17 +15,19 @@ import numpy as np
 import pytest
 from campaign import campaign
 
-from runtime.estimators.methods import estimate_of
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
-from runtime.observation.filters import States
-from runtime.observation.observation import decimated_torque, observation_from_states
-from runtime.observation.rows import select_rows
 from runtime.records.record import Record
+from runtime.rows.prepared import decimated_torque, observation_from_states
+from runtime.rows.selection import select_rows
 from runtime.settings.study import EstimateSettings, study_from_mapping
+from runtime.signals.filters import States
 
 RATE, N = 500.0, 4000
 NOISE = np.array([3.0, 3.0, 2.0, 0.8, 0.8, 0.5])  # N m, of each joint
-STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": None, "decimate": {"factor": 5}}, "rows": {"trim": 0}})
+STUDY = study_from_mapping(
+    {"signals": {"median": 1, "lowpass": None, "decimate": {"factor": 5}}, "rows": {"trim": 0}}
+)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +59,11 @@ def clean(tx40, states, truth):
     tau = tx40.inverse_dynamics(states.q, states.qd, states.qdd, truth)
     record = Record(np.arange(N) / RATE, states.q, tau, rate=RATE)
     selection = select_rows(record, states.qd, STUDY.signals, STUDY.rows)
-    return tau, selection, observation_from_states(tx40, states, decimated_torque(tau, selection), selection)
+    return (
+        tau,
+        selection,
+        observation_from_states(tx40, states, decimated_torque(tau, selection), selection),
+    )
 
 
 def test_noise_free_records_give_the_parameters_back(clean, truth) -> None:
@@ -67,9 +75,11 @@ def test_noise_free_records_give_the_parameters_back(clean, truth) -> None:
 @pytest.mark.parametrize("runs", [40, pytest.param(200, marks=campaign)])
 @pytest.mark.parametrize("method", ["ols", "wls"])
 def test_stated_sigma_is_the_scatter_over_records(clean, truth, method: str, runs: int) -> None:
-    """z = (X - truth)/sigma has variance 1. OLS with unequal joints: the correlation-corrected sigma; WLS: that of eq. (10) too.
+    """z = (X - truth)/sigma has variance 1. OLS with unequal joints: the correlation-corrected
+    sigma; WLS: that of eq. (10) too.
 
-    The decimation filter passes 0.8 of the new band, so neighbouring rows are correlated by some per cent: bounds of 15 % on the
+    The decimation filter passes 0.8 of the new band, so neighbouring rows are correlated by some
+    per cent: bounds of 15 % on the
     mean over the parameters and of 35 % on each (200 runs: 10 % at two deviations; 40 runs: 22 %).
     """
     tau, selection, seen = clean

@@ -12,7 +12,15 @@ from runtime.records.datasets import DATASETS, dataset_study
 from runtime.records.named import study_of
 from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text
-from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping, to_mapping
+from runtime.settings.study import (
+    CestacSettings,
+    Lowpass,
+    Rows,
+    Signals,
+    Study,
+    study_from_mapping,
+    to_mapping,
+)
 
 DESIGN = """
 symgen: 1
@@ -29,7 +37,11 @@ controller: {law: {kind: cascade, kp: 160.18}}
 
 def test_defaults_are_those_of_the_chapter():
     study = Study()
-    assert (study.signals.lowpass.cutoff, study.signals.lowpass.order, study.signals.lowpass.on) == (50, 4, ("q", "qd"))
+    assert (
+        study.signals.lowpass.cutoff,
+        study.signals.lowpass.order,
+        study.signals.lowpass.on,
+    ) == (50, 4, ("q", "qd"))
     assert study.signals.decimate.factor == "auto"
     assert study.essential.threshold == 1.04
     assert study.cestac.runs == 5
@@ -50,7 +62,14 @@ def test_study_file_of_the_design():
     assert study.controller.law.kp == 160.18 and study.controller.delay == 0
 
 
-@pytest.mark.parametrize("study", [Study(), study_from_text(DESIGN), *(study_from_mapping(dataset_study(name)) for name in DATASETS)])
+@pytest.mark.parametrize(
+    "study",
+    [
+        Study(),
+        study_from_text(DESIGN),
+        *(study_from_mapping(dataset_study(name)) for name in DATASETS),
+    ],
+)
 def test_written_settings_read_back(study):
     mapping = to_mapping(study)
     assert study_from_mapping(mapping) == study
@@ -87,30 +106,68 @@ def test_a_filter_is_switched_off_by_null():
 
 def test_one_record_or_several():
     assert len(study_from_text("record: {files: a.csv}").record) == 1
-    assert [r.files for r in study_from_text("record: [{files: a.csv}, {files: b.csv}]").record] == [("a.csv",), ("b.csv",)]
+    assert [
+        r.files for r in study_from_text("record: [{files: a.csv}, {files: b.csv}]").record
+    ] == [("a.csv",), ("b.csv",)]
 
 
 @pytest.mark.parametrize(
     ("mapping", "path", "said"),
     [
         ({"signal": {}}, ("signal",), "unknown key signal; known: symgen, record, signals"),
-        ({"signals": {"lowpas": 1}}, ("signals", "lowpas"), "known: median, lowpass, ends, decimate"),
+        (
+            {"signals": {"lowpas": 1}},
+            ("signals", "lowpas"),
+            "known: median, lowpass, ends, decimate",
+        ),
         ({"signals": {"median": 4}}, ("signals", "median"), "odd window"),
         ({"signals": {"median": 2.5}}, ("signals", "median"), "expected an integer"),
-        ({"signals": {"lowpass": {"cutoff": "fast"}}}, ("signals", "lowpass", "cutoff"), "expected a number"),
-        ({"signals": {"lowpass": {"cutoff": -1}}}, ("signals", "lowpass", "cutoff"), "expected more than 0"),
-        ({"signals": {"lowpass": {"on": ["qdd"]}}}, ("signals", "lowpass", "on", 0), "expected q or qd"),
-        ({"signals": {"decimate": {"factor": 0}}}, ("signals", "decimate", "factor"), "0; expected at least 1 or auto"),
+        (
+            {"signals": {"lowpass": {"cutoff": "fast"}}},
+            ("signals", "lowpass", "cutoff"),
+            "expected a number",
+        ),
+        (
+            {"signals": {"lowpass": {"cutoff": -1}}},
+            ("signals", "lowpass", "cutoff"),
+            "expected more than 0",
+        ),
+        (
+            {"signals": {"lowpass": {"on": ["qdd"]}}},
+            ("signals", "lowpass", "on", 0),
+            "expected q or qd",
+        ),
+        (
+            {"signals": {"decimate": {"factor": 0}}},
+            ("signals", "decimate", "factor"),
+            "0; expected at least 1 or auto",
+        ),
         ({"rows": {"window": [1, 0]}}, ("rows", "window"), "the earlier time first"),
         ({"rows": {"window": [1]}}, ("rows", "window"), "1 values; expected at least 2"),
         ({"rows": {"low_speed": "slow"}}, ("rows", "low_speed"), "expected a number"),
-        ({"estimate": {"method": "magic"}}, ("estimate", "method"), "expected ols, wls, irls, tls, iv, didim, cloe or feasible"),
+        (
+            {"estimate": {"method": "magic"}},
+            ("estimate", "method"),
+            "expected ols, wls, irls, tls, iv, didim, cloe or feasible",
+        ),
         ({"essential": {"threshold": 1}}, ("essential", "threshold"), "expected more than 1"),
-        ({"record": [{"files": "a"}, {"side": "left"}]}, ("record", 1, "side"), "expected motor or joint"),
+        (
+            {"record": [{"files": "a"}, {"side": "left"}]},
+            ("record", 1, "side"),
+            "expected motor or joint",
+        ),
         ({"record": {"rate": True}}, ("record", "rate"), "expected a number"),
-        ({"record": {"units": {"q": "counts"}}}, ("record", "counts_per_revolution"), "counts need it"),
+        (
+            {"record": {"units": {"q": "counts"}}},
+            ("record", "counts_per_revolution"),
+            "counts need it",
+        ),
         ({"cestac": {"runs": 1}}, ("cestac", "runs"), "at least 2"),
-        ({"cestac": {"delta": [1e-3, float("inf")]}}, ("cestac", "delta", 1), "inf; expected a finite number"),
+        (
+            {"cestac": {"delta": [1e-3, float("inf")]}},
+            ("cestac", "delta", 1),
+            "inf; expected a finite number",
+        ),
         ({"symgen": 2}, ("symgen",), "this version reads 1"),
         ({"validate": {"split": [[0, 1]]}}, ("validate", "split"), "at least two"),
     ],
@@ -125,7 +182,11 @@ def test_errors_give_the_path(mapping, path, said):
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
-        ("symgen: 1\nsignals:\n  lowpass: {cutoff: 50,\n    order: four}\n", 4, "signals.lowpass.order"),
+        (
+            "symgen: 1\nsignals:\n  lowpass: {cutoff: 50,\n    order: four}\n",
+            4,
+            "signals.lowpass.order",
+        ),
         ("record:\n- files: a\n- files: b\n  side: 3\n", 4, "record[1].side"),
         ("cestac:\n  delta:\n  - 1e-3\n  - 2*qi\n", 4, "cestac.delta[1]"),
         ("rows: {window: [0,\n", 2, "not YAML"),
@@ -139,14 +200,18 @@ def test_errors_of_a_file_give_the_line(text, line, said):
     assert e.value.line == line and said in str(e.value) and "arm.study.yaml" in str(e.value)
 
 
-@pytest.mark.parametrize("text", ["a: !!python/object/apply:os.getcwd []", "a: &a [*a]", "- 1", "a: 2024-01-01", "\x00"])
+@pytest.mark.parametrize(
+    "text", ["a: !!python/object/apply:os.getcwd []", "a: &a [*a]", "- 1", "a: 2024-01-01", "\x00"]
+)
 def test_other_content_is_refused(text):
     with pytest.raises(InputError):
         study_from_text(text)
 
 
 def test_an_alias_bomb_is_refused():
-    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"] + [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"] + [
+        f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)
+    ]
     with pytest.raises(InputError, match="anchors and aliases"):
         study_from_text("\n".join(lines))
 
@@ -163,14 +228,26 @@ def test_record_on_a_command_line(tmp_path):
     assert study_of(str(tmp_path / "arm.yaml")) == (study_from_text(DESIGN), tmp_path)
     assert study_of("emps")[0] == study_from_mapping(dataset_study("emps"))
     study, folder = study_of(str(tmp_path / "run.csv.gz"))
-    assert study.record[0].files == ("run.csv.gz",) and study.record[0].side == "joint" and folder == tmp_path
+    assert (
+        study.record[0].files == ("run.csv.gz",)
+        and study.record[0].side == "joint"
+        and folder == tmp_path
+    )
     with pytest.raises(InputError, match="expected a dataset"):
         study_of("rx90")
 
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("2*pi/10000", 2 * math.pi / 10000), ("-3", -3), ("1e-3", 1e-3), ("(1 + 2)*3", 9), ("2**-3", 0.125), (" 4 ", 4), ("+pi", math.pi)],
+    [
+        ("2*pi/10000", 2 * math.pi / 10000),
+        ("-3", -3),
+        ("1e-3", 1e-3),
+        ("(1 + 2)*3", 9),
+        ("2**-3", 0.125),
+        (" 4 ", 4),
+        ("+pi", math.pi),
+    ],
 )
 def test_arithmetic(text, value):
     assert number(text) == value
@@ -233,20 +310,28 @@ def test_settings_made_in_python_are_checked():
 
 
 def test_numbers_of_numpy_are_numbers():
-    study = Study(cestac=CestacSettings(delta=np.array([1e-3, 2e-3]), runs=np.int64(3)), rows=Rows(low_speed=np.float32(0.5)))
+    study = Study(
+        cestac=CestacSettings(delta=np.array([1e-3, 2e-3]), runs=np.int64(3)),
+        rows=Rows(low_speed=np.float32(0.5)),
+    )
     assert (study.cestac.delta, study.cestac.runs, study.rows.low_speed) == ((1e-3, 2e-3), 3, 0.5)
 
 
 def test_settings_are_values():
     study = study_from_text(DESIGN)
-    assert hash(study.rows) == hash(study_from_text(DESIGN).rows) and study == pickle.loads(pickle.dumps(study))  # noqa: S301
+    assert hash(study.rows) == hash(study_from_text(DESIGN).rows)
+    assert study == pickle.loads(pickle.dumps(study))  # noqa: S301
     assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
 
 
 def test_blocks_of_the_records():
-    assert [study_from_mapping({"stream": value}).stream for value in ("auto", "off", 5000)] == ["auto", "off", 5000]
+    assert [study_from_mapping({"stream": value}).stream for value in ("auto", "off", 5000)] == [
+        "auto",
+        "off",
+        5000,
+    ]
     for value in (9, "always", 0.5):
         with pytest.raises(SettingsError, match=r"stream: .*expected auto"):
             study_from_mapping({"stream": value})

@@ -1,4 +1,6 @@
-"""Along one record: jumps of positions, torques cut off, a robot that changes; records that only look like it are left alone."""
+"""Along one record: jumps of positions, torques cut off, a robot that changes; records that only
+look like it are left alone.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.identification.plausibility.plausibility import Plausibility
+from runtime.checks.plausibility import Plausibility
 from symgen.description.yaml import parse_robot
 
 ARM = b"""\
@@ -30,11 +32,28 @@ def right() -> runtime.Record:
     """20 s at 500 Hz, 2 % of noise."""
     t = np.arange(10_000)[:, None] / 500
     w, a = np.array([[2.0, 2.6], [5.0, 4.1]]), np.array([[1.2, 0.9], [0.5, 0.6]])
-    q, qd, qdd = (sum(a[k] * f(w[k] * t) * w[k] ** p for k in (0, 1)) for p, f in ((0, np.sin), (1, np.cos), (2, lambda x: -np.sin(x))))
+    q, qd, qdd = (
+        sum(a[k] * f(w[k] * t) * w[k] ** p for k in (0, 1))
+        for p, f in ((0, np.sin), (1, np.cos), (2, lambda x: -np.sin(x)))
+    )
     chi = dict.fromkeys(MODEL.STANDARD_PARAMETERS, 0.0)
-    chi |= {"ZZ1": 0.5, "MX1": 1.0, "M2": 3.0, "MX2": 0.6, "ZZ2": 0.2, "FV1": 0.5, "FS1": 0.4, "FV2": 0.3, "FS2": 0.2}
+    chi |= {
+        "ZZ1": 0.5,
+        "MX1": 1.0,
+        "M2": 3.0,
+        "MX2": 0.6,
+        "ZZ2": 0.2,
+        "FV1": 0.5,
+        "FS1": 0.4,
+        "FV2": 0.3,
+        "FS2": 0.2,
+    }
     tau = MODEL.inverse_dynamics(q, qd, qdd, MODEL.base_parameters(chi))
-    return runtime.Record(t[:, 0], q, tau + 0.02 * tau.std(axis=0) * np.random.default_rng(0).standard_normal(tau.shape))
+    return runtime.Record(
+        t[:, 0],
+        q,
+        tau + 0.02 * tau.std(axis=0) * np.random.default_rng(0).standard_normal(tau.shape),
+    )
 
 
 def judged(record: runtime.Record) -> Plausibility:
@@ -44,7 +63,9 @@ def judged(record: runtime.Record) -> Plausibility:
 def test_a_right_record_and_one_of_coarse_counts_are_left_alone(right: runtime.Record) -> None:
     assert judged(right).worst is None
     assert not any(
-        "motion" in check.question for check in judged(replace(right, q=np.round(right.q / 0.06) * 0.06)).checks if check.state == "no"
+        "motion" in check.question
+        for check in judged(replace(right, q=np.round(right.q / 0.06) * 0.06)).checks
+        if check.state == "no"
     )
 
 
@@ -55,7 +76,9 @@ def test_a_right_record_and_one_of_coarse_counts_are_left_alone(right: runtime.R
         ((0, 10_000), (3000, 3300), "Joint 2 jumps by", "dropped out"),
     ],
 )
-def test_jumps_are_told(right: runtime.Record, kept: tuple[int, ...], frozen: tuple[int, int], joints: str, remedy: str) -> None:
+def test_jumps_are_told(
+    right: runtime.Record, kept: tuple[int, ...], frozen: tuple[int, int], joints: str, remedy: str
+) -> None:
     q = right.q.copy()
     q[slice(*frozen), 1] = q[frozen[0], 1]
     rows = np.concatenate([np.arange(a, b) for a, b in zip(kept[::2], kept[1::2], strict=True)])
@@ -72,17 +95,28 @@ def test_angles_that_wrap_are_told(right: runtime.Record) -> None:
 def test_clipped_torques_are_told(right: runtime.Record) -> None:
     bound = 0.6 * np.abs(right.tau).max(axis=0)
     worst = judged(replace(right, tau=np.clip(right.tau, -bound, bound))).worst
-    assert worst is not None and "largest or smallest value in" in worst.finding and "clipped" in worst.remedy
+    assert (
+        worst is not None
+        and "largest or smallest value in" in worst.finding
+        and "clipped" in worst.remedy
+    )
 
 
 def test_a_drive_at_its_limit_is_not_accused() -> None:
-    """A mass driven to and fro by a force of one size: the force stays at its bounds, and is what acted."""
+    """A mass driven to and fro by a force of one size: the force stays at its bounds, and is what
+    acted.
+    """
     robot = b"symgen: 1\nname: slide\ngravity: [0, 0, 0]\nframes: {1: {ant: 0, sigma: 1, alpha: 0, d: 0, theta: 0, r: q1}}\n"
     t = np.arange(8000) / 400
     force = np.where(np.mod(t, 2.0) < 1.0, 5.0, -5.0)
     q = np.cumsum(np.cumsum(force / 2.5) / 400 - 1.0) / 400
-    found = runtime.plausibility(symgen.model(parse_robot(robot, "slide")), runtime.Record(t, q, force))
-    assert any("largest or smallest value in" in check.finding for check in found.checks) and found.worst is None, found.to_text()
+    found = runtime.plausibility(
+        symgen.model(parse_robot(robot, "slide")), runtime.Record(t, q, force)
+    )
+    assert (
+        any("largest or smallest value in" in check.finding for check in found.checks)
+        and found.worst is None
+    ), found.to_text()
 
 
 def test_a_gain_that_changes_is_told_with_its_time(right: runtime.Record) -> None:
@@ -90,7 +124,9 @@ def test_a_gain_that_changes_is_told_with_its_time(right: runtime.Record) -> Non
     assert worst is not None and worst.finding.startswith("Before and after 11"), worst
 
 
-def test_a_torque_that_never_changes_ends_the_questions(right: runtime.Record, recwarn: pytest.WarningsRecorder) -> None:
+def test_a_torque_that_never_changes_ends_the_questions(
+    right: runtime.Record, recwarn: pytest.WarningsRecorder
+) -> None:
     found = judged(replace(right, tau=right.tau * [1.0, 0.0]))
     assert found.worst is not None and found.worst.finding == "The torque of joint 2 is constant"
     assert found.checks[-1].finding == "Not asked: a torque never changes" and not recwarn.list

@@ -1,14 +1,28 @@
-"""Families of trajectories: derivatives, rest at both ends, chains, files, and the same text over casadi."""
+"""Families of trajectories: derivatives, rest at both ends, chains, files, and the same text over
+casadi.
+"""
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
-from runtime.settings.families import FAMILIES, Fourier, PointToPoint, Sinusoids, Triangular, family_from_mapping
+from runtime.settings.families import (
+    FAMILIES,
+    Fourier,
+    PointToPoint,
+    Sinusoids,
+    Triangular,
+    family_from_mapping,
+)
 from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 
-EVERY = [Fourier(4.0, 3, 2), Sinusoids(5.0, 3, 0.8, 0.7), PointToPoint(5, 1.1, 0.25), Triangular(4, 1.5, 0.3, 0.4)]
+EVERY = [
+    Fourier(4.0, 3, 2),
+    Sinusoids(5.0, 3, 0.8, 0.7),
+    PointToPoint(5, 1.1, 0.25),
+    Triangular(4, 1.5, 0.3, 0.4),
+]
 
 
 def coefficients(family: object, seed: int = 0) -> np.ndarray:
@@ -23,7 +37,9 @@ def test_velocity_and_acceleration_are_derivatives(family: object) -> None:
     q, qd, qdd = motion.states(t)
     h = t[1] - t[0]
     assert np.abs((q[2:] - q[:-2]) / (2 * h) - qd[1:-1]).max() < 1e-5
-    assert np.abs((qd[2:] - qd[:-2]) / (2 * h) - qdd[1:-1]).max() < 2e-2  # the acceleration has corners
+    assert (
+        np.abs((qd[2:] - qd[:-2]) / (2 * h) - qdd[1:-1]).max() < 2e-2
+    )  # the acceleration has corners
     assert np.abs(np.diff(qdd, axis=0)).max() < 2e-2  # but no steps
 
 
@@ -47,7 +63,10 @@ def test_casadi_says_the_same(family: object) -> None:
 
 def test_points_are_reached_and_velocities_constant() -> None:
     p = np.array([[0.0], [1.0], [0.5]])
-    still, turning = Motion((Part(PointToPoint(3, 1.0, 0.2), p),)), Motion((Part(Triangular(3, 1.0, 0.2), p),))
+    still, turning = (
+        Motion((Part(PointToPoint(3, 1.0, 0.2), p),)),
+        Motion((Part(Triangular(3, 1.0, 0.2), p),)),
+    )
     q, qd, _ = still.states(np.array([0.0, 1.0, 2.0, 0.5, 1.5]))
     assert np.allclose(q[:3], p, atol=1e-14)
     assert np.allclose(qd.ravel(), [0.0, 0.0, 0.0, 1.25, -0.625])  # (p1 - p0)/(travel - blend)
@@ -59,7 +78,12 @@ def test_points_are_reached_and_velocities_constant() -> None:
 
 def test_chain_and_file() -> None:
     one, two = PointToPoint(3, 1.0, 0.2), Sinusoids(2.0, 1, 1.0, 0.5)
-    motion = Motion((Part(one, np.array([[0.0], [1.0], [0.5]])), Part(two, np.array([[0.5], [0.1], [0.7], [0.3]]))))
+    motion = Motion(
+        (
+            Part(one, np.array([[0.0], [1.0], [0.5]])),
+            Part(two, np.array([[0.5], [0.1], [0.7], [0.3]])),
+        )
+    )
     assert motion.duration == pytest.approx(4.0)
     t, q, *_ = motion.sampled(1000.0)
     assert len(t) == 4001

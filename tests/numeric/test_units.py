@@ -1,4 +1,6 @@
-"""Units at the border: what the table says is what pint says, texts are checked before pint sees them, and figures come out in SI."""
+"""Units at the border: what the table says is what pint says, texts are checked before pint sees
+them, and figures come out in SI.
+"""
 
 import subprocess
 import sys
@@ -22,7 +24,15 @@ OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
 @pytest.mark.parametrize("name", [name for name in TABLE if name not in OURS])
 def test_table_is_that_of_pint(name):
     kind, factor = TABLE[name]
-    assert float(pint.UnitRegistry(non_int_type=Fraction).Quantity(Fraction(1), name).to(SI[kind]).magnitude) == factor
+    assert (
+        float(
+            pint.UnitRegistry(non_int_type=Fraction)
+            .Quantity(Fraction(1), name)
+            .to(SI[kind])
+            .magnitude
+        )
+        == factor
+    )
 
 
 @pytest.mark.parametrize(
@@ -58,11 +68,22 @@ def test_units_of_pint(read, name, kind, factor):
         (position_unit, "grad/s", "such as rad, deg, rev"),
         (position_unit, "percent", "not a unit known here"),
         (position_unit, "grad", "such as gon or deg"),
-        (position_unit, "Grad", "'Grad' is 1e+09 radian, which nothing here is measured in; expected units such as rad, deg"),
+        (
+            position_unit,
+            "Grad",
+            (
+                "'Grad' is 1e+09 radian, which nothing here is measured in; expected units such as "
+                "rad, deg"
+            ),
+        ),
         (torque_unit, "%", "'%' of what? write the unit of the rated value"),
         (torque_unit, "MA", "'MA' is 1e+06 ampere"),
         (position_unit, "s", "is a unit of time"),
-        (torque_unit, "deg", "is a unit of angle; expected one of torque, force, current, voltage, such as N*m"),
+        (
+            torque_unit,
+            "deg",
+            "is a unit of angle; expected one of torque, force, current, voltage, such as N*m",
+        ),
         (torque_unit, "N*m/rad", "not a unit known here"),
         (torque_unit, "nm", "is a unit of length"),
         (time_unit, "Hz", "such as s, ms, us, ns"),
@@ -108,7 +129,11 @@ def test_speeds():
     rows = study_from_mapping({"rows": {"low_speed": ["30 rpm", "5 deg/s", 0.1, "2*pi/60"]}}).rows
     np.testing.assert_allclose(rows.low_speed, [np.pi, np.pi / 36, 0.1, np.pi / 30], rtol=3e-16)
     assert study_from_mapping({"rows": {"low_speed": "20 mm/s"}}).rows.low_speed == 0.02
-    for text, said in (("30 rpmz", "'rpmz' is not a unit"), ("30 deg", "is a unit of angle"), ("1..2 rpm", "such as 30 rpm")):
+    for text, said in (
+        ("30 rpmz", "'rpmz' is not a unit"),
+        ("30 deg", "is a unit of angle"),
+        ("1..2 rpm", "such as 30 rpm"),
+    ):
         with pytest.raises(SettingsError, match=rf"rows\.low_speed: .*{said}"):
             study_from_mapping({"rows": {"low_speed": text}})
 
@@ -125,7 +150,11 @@ def test_degrees_and_milliampere(tmp_path):
         "units": {"t": "us", "q": "degree", "tau": "mA"},
         "side": "motor",
     }
-    drives = {"ratio": np.diag([50.0, -80.0]), "offset": [0.0, 0.0], "torque_constant": [0.06, 0.08]}
+    drives = {
+        "ratio": np.diag([50.0, -80.0]),
+        "offset": [0.0, 0.0],
+        "torque_constant": [0.06, 0.08],
+    }
     robot = SimpleNamespace(NAME="arm", JOINTS=(1, 2), DRIVES=drives)
     found = read_record(study_from_mapping({"record": record}).record[0], robot, folder=tmp_path)
     np.testing.assert_allclose(found.q, q / [50, -80], rtol=1e-15)

@@ -9,8 +9,13 @@ import pytest
 from planar_data import OLS, TRUE, motion, observation
 
 from runtime.errors import InputError
-from runtime.estimators.methods import estimate_of
-from runtime.identification.validation import cross_validation, direct_comparison, split_validation, weak_directions
+from runtime.identification.validation import (
+    cross_validation,
+    direct_comparison,
+    split_validation,
+    weak_directions,
+)
+from runtime.loop.methods import estimate_of
 from runtime.settings.study import EstimateSettings
 
 
@@ -40,7 +45,12 @@ def test_other_records_are_predicted():
     fit = observation(noise=(0.3, 0.05), seed=1)
     other = observation(noise=(0.3, 0.05), seed=2, motion=lambda t: motion(1.3 * t + 5))
     result = cross_validation(
-        fit, {"second": other}, {"all": OLS, "essential": replace(OLS, columns=("MX1R", "FV1", "FS1", "MX2", "FV2", "FS2", "ZZ1R"))}
+        fit,
+        {"second": other},
+        {
+            "all": OLS,
+            "essential": replace(OLS, columns=("MX1R", "FV1", "FS1", "MX2", "FV2", "FS2", "ZZ1R")),
+        },
     )
     assert [(p.part, p.columns, p.count, p.fitted) for p in result.predictions] == [
         ("fit", "all", 10, True),
@@ -62,9 +72,17 @@ def test_windows_of_one_record():
     assert [p.part for p in result.predictions] == ["[0, 5] s", "[5.01, ] s"]
     found = estimate_of(seen.between(0, 5))
     late = seen.between(5.01, None)
-    assert np.isclose(result.predictions[1].relative_error, 100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y))
+    assert np.isclose(
+        result.predictions[1].relative_error,
+        100 * np.linalg.norm(late.Y - late.W @ found.X) / np.linalg.norm(late.Y),
+    )
     epoch = replace(seen, t=seen.t + 1.795e9)
-    parts = [p.part for p in split_validation(epoch, [(1.795e9, 1.795e9 + 5), (1.795e9 + 5.01, None)], {"all": OLS}).predictions]
+    parts = [
+        p.part
+        for p in split_validation(
+            epoch, [(1.795e9, 1.795e9 + 5), (1.795e9 + 5.01, None)], {"all": OLS}
+        ).predictions
+    ]
     assert parts == ["[1795000000.000, 1795000005.000] s", "[1795000005.010, ] s"]
     with pytest.raises(InputError, match="at least two"):
         split_validation(seen, [(0, 5)], {"all": OLS})
@@ -84,7 +102,12 @@ def test_parameters_that_trade_are_named():
     assert np.isclose(sum(w**2 for w in found.directions[0].weights.values()), 1, atol=1e-3)
     assert "MX1R MY1" in str(found)
     (warning,) = found.warnings
-    assert warning.startswith("MX1R and MY1 trade against each other on this record (correlation -1.00)") and "excite" in warning
+    assert (
+        warning.startswith(
+            "MX1R and MY1 trade against each other on this record (correlation -1.00)"
+        )
+        and "excite" in warning
+    )
     json.loads(found.to_json())
 
 

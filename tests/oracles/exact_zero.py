@@ -1,4 +1,6 @@
-"""Helpers of the tests of symbols: exact zero of trigonometric polynomials by SymPy, and values of SymPy objects at many states."""
+"""Helpers of the tests of symbols: exact zero of trigonometric polynomials by SymPy, and values of
+SymPy objects at many states.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ import sympy
 def is_zero(expression) -> bool:
     """Whether a polynomial in cos and sin of sums of symbols, and in symbols, vanishes identically.
 
-    Sums of angles are expanded by SymPy; with s**2 + c**2 - 1 of every angle as the (Groebner) basis, the remainder is a normal form.
+    Sums of angles are expanded by SymPy; with s**2 + c**2 - 1 of every angle as the (Groebner)
+    basis, the remainder is a normal form.
     """
     e = sympy.expand(expression, trig=True)
     names = {}
@@ -21,10 +24,15 @@ def is_zero(expression) -> bool:
     angles = sorted({str(f.args[0]) for f in names})
     if not angles:
         return sympy.expand(e) == 0
-    sines, cosines = [sympy.Symbol(f"sin_{a}") for a in angles], [sympy.Symbol(f"cos_{a}") for a in angles]
+    sines, cosines = (
+        [sympy.Symbol(f"sin_{a}") for a in angles],
+        [sympy.Symbol(f"cos_{a}") for a in angles],
+    )
     others = sorted(e.free_symbols - {*sines, *cosines}, key=str)
     ring, *generators = sympy.ring([*sines, *cosines, *others], sympy.QQ, "lex")
-    basis = [s**2 + c**2 - 1 for s, c in zip(generators, generators[len(angles) :], strict=False)][: len(angles)]
+    basis = [s**2 + c**2 - 1 for s, c in zip(generators, generators[len(angles) :], strict=False)][
+        : len(angles)
+    ]
     return ring.from_expr(e).rem(basis) == 0
 
 
@@ -33,15 +41,25 @@ def are_zero(matrix) -> bool:
 
 
 def valued(expression, values, steps=()):
-    """A SymPy scalar or Matrix at N states, (N, ...): `values` by name are numbers or (N,); `steps` are [(symbol, expression)] to compute first."""
+    """A SymPy scalar or Matrix at N states, (N, ...): `values` by name are numbers or (N,); `steps`
+    are [(symbol, expression)] to compute first.
+    """
     scalar = not hasattr(expression, "shape")
     entries = [expression] if scalar else list(expression)
-    free = set().union(*(e.free_symbols for e in entries), *(e.free_symbols for _, e in steps)) - {x for x, _ in steps}
+    free = set().union(*(e.free_symbols for e in entries), *(e.free_symbols for _, e in steps)) - {
+        x for x, _ in steps
+    }
     used = sorted(free, key=str)
     known = [np.asarray(values[str(x)]) for x in used]
-    function = sympy.lambdify(used, entries, "numpy", cse=lambda reduced: (list(steps), list(reduced)))
+    function = sympy.lambdify(
+        used, entries, "numpy", cse=lambda reduced: (list(steps), list(reduced))
+    )
     N = max((np.size(v) for v in values.values()), default=1)
     made = np.stack([np.broadcast_to(e, (N,)) for e in function(*known)], axis=-1)
     if scalar:
         return made[:, 0]
-    return made.reshape(N, *expression.shape)[..., 0] if expression.shape[1] == 1 else made.reshape(N, *expression.shape)
+    return (
+        made.reshape(N, *expression.shape)[..., 0]
+        if expression.shape[1] == 1
+        else made.reshape(N, *expression.shape)
+    )

@@ -9,16 +9,37 @@ from symgen.description.robot import FIXED, JOINT_FAMILIES, REVOLUTE, Element, F
 Row = tuple[int, int, str, str, str, str]  # ant, sigma, alpha, d, theta, r
 
 
-def robot(name: str, rows: list[Row], gravity: tuple[str, str, str], constants: dict[str, float], **more: object) -> Robot:
+def robot(
+    name: str,
+    rows: list[Row],
+    gravity: tuple[str, str, str],
+    constants: dict[str, float],
+    **more: object,
+) -> Robot:
     """A Robot from table rows; joint friction, motor inertia and offset on every actuated joint."""
     passive = more.pop("passive", ())
     frames = []
     for j, (ant, sigma, *texts) in enumerate(rows, start=1):
         alpha, d, theta, r = (parse(text) for text in texts)
-        frames.append(Frame(j, ant, sigma, int(sigma != FIXED and j not in passive), ZERO, ZERO, alpha, d, theta, r))  # type: ignore[operator]
+        frames.append(
+            Frame(
+                j,
+                ant,
+                sigma,
+                int(sigma != FIXED and j not in passive),
+                ZERO,
+                ZERO,
+                alpha,
+                d,
+                theta,
+                r,
+            )
+        )  # type: ignore[operator]
     each = {f.j: {f.j: ONE} for f in frames if f.mu}
     kinds = ("inertia", "viscous", "coulomb", "offset")
-    elements = tuple(Element(family, kind, each, {}) for family, kind in zip(JOINT_FAMILIES, kinds, strict=True))
+    elements = tuple(
+        Element(family, kind, each, {}) for family, kind in zip(JOINT_FAMILIES, kinds, strict=True)
+    )
     g = tuple(parse(text) for text in gravity)
     return Robot(name, tuple(frames), g, constants=constants, elements=elements, **more)  # type: ignore[arg-type]
 
@@ -43,7 +64,8 @@ def six_r() -> Robot:
 
 
 def four_bar(rocker: float = 0.3, start: dict[int, float] | None = None) -> Robot:
-    """Four-bar linkage in the plane: crank q1 actuated; coupler q2, rocker q3 passive, 4 cut; frame 5 on link 3 coincides with frame 4.
+    """Four-bar linkage in the plane: crank q1 actuated; coupler q2, rocker q3 passive, 4 cut; frame
+    5 on link 3 coincides with frame 4.
 
     A parallelogram when the rocker is as long as the crank, 0.3 m.
     """
@@ -55,4 +77,11 @@ def four_bar(rocker: float = 0.3, start: dict[int, float] | None = None) -> Robo
         (3, FIXED, "0", "L3", "0", "0"),
     ]
     constants = {"L1": 0.3, "L2": 0.5, "L3": rocker, "g": 9.81}
-    return robot("four_bar", rows, ("0", "-g", "0"), constants, passive=(2, 3, 4), loops=(Loop(4, 5, start or {}),))
+    return robot(
+        "four_bar",
+        rows,
+        ("0", "-g", "0"),
+        constants,
+        passive=(2, 3, 4),
+        loops=(Loop(4, 5, start or {}),),
+    )

@@ -1,7 +1,10 @@
-"""Random robots that carry numbers: decimals in place of constants, gears, mimic ratios, square roots, odd angles.
+"""Random robots that carry numbers: decimals in place of constants, gears, mimic ratios, square
+roots, odd angles.
 
-A seed gives one robot: a random serial or tree robot or parallelogram of this folder, or a star of slides beside a chain (uneven depth), most of whose
-constants are replaced by numbers; gears on motor inertias, friction along random combinations of joints and mimic joints are added.
+A seed gives one robot: a random serial or tree robot or parallelogram of this folder, or a star of
+slides beside a chain (uneven depth), most of whose
+constants are replaced by numbers; gears on motor inertias, friction along random combinations of
+joints and mimic joints are added.
 """
 
 from __future__ import annotations
@@ -20,7 +23,20 @@ from symgen.description.robot import PRISMATIC, REVOLUTE, Element, Frame, Robot
 
 Generator = np.random.Generator
 ROOTS = ("sqrt(3)/2", "sqrt(2)/2", "sqrt(5)/4", "sqrt(3)", "sqrt(0.02)", "sqrt(7)/9")
-ANGLES = ("pi/6", "-pi/3", "pi/4", "2*pi/5", "pi/12", "0.123456789*pi", "1.0472", "0.7854", "0.35", "-1.2217", "0.6108652382", "pi/7")
+ANGLES = (
+    "pi/6",
+    "-pi/3",
+    "pi/4",
+    "2*pi/5",
+    "pi/12",
+    "0.123456789*pi",
+    "1.0472",
+    "0.7854",
+    "0.35",
+    "-1.2217",
+    "0.6108652382",
+    "pi/7",
+)
 GEARS = ("101.25", "1798/7", "100", "80", "-48", "32", "160/3", "0.5", "153.6")
 
 
@@ -40,16 +56,18 @@ def numeric_robot(seed: int) -> Robot:
 
 def numbers_in(robot: Robot, rng: Generator, *, angles: bool) -> Robot:
     """`robot` with most of its constants as numbers."""
-    in_angles = {s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols} | {
-        s for e in robot.constraints.values() for s in e.symbols
-    }
+    in_angles = {
+        s for f in robot.frames for e in (f.gamma, f.alpha, f.theta0) for s in e.symbols
+    } | {s for e in robot.constraints.values() for s in e.symbols}
     symbolic = rng.random() < 0.3
     values: dict[str, Expression] = {}
     for name in robot.constants:
         if symbolic and rng.random() < 0.5:
             continue
         if name in in_angles:
-            values[name] = parse(str(rng.choice(ANGLES))) if angles else parse(f"{rng.uniform(0.2, 1.4):.4f}")
+            values[name] = (
+                parse(str(rng.choice(ANGLES))) if angles else parse(f"{rng.uniform(0.2, 1.4):.4f}")
+            )
         elif name.startswith("g"):
             values[name] = parse(str(rng.choice(["9.80665", "9.81", "6.93", "4.9"])))
         else:
@@ -64,7 +82,11 @@ def _length(rng: Generator) -> Expression:
         return parse(f"{rng.uniform(0.05, 1.2):.3f}")
     if kind < 0.75:
         return parse(f"{rng.uniform(0.05, 1.2):.5f}")
-    return parse(str(rng.choice(ROOTS))) if kind < 0.9 else parse(str(rng.choice(["1", "2", "1/3", "0.5"])))
+    return (
+        parse(str(rng.choice(ROOTS)))
+        if kind < 0.9
+        else parse(str(rng.choice(["1", "2", "1/3", "0.5"])))
+    )
 
 
 def _geared(robot: Robot, rng: Generator) -> Robot:
@@ -87,7 +109,9 @@ def _geared(robot: Robot, rng: Generator) -> Robot:
 
 
 def _mimic(robot: Robot, rng: Generator) -> Robot:
-    """One joint passive, tied to another by a ratio: a decimal one for a slide, a whole one for a hinge."""
+    """One joint passive, tied to another by a ratio: a decimal one for a slide, a whole one for a
+    hinge.
+    """
     moving = [f for f in robot.frames if f.mu]
     if len(moving) < 2 or robot.loops:
         return robot
@@ -99,7 +123,11 @@ def _mimic(robot: Robot, rng: Generator) -> Robot:
         return robot
     offset = parse(f"{rng.uniform(0, 0.5):.3f}") if rng.random() < 0.5 else ZERO
     frames = tuple(replace(f, mu=0) if f.j == tied.j else f for f in robot.frames)
-    return replace(robot, frames=frames, constraints={tied.j: factor * Expression.symbol(f"q{master.j}") + offset})
+    return replace(
+        robot,
+        frames=frames,
+        constraints={tied.j: factor * Expression.symbol(f"q{master.j}") + offset},
+    )
 
 
 def _uneven(rng: Generator, seed: int) -> Robot:
@@ -133,8 +161,16 @@ def _uneven(rng: Generator, seed: int) -> Robot:
         Element("OFFSET", "offset", one, {}),
         Element("K", "stiffness", one, {}),
     )
-    gravity = (ZERO, parse("-9.80665"), ZERO) if rng.random() < 0.5 else (ZERO, ZERO, parse("-9.81"))
-    return Robot(name=f"uneven_{seed}", frames=tuple(frames), gravity=gravity, elements=elements, massless=massless)
+    gravity = (
+        (ZERO, parse("-9.80665"), ZERO) if rng.random() < 0.5 else (ZERO, ZERO, parse("-9.81"))
+    )
+    return Robot(
+        name=f"uneven_{seed}",
+        frames=tuple(frames),
+        gravity=gravity,
+        elements=elements,
+        massless=massless,
+    )
 
 
 def describe_numbers(sample: Iterable[Robot]) -> dict[str, float]:
@@ -149,10 +185,17 @@ def describe_numbers(sample: Iterable[Robot]) -> dict[str, float]:
             "square root": any("sqrt" in str(e) for e in lengths),
             "no symbol at all": not robot.constants,
             "9.80665": any("9.80665" in str(e) for e in robot.gravity),
-            "odd fraction of pi": any("pi" in e.atoms and c.denominator > 2 for e in angles for m, c in e.terms.items() if m),
+            "odd fraction of pi": any(
+                "pi" in e.atoms and c.denominator > 2
+                for e in angles
+                for m, c in e.terms.items()
+                if m
+            ),
             "decimal angle": any(m == () and c for e in angles for m, c in e.terms.items()),
             "gear": any(abs(float(c)) > 20 for g in rows for m, c in g.terms.items()),
-            "combination of joints": any(len(row) > 1 for e in robot.elements for row in e.along.values()),
+            "combination of joints": any(
+                len(row) > 1 for e in robot.elements for row in e.along.values()
+            ),
             "mimic": bool(robot.constraints) and not robot.loops,
             "parallelogram": bool(robot.loops),
             "tree": any(f.ant != f.j - 1 for f in robot.frames),

@@ -1,7 +1,9 @@
-"""Random planar loops of one and two degrees of freedom, with lengths as numbers or as constants: four-bars, kites, parallelograms in either mode, sliders,
+"""Random planar loops of one and two degrees of freedom, with lengths as numbers or as constants:
+four-bars, kites, parallelograms in either mode, sliders,
 slotted levers, jacks, five-bars, a six-bar, and some of them on a turret.
 
-A kind and a seed give one robot; its `start` is closed here by plane trigonometry and chosen away from dead points.
+A kind and a seed give one robot; its `start` is closed here by plane trigonometry and chosen away
+from dead points.
 """
 
 from __future__ import annotations
@@ -102,7 +104,10 @@ def _fixed(j: int, ant: int, d: str) -> str:
 
 def _slide(j: int, ant: int, d: str, mu: int) -> str:
     """Along x of frame `ant`, at the height d."""
-    return f"  {j}: {{ant: {ant}, sigma: 1, mu: {mu}, gamma: pi/2, b: 0, alpha: pi/2, d: {d}, theta: 0, r: q{j}}}"
+    return (
+        f"  {j}: {{ant: {ant}, sigma: 1, mu: {mu}, gamma: pi/2, b: 0, alpha: pi/2, d: {d}, "
+        f"theta: 0, r: q{j}}}"
+    )
 
 
 def _made(kind: str, rng: np.random.Generator) -> Made | None:
@@ -121,7 +126,11 @@ def _made(kind: str, rng: np.random.Generator) -> Made | None:
 
 def _four_bar(kind: str, rng: np.random.Generator) -> Made | None:
     on = kind.endswith("turret")
-    sides = SIDES[kind.removesuffix(" on a turret")] if kind.startswith("four") else SIDES.get(kind, "AABB")
+    sides = (
+        SIDES[kind.removesuffix(" on a turret")]
+        if kind.startswith("four")
+        else SIDES.get(kind, "AABB")
+    )
     values = {name: _length(rng) for name in dict.fromkeys(sides)}
     L = [values[name] for name in sides]
     names = [f"L{name}" for name in sides]
@@ -149,7 +158,9 @@ def _four_bar(kind: str, rng: np.random.Generator) -> Made | None:
         _hinge(4 + k, 2 + k, names[2]),
         _fixed(5 + k, 3 + k, names[3]),
     ]
-    loops = f"  - {{cut: {4 + k}, twin: {5 + k}, start: {_start({j + k: x for j, x in q.items()})}}}"
+    loops = (
+        f"  - {{cut: {4 + k}, twin: {5 + k}, start: {_start({j + k: x for j, x in q.items()})}}}"
+    )
     massless = [int(rng.integers(2, 4)) + k] if rng.random() < 0.2 else []
     return frames, loops, {f"L{name}": x for name, x in values.items()}, massless
 
@@ -174,7 +185,9 @@ def _slider(kind: str, rng: np.random.Generator) -> Made | None:
         _hinge(4, 3, "0", 0, "-pi/2"),
         _fixed(5, 2, "LA" if kind.startswith("isosceles") else "LB"),
     ]
-    values = {"LA": L1} | ({} if kind.startswith("isosceles") else {"LB": L2}) | ({"E": e} if e else {})
+    values = (
+        {"LA": L1} | ({} if kind.startswith("isosceles") else {"LB": L2}) | ({"E": e} if e else {})
+    )
     return frames, f"  - {{cut: 4, twin: 5, start: {_start(q)}}}", values, []
 
 
@@ -197,7 +210,9 @@ def _slotted(rng: np.random.Generator) -> Made | None:
 
 
 def _jack(rng: np.random.Generator) -> Made | None:
-    """A boom on a jack, a second boom on its end on another one: two degrees of freedom, lengths in millimetres for some."""
+    """A boom on a jack, a second boom on its end on another one: two degrees of freedom, lengths in
+    millimetres for some.
+    """
     unit = float(rng.choice([1.0, 0.001]))
     a, b, c, d, L = (round(_length(rng) * unit, 8) for _ in range(5))
     q1, q4 = float(rng.uniform(0.6, 1.4)), float(rng.uniform(-1.6, -0.8))
@@ -207,7 +222,14 @@ def _jack(rng: np.random.Generator) -> Made | None:
     second = d * cmath.exp(1j * q4) - elbow
     if abs(jack) < 0.1 * unit or abs(second) < 0.1 * unit:
         return None
-    q = {1: q1, 2: _angle(jack) - np.pi / 2, 3: abs(jack), 4: q4, 5: _angle(second) - np.pi / 2, 6: abs(second)}
+    q = {
+        1: q1,
+        2: _angle(jack) - np.pi / 2,
+        3: abs(jack),
+        4: q4,
+        5: _angle(second) - np.pi / 2,
+        6: abs(second),
+    }
     q |= {7: q[1] - q[2], 9: q[4] - q[5]}
     frames = [
         _hinge(1, 0, "0"),
@@ -235,7 +257,10 @@ def _five_bar(kind: str, rng: np.random.Generator) -> Made | None:
         L3, L4, names = L1, L2, ["L0", "L1", "L2", "L1", "L2"]
     q1, q3 = float(rng.uniform(1.6, 2.4)), float(rng.uniform(0.6, 1.4))
     if slides:  # carriages on the ground line carry the rods
-        A, B = complex(-round(float(rng.uniform(0.05, 0.2)), 3), 0), complex(round(float(rng.uniform(0.1, 0.3)), 3), L0 / 4)
+        A, B = (
+            complex(-round(float(rng.uniform(0.05, 0.2)), 3), 0),
+            complex(round(float(rng.uniform(0.1, 0.3)), 3), L0 / 4),
+        )
     else:
         A, B = L1 * cmath.exp(1j * q1), L0 + L3 * cmath.exp(1j * q3)
     C = _meeting(A, B, L2, L4, int(rng.choice([1, -1])))
@@ -244,12 +269,22 @@ def _five_bar(kind: str, rng: np.random.Generator) -> Made | None:
     if slides:
         q = {1: A.real, 2: _angle(C - A) - np.pi / 2, 3: B.real, 4: _angle(C - B) - np.pi / 2}
         q[5] = q[4] - q[2]
-        frames = [_slide(1, 0, "0", 1), _hinge(2, 1, "0", 0, "-pi/2"), _slide(3, 0, "L1", 1), _hinge(4, 3, "0", 0, "-pi/2")]
+        frames = [
+            _slide(1, 0, "0", 1),
+            _hinge(2, 1, "0", 0, "-pi/2"),
+            _slide(3, 0, "L1", 1),
+            _hinge(4, 3, "0", 0, "-pi/2"),
+        ]
         values = {"L1": L0 / 4, "L2": L2, "L4": L4}
     else:
         q = {1: q1, 2: _angle((C - A) / A), 3: q3, 4: _angle((C - B) / (B - L0))}
         q[5] = q[3] + q[4] - q[1] - q[2]
-        frames = [_hinge(1, 0, "0", 1), _hinge(2, 1, names[1]), _hinge(3, 0, "L0", 1), _hinge(4, 3, names[3])]
+        frames = [
+            _hinge(1, 0, "0", 1),
+            _hinge(2, 1, names[1]),
+            _hinge(3, 0, "L0", 1),
+            _hinge(4, 3, names[3]),
+        ]
         values = dict(zip(names, (L0, L1, L2, L3, L4), strict=True))
     frames += [_hinge(5, 2, names[2]), _fixed(6, 4, names[4])]
     return frames, f"  - {{cut: 5, twin: 6, start: {_start(q)}}}", values, []
@@ -267,7 +302,14 @@ def _six_bar(rng: np.random.Generator) -> Made | None:
     H = _meeting(E, G, L[6], L[7], int(rng.choice([1, -1])))
     if H is None or abs(((H - E) / (H - G)).imag) < 0.3:
         return None
-    q = {1: q1, 2: _angle((B - A) / A), 3: _angle(B - D), 5: 0.0, 6: _angle((H - E) / (B - D)), 7: _angle(H - G)}
+    q = {
+        1: q1,
+        2: _angle((B - A) / A),
+        3: _angle(B - D),
+        5: 0.0,
+        6: _angle((H - E) / (B - D)),
+        7: _angle(H - G),
+    }
     q[5], q[8] = q[3] - q[1] - q[2], q[7] - q[3] - q[6]
     frames = [
         _hinge(1, 0, "0", 1),

@@ -1,12 +1,15 @@
 """Random arms with one or two planar parallelograms: the cases that the packaged loops leave out.
 
-A seed gives one robot: up to two joints, a parallelogram, up to three joints, sometimes a second parallelogram. Two kinds:
+A seed gives one robot: up to two joints, a parallelogram, up to three joints, sometimes a second
+parallelogram. Two kinds:
 
     driven     crank and arm on one axis, a bar from the crank to the forearm (SR400): forearm parallel to crank, bar to arm
     guided     arm and rocker on two axes of one link, a coupler between their ends: coupler parallel to that link
 
-Alpha of every axis, offsets gamma, b, r, shifts along the axes of the loop, offsets of theta (quarter turns, constants), direction of the twin,
-gravity, friction of passive joints, massless bars and the actuated pair vary; relations are declared in some and left to be found in others.
+Alpha of every axis, offsets gamma, b, r, shifts along the axes of the loop, offsets of theta
+(quarter turns, constants), direction of the twin,
+gravity, friction of passive joints, massless bars and the actuated pair vary; relations are
+declared in some and left to be found in others.
 """
 
 from __future__ import annotations
@@ -26,7 +29,9 @@ SEEDS = tuple(range(30))
 
 @dataclass
 class _Arm:
-    """Frames and loops so far; `shape` = (arm, bar) of every parallelogram: frames that keep their orientation to each other."""
+    """Frames and loops so far; `shape` = (arm, bar) of every parallelogram: frames that keep their
+    orientation to each other.
+    """
 
     rng: Generator
     constants: _Constants
@@ -71,24 +76,40 @@ class _Arm:
             alpha = self.constants.angle(f"AL{j}")
         row = {"alpha": alpha, "d": self.length(f"D{j}", 0.5)}
         if self.chance(0.25):
-            row |= {"gamma": parse(str(self.rng.choice(["pi/2", "-pi/2", "pi"]))), "b": self.length(f"LB{j}", 0.6)}
+            row |= {
+                "gamma": parse(str(self.rng.choice(["pi/2", "-pi/2", "pi"]))),
+                "b": self.length(f"LB{j}", 0.6),
+            }
         return row
 
     def serial(self, ant: int) -> int:
         """One more actuated joint on link `ant`."""
         j = len(self.frames) + 1
         sigma = PRISMATIC if self.chance(0.2) else REVOLUTE
-        return self.add(ant, sigma, 1, **self.axis(), r=self.length(f"RL{j}", 0.4), theta=self.turn(f"TH{j}", 0.3))
+        return self.add(
+            ant,
+            sigma,
+            1,
+            **self.axis(),
+            r=self.length(f"RL{j}", 0.4),
+            theta=self.turn(f"TH{j}", 0.3),
+        )
 
     def driven(self, base: int) -> int:
         """Arm and crank turn about one axis of link `base`; returns the forearm.
 
-        The arm and the bar have length L, the crank and the lever of the forearm K. The bar may run in another plane, shifted by E.
+        The arm and the bar have length L, the crank and the lever of the forearm K. The bar may run
+        in another plane, shifted by E.
         """
-        L, K = self.constants.length(f"L{len(self.frames)}"), self.constants.length(f"K{len(self.frames)}")
+        L, K = (
+            self.constants.length(f"L{len(self.frames)}"),
+            self.constants.length(f"K{len(self.frames)}"),
+        )
         E = self.length(f"E{len(self.frames)}", 0.4)
         row, r = self.axis(), self.length(f"RL{len(self.frames)}", 0.4)
-        by_crank = self.chance(0.85)  # else the joint of the forearm is actuated and the crank follows
+        by_crank = self.chance(
+            0.85
+        )  # else the joint of the forearm is actuated and the crank follows
         turns = [self.turn(f"TH{len(self.frames)}{k}") for k in "ABCDE"]
         arm = self.add(base, REVOLUTE, 1, **row, r=r, theta=turns[0])
         forearm = self.add(arm, REVOLUTE, int(not by_crank), d=L, theta=turns[1])
@@ -99,8 +120,13 @@ class _Arm:
         gamma = parse(str(self.rng.choice(["0", "pi/2", "-pi/2"], p=[0.5, 0.3, 0.2])))
         twin = self.add(forearm, FIXED, 0, gamma=gamma, d=-K if opposite else K, r=E)
         self.loops.append(Loop(cut, twin))
-        q = {j: Expression.symbol(f"q{j}") + theta for j, theta in zip((arm, forearm, crank, bar, cut), turns, strict=True)}
-        lever = gamma + (PI if opposite else ZERO)  # forearm + lever = crank, bar = arm, cut = forearm + gamma, as angles
+        q = {
+            j: Expression.symbol(f"q{j}") + theta
+            for j, theta in zip((arm, forearm, crank, bar, cut), turns, strict=True)
+        }
+        lever = gamma + (
+            PI if opposite else ZERO
+        )  # forearm + lever = crank, bar = arm, cut = forearm + gamma, as angles
         if by_crank:
             self.relations[forearm] = q[crank] - q[arm] - lever - turns[1]
         else:
@@ -111,8 +137,13 @@ class _Arm:
         return forearm
 
     def guided(self, base: int) -> int:
-        """Arm and rocker turn about parallel axes of link `base`, at a distance K; returns the coupler between their ends."""
-        L, K = self.constants.length(f"L{len(self.frames)}"), self.constants.length(f"K{len(self.frames)}")
+        """Arm and rocker turn about parallel axes of link `base`, at a distance K; returns the
+        coupler between their ends.
+        """
+        L, K = (
+            self.constants.length(f"L{len(self.frames)}"),
+            self.constants.length(f"K{len(self.frames)}"),
+        )
         row, r = self.axis(), self.length(f"RL{len(self.frames)}", 0.4)
         turns = [self.turn(f"TH{len(self.frames)}{k}") for k in "ABCD"]
         arm = self.add(base, REVOLUTE, 1, **row, r=r, theta=turns[0])
@@ -121,7 +152,10 @@ class _Arm:
         cut = self.add(rocker, REVOLUTE, 0, d=L, theta=turns[3])
         gamma = parse(str(self.rng.choice(["0", "pi/2", "pi"], p=[0.5, 0.3, 0.2])))
         self.loops.append(Loop(cut, self.add(coupler, FIXED, 0, gamma=gamma, d=K)))
-        q = {j: Expression.symbol(f"q{j}") + theta for j, theta in zip((arm, coupler, rocker, cut), turns, strict=True)}
+        q = {
+            j: Expression.symbol(f"q{j}") + theta
+            for j, theta in zip((arm, coupler, rocker, cut), turns, strict=True)
+        }
         self.relations[coupler] = -q[arm] - gamma - turns[1]
         self.relations[rocker] = q[arm] - turns[2]
         self.relations[cut] = q[arm] + q[coupler] + gamma - q[rocker] - turns[3]

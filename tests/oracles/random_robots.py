@@ -1,7 +1,9 @@
 """Random serial and tree robots of 2 to 7 frames: the cases that published arms leave out.
 
-A seed gives one robot. Lengths and some angles are constants with distinct default values; some lengths are zero. Parallel,
-perpendicular and oblique axes, fixed frames, branches, offsets of theta, four kinds of gravity, coupled elements, massless links.
+A seed gives one robot. Lengths and some angles are constants with distinct default values; some
+lengths are zero. Parallel,
+perpendicular and oblique axes, fixed frames, branches, offsets of theta, four kinds of gravity,
+coupled elements, massless links.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ class _Constants:
     def __init__(self, rng: Generator) -> None:
         self.values: dict[str, float] = {}
         self._lengths = list(rng.permutation(np.arange(13, 99, 3)) / 100)
-        self._angles = list(rng.permutation([0.31, 0.52, 0.83, 1.01, 1.22, 2.03, -0.44, -0.67, -1.27, -2.11]))
+        self._angles = list(
+            rng.permutation([0.31, 0.52, 0.83, 1.01, 1.22, 2.03, -0.44, -0.67, -1.27, -2.11])
+        )
 
     def length(self, name: str) -> Expression:
         self.values[name] = float(self._lengths.pop())
@@ -46,11 +50,16 @@ def random_robot(seed: int) -> Robot:
     sigma = _kinds(rng, n)
     ant = [int(rng.choice(j)) if tree and rng.random() < 0.5 else j - 1 for j in range(1, n + 1)]
     places = {int(rng.integers(2, n + 1)) for _ in range(2)} if oblique else set()
-    frames = tuple(_frame(rng, constants, j, ant[j - 1], sigma[j - 1], j in places, bool(offsets)) for j in range(1, n + 1))
+    frames = tuple(
+        _frame(rng, constants, j, ant[j - 1], sigma[j - 1], j in places, bool(offsets))
+        for j in range(1, n + 1)
+    )
     gravity = _gravity(rng, constants)
     moving = [f.j for f in frames if f.sigma != FIXED]
     massless = (
-        frozenset(int(j) for j in rng.choice(np.arange(1, n + 1), rng.integers(1, n), replace=False))
+        frozenset(
+            int(j) for j in rng.choice(np.arange(1, n + 1), rng.integers(1, n), replace=False)
+        )
         if rng.random() < 0.15
         else frozenset()
     )
@@ -70,15 +79,29 @@ def _kinds(rng: Generator, n: int) -> list[int]:
     prismatic, fixed = rng.random(2) < [0.55, 0.38]
     weights = np.array([0.6, 0.4 if prismatic else 0.0, 0.25 if fixed else 0.0])
     while True:
-        sigma = [int(s) for s in rng.choice([REVOLUTE, PRISMATIC, FIXED], n, p=weights / weights.sum())]
+        sigma = [
+            int(s) for s in rng.choice([REVOLUTE, PRISMATIC, FIXED], n, p=weights / weights.sum())
+        ]
         if sum(s != FIXED for s in sigma) >= 2:
             return sigma
 
 
-def _frame(rng: Generator, constants: _Constants, j: int, ant: int, sigma: int, oblique: bool, offsets: bool) -> Frame:
+def _frame(
+    rng: Generator,
+    constants: _Constants,
+    j: int,
+    ant: int,
+    sigma: int,
+    oblique: bool,
+    offsets: bool,
+) -> Frame:
     def angle(name: str, slanted: bool) -> Expression:
         if slanted:
-            return constants.angle(f"{name}{j}") if rng.random() < 0.4 else parse(str(rng.choice(OBLIQUE)))
+            return (
+                constants.angle(f"{name}{j}")
+                if rng.random() < 0.4
+                else parse(str(rng.choice(OBLIQUE)))
+            )
         return parse(str(rng.choice(["0", "pi/2", "-pi/2", "pi"], p=[0.4, 0.28, 0.28, 0.04])))
 
     def length(name: str, probability: float) -> Expression:
@@ -88,7 +111,9 @@ def _frame(rng: Generator, constants: _Constants, j: int, ant: int, sigma: int, 
         return -e if rng.random() < 0.25 else e
 
     branch = ant != j - 1 and rng.random() < 0.7
-    gamma, b = (angle("GB", bool(rng.random() < 0.2)), length("LB", 0.5)) if branch else (ZERO, ZERO)
+    gamma, b = (
+        (angle("GB", bool(rng.random() < 0.2)), length("LB", 0.5)) if branch else (ZERO, ZERO)
+    )
     alpha, d, r = angle("AL", oblique), length("D", 0.55), length("RL", 0.45)
     q = Expression.symbol(f"q{j}")
     theta = ZERO
@@ -129,9 +154,13 @@ def _elements(rng: Generator, moving: list[int]) -> tuple[Element, ...]:
         [Element("OFFSET", "offset", each, {})],
     )
     special, (i, k) = rng.random(), sorted(int(j) for j in rng.choice(moving, 2, replace=False))
-    if special < 0.08:  # a motor that also turns with an earlier joint: cross forms, as the wrist of an arm
+    if (
+        special < 0.08
+    ):  # a motor that also turns with an earlier joint: cross forms, as the wrist of an arm
         cross = {(k, k): ONE, (i, k): ONE, (k, i): ONE}
-        inertia = Element("Ia", "inertia", {j: row for j, row in each.items() if j != k}, {k: cross})
+        inertia = Element(
+            "Ia", "inertia", {j: row for j, row in each.items() if j != k}, {k: cross}
+        )
         viscous.append(Element("FVM", "viscous", {}, {k: {(i, k): ONE, (k, i): ONE}}))
         coulomb.append(Element("FSM", "coulomb", {k: {i: ONE, k: ONE}}, {}))
     elif special < 0.16:  # the same as a row
@@ -139,9 +168,18 @@ def _elements(rng: Generator, moving: list[int]) -> tuple[Element, ...]:
         inertia = Element("Ia", "inertia", {**each, k: row}, {})
         coulomb.append(Element("FSM", "coulomb", {k: row}, {}))
     elif special < 0.22:  # friction that depends on the direction of motion
-        viscous = [Element("FVP", "viscous", each, {}, "positive"), Element("FVN", "viscous", each, {}, "negative")]
+        viscous = [
+            Element("FVP", "viscous", each, {}, "positive"),
+            Element("FVN", "viscous", each, {}, "negative"),
+        ]
     elif special < 0.26:
-        coulomb, offset = [Element("FSP", "coulomb", each, {}, "positive"), Element("FSN", "coulomb", each, {}, "negative")], []
+        coulomb, offset = (
+            [
+                Element("FSP", "coulomb", each, {}, "positive"),
+                Element("FSN", "coulomb", each, {}, "negative"),
+            ],
+            [],
+        )
     elif special < 0.32:
         offset.append(Element("KS", "stiffness", {k: {k: ONE}}, {i: {(i, i): parse("2")}}))
     return (inertia, *viscous, *coulomb, *offset)
@@ -153,7 +191,9 @@ def robots(largest: int = 10**6) -> st.SearchStrategy[Robot]:
 
 
 def random_state(robot: Robot, samples: int, seed: int) -> tuple[Array, Array, Array]:
-    """q within half a turn or 1 m, qd and qdd standard normal; each (samples, n), order `robot.moving`."""
+    """q within half a turn or 1 m, qd and qdd standard normal; each (samples, n), order
+    `robot.moving`.
+    """
     rng = np.random.default_rng([21, seed])
     reach = [np.pi if robot.frame(j).sigma == REVOLUTE else 1.0 for j in robot.moving]
     q = rng.uniform(-1, 1, (samples, len(reach))) * reach
@@ -162,7 +202,9 @@ def random_state(robot: Robot, samples: int, seed: int) -> tuple[Array, Array, A
 
 
 def random_parameters(robot: Robot, seed: int) -> Array:
-    """Standard parameters of links that could exist: masses at a few points; elements between 0.1 and 1, of a cross form a tenth of that: it stays positive. (p,)"""
+    """Standard parameters of links that could exist: masses at a few points; elements between 0.1
+    and 1, of a cross form a tenth of that: it stays positive. (p,)
+    """
     rng = np.random.default_rng([22, seed])
     value: dict[str, float] = {}
     for j in robot.links:
@@ -172,7 +214,12 @@ def random_parameters(robot: Robot, seed: int) -> Array:
         elements = (*J[np.triu_indices(3)], *MS, m.sum())  # XX XY XZ YY YZ ZZ MX MY MZ M
         value |= {f"{p}{j}": v for p, v in zip(INERTIAL, elements, strict=True)}
     cross = {f"{element.family}{j}" for element in robot.elements for j in element.form}
-    return np.array([value.get(name, rng.uniform(0.1, 1.0) * (0.1 if name in cross else 1.0)) for name in robot.parameters])
+    return np.array(
+        [
+            value.get(name, rng.uniform(0.1, 1.0) * (0.1 if name in cross else 1.0))
+            for name in robot.parameters
+        ]
+    )
 
 
 def describe_mix(sample: Iterable[Robot]) -> dict[str, float]:
@@ -189,15 +236,25 @@ def _features(robot: Robot) -> dict[str, bool]:
     g = [bool(e) for e in robot.gravity]
     inner = [f for f in robot.frames if f.ant]
     special = [
-        e for e in robot.elements if e.family not in ("Ia", "FV", "FS", "OFFSET") or e.form or any(len(r) > 1 for r in e.along.values())
+        e
+        for e in robot.elements
+        if e.family not in ("Ia", "FV", "FS", "OFFSET")
+        or e.form
+        or any(len(r) > 1 for r in e.along.values())
     ]
     return {
         "tree": any(f.ant != f.j - 1 for f in robot.frames),
         "oblique axes": any(slanted(f.alpha) for f in inner),
-        "any oblique angle": any(slanted(e) for f in robot.frames for e in (f.alpha, f.gamma, f.theta0)),
-        "symbolic angle": any(e.symbols for f in robot.frames for e in (f.alpha, f.gamma, f.theta0)),
+        "any oblique angle": any(
+            slanted(e) for f in robot.frames for e in (f.alpha, f.gamma, f.theta0)
+        ),
+        "symbolic angle": any(
+            e.symbols for f in robot.frames for e in (f.alpha, f.gamma, f.theta0)
+        ),
         "parallel axes": any(not f.alpha for f in inner),
-        "perpendicular axes": any(quarter_turns(f.alpha)[0] % 2 == 1 and not slanted(f.alpha) for f in inner),
+        "perpendicular axes": any(
+            quarter_turns(f.alpha)[0] % 2 == 1 and not slanted(f.alpha) for f in inner
+        ),
         "prismatic": any(f.sigma == PRISMATIC for f in robot.frames),
         "fixed frame": any(f.sigma == FIXED for f in robot.frames),
         "theta offset": any(f.sigma == REVOLUTE and bool(f.theta0) for f in robot.frames),
@@ -215,5 +272,6 @@ def _features(robot: Robot) -> dict[str, bool]:
 def print_mix(sample: Iterable[Robot]) -> str:
     """The mix as lines of a table."""
     return "\n".join(
-        f"{name:30} {share:6.0f}" if name == "robots" else f"{name:30} {100 * share:5.0f} %" for name, share in describe_mix(sample).items()
+        f"{name:30} {share:6.0f}" if name == "robots" else f"{name:30} {100 * share:5.0f} %"
+        for name, share in describe_mix(sample).items()
     )

@@ -1,14 +1,18 @@
-"""A sampler that draws once for each prime: certificates of many mutations of one robot differ by their formulas alone."""
+"""A sampler that draws once for each prime: certificates of many mutations of one robot differ by
+their formulas alone.
+"""
 
 from __future__ import annotations
 
+from symgen.certify.certificate import Sampler
 from symgen.derive.exact import Array, Draw
-from symgen.regroup.certificate import Sampler
-from symgen.regroup.solve import sample
+from symgen.regroup.residues import sample
 
 
 def same_draw() -> Sampler:
-    """`symgen.regroup.solve.sample` that gives the columns of its first draw for a prime ever after: sampling is most of the work."""
+    """`symgen.regroup.residues.sample` that gives the columns of its first draw for a prime ever
+    after: sampling is most of the work.
+    """
     drawn: dict[int, Array] = {}
 
     def once(draw: Draw, names: tuple[str, ...]) -> Array:

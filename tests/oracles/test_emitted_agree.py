@@ -1,6 +1,8 @@
-"""Every function of the emitted NumPy module against two oracles without common code: CasADi energies and pinocchio.
+"""Every function of the emitted NumPy module against two oracles without common code: CasADi
+energies and pinocchio.
 
-Tolerance 1e-10 of the largest entry, for regressors of every (joint, column). Seeds that once showed a fault of the generator stay.
+Tolerance 1e-10 of the largest entry, for regressors of every (joint, column). Seeds that once
+showed a fault of the generator stay.
 """
 
 from __future__ import annotations
@@ -21,7 +23,18 @@ from symgen.description import load_robot, packaged_robots
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_module
 
-SEEDS = (*range(50), 66, 67, 68, 84, 116, 148, 178, 180, 208)  # above 50: seeds that once showed a fault
+SEEDS = (
+    *range(50),
+    66,
+    67,
+    68,
+    84,
+    116,
+    148,
+    178,
+    180,
+    208,
+)  # above 50: seeds that once showed a fault
 PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.passive]
 ROBOTS = [*PACKAGED, *sampled([random_robot(seed) for seed in SEEDS], 25)]
 
@@ -40,7 +53,9 @@ def emitted(robot: Robot, folder: Path) -> ModuleType:
 
 
 def close(a, b):
-    """Equal to 1e-10 of the largest entry; of every (joint, column) for arrays of more than two axes."""
+    """Equal to 1e-10 of the largest entry; of every (joint, column) for arrays of more than two
+    axes.
+    """
     a, b = np.asarray(a), np.asarray(b)
     assert a.shape == b.shape
     axis = 0 if b.ndim > 2 else None
@@ -78,11 +93,18 @@ class Pinocchio:
 def test_module_against_oracle(robot: Robot, oracle, tmp_path: Path) -> None:
     module, model = emitted(robot, tmp_path), oracle(robot)
     chi, (q, qd, qdd) = random_parameters(robot, seed=3), random_state(robot, 6, seed=4)
-    D, tau, full = module.regressor(q, qd, qdd), model.torque(q, qd, qdd, chi), model.regressor(q, qd, qdd)
+    D, tau, full = (
+        module.regressor(q, qd, qdd),
+        model.torque(q, qd, qdd, chi),
+        model.regressor(q, qd, qdd),
+    )
     X = module.base_parameters(chi)
     K = np.array([module.base_parameters(unit) for unit in np.eye(len(chi))]).T  # X = K chi
     assert robot.parameters == module.STANDARD_PARAMETERS
-    own = [robot.parameters.index(name if name in robot.parameters else name.removesuffix("R")) for name in module.BASE_PARAMETERS]
+    own = [
+        robot.parameters.index(name if name in robot.parameters else name.removesuffix("R"))
+        for name in module.BASE_PARAMETERS
+    ]
     close(D, full[:, :, own])
     close(D @ K, full)
     close(module.base_parameters(dict(zip(robot.parameters, chi, strict=True))), X)
@@ -104,5 +126,9 @@ def test_module_against_oracle(robot: Robot, oracle, tmp_path: Path) -> None:
 
 
 def friction_absorbs(module: ModuleType) -> bool:
-    """One-sided Coulomb friction without an offset takes in a constant weight: in motion the two are one, at rest they are not."""
-    return any(name.startswith(("FSP", "FSN")) and name.endswith("R") for name in module.BASE_PARAMETERS)
+    """One-sided Coulomb friction without an offset takes in a constant weight: in motion the two
+    are one, at rest they are not.
+    """
+    return any(
+        name.startswith(("FSP", "FSN")) and name.endswith("R") for name in module.BASE_PARAMETERS
+    )

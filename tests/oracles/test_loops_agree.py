@@ -1,6 +1,8 @@
-"""Emitted models of mechanisms with loops against two routes: Lagrange multipliers, and the open tree with numerically solved loops.
+"""Emitted models of mechanisms with loops against two routes: Lagrange multipliers, and the open
+tree with numerically solved loops.
 
-Tolerance 1e-10 of the largest entry, of every (joint, column) for regressors; loops close to 1e-12 (metres, direction cosines).
+Tolerance 1e-10 of the largest entry, of every (joint, column) for regressors; loops close to 1e-12
+(metres, direction cosines).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from campaign import sampled
 from oracles.multipliers import Multipliers
 from oracles.random_parallelograms import SEEDS, random_parallelogram
 from oracles.random_robots import random_parameters
+from symgen.certify.certificate import certify_formulas
 from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close as close_loops
 from symgen.description import load_robot
@@ -27,7 +30,6 @@ from symgen.description.grammar import parse
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.emit.numpy_target import render
 from symgen.emit.spec import module_spec
-from symgen.regroup.certificate import certify_formulas
 from symgen.regroup.regrouping import EXACT, Regrouping, regroup
 
 Array = np.ndarray[Any, Any]
@@ -41,7 +43,9 @@ Emitted = Callable[[str], ModuleType]
 
 @cache
 def robot_of(name: str) -> Robot:
-    return load_robot(name) if name in PACKAGED else random_parallelogram(int(name.rpartition("_")[2]))
+    return (
+        load_robot(name) if name in PACKAGED else random_parallelogram(int(name.rpartition("_")[2]))
+    )
 
 
 @cache
@@ -68,9 +72,11 @@ def emitted(tmp_path_factory: pytest.TempPathFactory) -> Emitted:
 
 
 def equal(a, b) -> None:
-    """Equal to 1e-10 of the largest entry; of every column (all samples, all joints) for arrays of more than two axes.
+    """Equal to 1e-10 of the largest entry; of every column (all samples, all joints) for arrays of
+    more than two axes.
 
-    Floor 1e-2: a column that the loop nearly cancels has the rounding of the forces in its bars, of order 1 to 10 per unit parameter.
+    Floor 1e-2: a column that the loop nearly cancels has the rounding of the forces in its bars, of
+    order 1 to 10 per unit parameter.
     """
     a, b = np.asarray(a), np.asarray(b)
     assert a.shape == b.shape
@@ -81,12 +87,19 @@ def equal(a, b) -> None:
 
 
 def positions(robot: Robot, samples: int, seed: int) -> Array:
-    """Actuated joints: anywhere for parallelograms and for the crank of the four-bar, near the start for the five-bar."""
+    """Actuated joints: anywhere for parallelograms and for the crank of the four-bar, near the
+    start for the five-bar.
+    """
     rng = np.random.default_rng([24, seed])
     start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     near = len(robot.joints) > 1 and start
-    reach = [0.5 if near else np.pi if robot.frame(j).sigma == REVOLUTE else 1.0 for j in robot.joints]
-    return np.array([start.get(j, 0.0) for j in robot.joints]) + rng.uniform(-1, 1, (samples, len(reach))) * reach
+    reach = [
+        0.5 if near else np.pi if robot.frame(j).sigma == REVOLUTE else 1.0 for j in robot.joints
+    ]
+    return (
+        np.array([start.get(j, 0.0) for j in robot.joints])
+        + rng.uniform(-1, 1, (samples, len(reach))) * reach
+    )
 
 
 def whole(robot: Robot, actuated: Array, passive: Array) -> Array:
@@ -97,10 +110,13 @@ def whole(robot: Robot, actuated: Array, passive: Array) -> Array:
     return q
 
 
-def regular_states(module: ModuleType, robot: Robot, model: Lagrange, samples: int) -> tuple[tuple[Array, Array, Array], Multipliers]:
+def regular_states(
+    module: ModuleType, robot: Robot, model: Lagrange, samples: int
+) -> tuple[tuple[Array, Array, Array], Multipliers]:
     """q, qd, qdd (N, n) and the oracle there: its loops are solved anew from 0.01 rad or m beside.
 
-    Of ten times as many states those farthest from singular ones, where Newton from beside is sure and magnifies rounding least.
+    Of ten times as many states those farthest from singular ones, where Newton from beside is sure
+    and magnifies rounding least.
     """
     q, rng = positions(robot, 10 * samples, seed=5), np.random.default_rng(6)
     at = whole(robot, q, module.passive_joints(q))
@@ -108,7 +124,9 @@ def regular_states(module: ModuleType, robot: Robot, model: Lagrange, samples: i
     keep = np.argsort(Multipliers(robot, at[:1], zero, zero, model).regularity(at))[-samples:]
     qd, qdd = rng.standard_normal((2, samples, q.shape[1]))
     beside = at[keep]
-    beside[:, [robot.moving.index(j) for j in robot.passive]] += 0.01 * rng.uniform(-1, 1, (samples, len(robot.passive)))
+    beside[:, [robot.moving.index(j) for j in robot.passive]] += 0.01 * rng.uniform(
+        -1, 1, (samples, len(robot.passive))
+    )
     return (q[keep], qd, qdd), Multipliers(robot, beside, qd, qdd, model)
 
 
@@ -117,12 +135,20 @@ def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     robot, module = robot_of(name), emitted(name)
     model = Lagrange(robot)
     (q, qd, qdd), oracle = regular_states(module, robot, model, samples=6)
-    moving = [whole(robot, a, p) for a, p in zip((q, qd, qdd), module.passive_joints(q, qd, qdd), strict=True)]
+    moving = [
+        whole(robot, a, p)
+        for a, p in zip((q, qd, qdd), module.passive_joints(q, qd, qdd), strict=True)
+    ]
     assert oracle.defect(moving[0]).max() < 1e-12
     for found, expected in zip(moving, (oracle.q, oracle.qd, oracle.qdd), strict=True):
         equal(found, expected)
     chi = random_parameters(robot, seed=7)
-    X, D, tau, full = module.base_parameters(chi), module.regressor(q, qd, qdd), oracle.torque(chi), oracle.regressor()
+    X, D, tau, full = (
+        module.base_parameters(chi),
+        module.regressor(q, qd, qdd),
+        oracle.torque(chi),
+        oracle.regressor(),
+    )
     K = np.array([module.base_parameters(unit) for unit in np.eye(len(chi))]).T  # X = K chi
     assert robot.parameters == module.STANDARD_PARAMETERS
     equal(oracle.projected_regressor(), full)  # the two oracles
@@ -138,7 +164,11 @@ def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     equal(module.frame_poses(q), model.poses(oracle.q))
     for frame in robot.frames:
         equal(module.jacobian(q, frame=frame.j), model.jacobian(oracle.q, frame.j) @ oracle.rates)
-    assert np.all(np.linalg.eigvalsh(A) > 0) or robot.massless or not any(e.kind == "inertia" for e in robot.elements)
+    assert (
+        np.all(np.linalg.eigvalsh(A) > 0)
+        or robot.massless
+        or not any(e.kind == "inertia" for e in robot.elements)
+    )
     if np.linalg.cond(A).max() < 1e4:
         equal(module.forward_dynamics(q, qd, tau, X), qdd)
     assert not D[:, ~np.array(module.STRUCTURE).T].any()
@@ -158,7 +188,9 @@ RELATIONS = {
 
 @pytest.mark.parametrize("name", PACKAGED)
 def test_module_against_open_tree_closed_by_newton(name: str, emitted: Emitted) -> None:
-    """The loops of the packaged robots, solved by the tree itself from the relations of their sources or from `start`."""
+    """The loops of the packaged robots, solved by the tree itself from the relations of their
+    sources or from `start`.
+    """
     robot, module = robot_of(name), emitted(name)
     written = {int(q[1:]): parse(text) for q, text in RELATIONS.get(name, {}).items()}
     model = Lagrange(replace(robot, constraints=written))
@@ -173,7 +205,9 @@ def test_module_against_open_tree_closed_by_newton(name: str, emitted: Emitted) 
 
 @pytest.mark.parametrize("name", PARALLELOGRAMS)
 def test_never_an_antiparallelogram(name: str, emitted: Emitted) -> None:
-    """Opposite sides keep their orientation to each other through every state, flat ones included; the loops close to 1e-12."""
+    """Opposite sides keep their orientation to each other through every state, flat ones included;
+    the loops close to 1e-12.
+    """
     robot, module = robot_of(name), emitted(name)
     q = positions(robot, 400, seed=10)
     T = module.frame_poses(q)
@@ -198,16 +232,25 @@ def crank_record(samples: int = 3000, turns: float = 5.0) -> tuple[Array, Array,
 def five_bar_record(samples: int = 3000) -> tuple[Array, Array, Array]:
     t = np.linspace(0.0, 10.0, samples)[:, None]
     a, w, phase = np.array([0.6, 0.5]), np.array([2.1, 3.3]), np.array([0.0, 0.7])
-    return np.array([2.2, 0.9]) + a * np.sin(w * t + phase), a * w * np.cos(w * t + phase), -a * w**2 * np.sin(w * t + phase)
+    return (
+        np.array([2.2, 0.9]) + a * np.sin(w * t + phase),
+        a * w * np.cos(w * t + phase),
+        -a * w**2 * np.sin(w * t + phase),
+    )
 
 
 RECORDS = {"four_bar": crank_record, "five_bar": five_bar_record}
-APEX = {"four_bar": 4, "five_bar": 5}  # cut joint: the angle between the last two bars keeps its sign in one assembly mode
+APEX = {
+    "four_bar": 4,
+    "five_bar": 5,
+}  # cut joint: the angle between the last two bars keeps its sign in one assembly mode
 
 
 @pytest.mark.parametrize("name", GENERAL)
 def test_general_loop_along_a_record(name: str, emitted: Emitted) -> None:
-    """Closed at every sample, continuous, always in the mode of `start`, with the rates that differences of the positions show."""
+    """Closed at every sample, continuous, always in the mode of `start`, with the rates that
+    differences of the positions show.
+    """
     robot, module = robot_of(name), emitted(name)
     q, qd, qdd = RECORDS[name]()
     h = 10.0 / (len(q) - 1)
@@ -235,13 +278,17 @@ def test_general_loop_in_any_order(name: str, emitted: Emitted) -> None:
     assert module.passive_joints(q[:0]).shape == (0, len(robot.passive))
 
 
-def newton_passes(module: ModuleType, q: Array, monkeypatch: pytest.MonkeyPatch) -> tuple[float, int]:
-    """Newton steps per sample: (mean, of all `_newton` calls on the way; largest number that the samples themselves needed).
+def newton_passes(
+    module: ModuleType, q: Array, monkeypatch: pytest.MonkeyPatch
+) -> tuple[float, int]:
+    """Newton steps per sample: (mean, of all `_newton` calls on the way; largest number that the
+    samples themselves needed).
 
-    A pass is one evaluation of `_closure_block` followed by a step; the evaluation that finds the loops closed is none.
+    A pass is one evaluation of `_linearised_closure_block` followed by a step; the evaluation that finds the
+    loops closed is none.
     """
     passes: list[tuple[int, int]] = []
-    newton, block = module._newton, module._closure_block
+    newton, block = module._newton, module._linearised_closure_block
     evaluations = [0]
 
     def counted_block(*arguments):
@@ -254,7 +301,7 @@ def newton_passes(module: ModuleType, q: Array, monkeypatch: pytest.MonkeyPatch)
         passes.append((len(states), evaluations[0] - 1))  # len(states) <= 8192: one block
         return result
 
-    monkeypatch.setattr(module, "_closure_block", counted_block)
+    monkeypatch.setattr(module, "_linearised_closure_block", counted_block)
     monkeypatch.setattr(module, "_newton", counted_newton)
     module.passive_joints(q)
     monkeypatch.undo()
@@ -269,10 +316,14 @@ def test_newton_passes(name: str, emitted: Emitted, monkeypatch: pytest.MonkeyPa
 
 
 def test_loop_that_does_not_close(emitted: Emitted) -> None:
-    """A longer crank cannot turn: the first samples close, the others are named with their residual."""
+    """A longer crank cannot turn: the first samples close, the others are named with their
+    residual.
+    """
     module = emitted("four_bar")
     q = np.linspace(1.0, 3.1, 200)[:, None]
-    with pytest.raises(ValueError, match=r"does not close at sample \d+: residual [\d.e-]+ at q = "):
+    with pytest.raises(
+        ValueError, match=r"does not close at sample \d+: residual [\d.e-]+ at q = "
+    ):
         module.inverse_dynamics(q, 0 * q, 0 * q, np.ones(len(module.BASE_PARAMETERS)), L1=0.6)
     with pytest.raises(ValueError, match="does not close at sample 2:"):
         module.passive_joints(np.array([[1.0], [1.1], [3.1], [1.2]]), L1=0.6)
@@ -284,19 +335,29 @@ def test_loop_that_does_not_close(emitted: Emitted) -> None:
 def test_singular_configuration(emitted: Emitted) -> None:
     """Dead point of a four-bar whose crank cannot turn: coupler and rocker in one line."""
     module = emitted("four_bar")
-    L = {"L0": 0.45, "L1": 0.35, "L2": 0.3, "L3": 0.4}  # outstretched where crank end and rocker pivot are L2 + L3 apart
-    dead = np.arccos((L["L0"] ** 2 + L["L1"] ** 2 - (L["L2"] + L["L3"]) ** 2) / (2 * L["L0"] * L["L1"]))
+    L = {
+        "L0": 0.45,
+        "L1": 0.35,
+        "L2": 0.3,
+        "L3": 0.4,
+    }  # outstretched where crank end and rocker pivot are L2 + L3 apart
+    dead = np.arccos(
+        (L["L0"] ** 2 + L["L1"] ** 2 - (L["L2"] + L["L3"]) ** 2) / (2 * L["L0"] * L["L1"])
+    )
     q = np.array([[1.0], [1.4], [dead], [1.2]])
     with pytest.raises(ValueError, match="singular configuration at sample 2"):
         module.passive_joints(q, **L)
     module.passive_joints(q[[0, 1, 3]], **L)
 
 
-# --- the four-bar of the theory notes ---------------------------------------------------------------------------------
+# --- the four-bar of the theory notes
+# ---------------------------------------------------------------------------------
 
 
 def test_four_bar_formula() -> None:
-    """D_MX3 = (L1^2 D_ZZ1 + L1 D_MX1 + L2^2 D_ZZ2 + L2 D_MX2)/L3 - L3 D_ZZ3, x axes along the bars: symbolically."""
+    """D_MX3 = (L1^2 D_ZZ1 + L1 D_MX1 + L2^2 D_ZZ2 + L2 D_MX2)/L3 - L3 D_ZZ3, x axes along the bars:
+    symbolically.
+    """
     regrouping = regrouped("four_bar")
     assert regrouping.method == EXACT
     row = {b.own: b.combination["MX3"] for b in regrouping.base if "MX3" in b.combination}
@@ -310,8 +371,16 @@ def test_certificate_catches_a_wrong_coefficient(own: str, standard: str) -> Non
     regrouping = regrouped("four_bar")
     for factor in (Expression.number(-1), Expression.number("1.000000000001")):
         base = tuple(
-            replace(b, combination={k: c * factor if (b.own, k) == (own, standard) else c for k, c in b.combination.items()})
+            replace(
+                b,
+                combination={
+                    k: c * factor if (b.own, k) == (own, standard) else c
+                    for k, c in b.combination.items()
+                },
+            )
             for b in regrouping.base
         )
         certificate = certify_formulas(replace(regrouping, base=base))
-        assert not certificate.valid and any(standard in failure for failure in certificate.failures)
+        assert not certificate.valid and any(
+            standard in failure for failure in certificate.failures
+        )

@@ -1,4 +1,6 @@
-"""Robots read from MJCF: torques and frames equal those that MuJoCo computes from the whole text, drawings, geoms and meshes aside."""
+"""Robots read from MJCF: torques and frames equal those that MuJoCo computes from the whole text,
+drawings, geoms and meshes aside.
+"""
 
 import re
 
@@ -22,7 +24,9 @@ TOLERANCE = 1e-9  # of the largest torque of the sample
 
 
 class MuJoCo:
-    """Inverse dynamics and poses of an MJCF text without contacts, limits and relations; meshes, which no test has, left out."""
+    """Inverse dynamics and poses of an MJCF text without contacts, limits and relations; meshes,
+    which no test has, left out.
+    """
 
     def __init__(self, text: str) -> None:
         text = re.sub(r"<asset>.*?</asset>|<geom type=\"mesh\"[^>]*>", "", text)
@@ -31,7 +35,10 @@ class MuJoCo:
         self.data = mujoco.MjData(self.model)
 
     def state(self, names, q, qd, qdd):
-        places = [(joint.qposadr[0], joint.dofadr[0]) for joint in (self.model.joint(name) for name in names)]
+        places = [
+            (joint.qposadr[0], joint.dofadr[0])
+            for joint in (self.model.joint(name) for name in names)
+        ]
         for (i, j), *x in zip(places, q, qd, qdd, strict=True):
             self.data.qpos[i], self.data.qvel[j], self.data.qacc[j] = x
         return [j for _, j in places]
@@ -66,11 +73,20 @@ def motion(robot: Robot, seed: int):
 
 
 def difference(text: str, robot: Robot, notes: tuple[str, ...], seed: int) -> float:
-    """Largest difference of torque over the largest torque; dry friction, a constraint in MuJoCo, aside."""
+    """Largest difference of torque over the largest torque; dry friction, a constraint in MuJoCo,
+    aside.
+    """
     states, follow, active = motion(robot, seed)
     names, oracle = legend(notes), MuJoCo(text)
-    theirs = np.array([oracle.torque([names[j] for j in robot.moving], *s) for s in zip(*states, strict=True)]) @ follow
-    chi = np.array([0.0 if name.startswith("FS") else robot.values[name] for name in robot.parameters])
+    theirs = (
+        np.array(
+            [oracle.torque([names[j] for j in robot.moving], *s) for s in zip(*states, strict=True)]
+        )
+        @ follow
+    )
+    chi = np.array(
+        [0.0 if name.startswith("FS") else robot.values[name] for name in robot.parameters]
+    )
     if robot.constraints:
         module = loaded(robot)
         ours = module.inverse_dynamics(*(x[:, active] for x in states), module.base_parameters(chi))
@@ -83,11 +99,20 @@ def pose_difference(text: str, robot: Robot, notes: tuple[str, ...]) -> float:
     names, oracle, largest = legend(notes), MuJoCo(text), 0.0
     for q in motion(robot, 5)[0][0]:
         poses = frame_poses(
-            Geometry(robot, FloatAlgebra(robot, {j: np.array(x) for j, x in zip(robot.moving, q, strict=True)}), close(robot))
+            Geometry(
+                robot,
+                FloatAlgebra(robot, {j: np.array(x) for j, x in zip(robot.moving, q, strict=True)}),
+                close(robot),
+            )
         )
         for j, frame in kept_frames(notes).items():
-            ours = np.column_stack([np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)])
-            largest = max(largest, float(np.abs(ours - oracle.pose([names[j] for j in robot.moving], q, frame)).max()))
+            ours = np.column_stack(
+                [np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]
+            )
+            largest = max(
+                largest,
+                float(np.abs(ours - oracle.pose([names[j] for j in robot.moving], q, frame)).max()),
+            )
     return largest
 
 
@@ -113,16 +138,33 @@ def test_random_trees():
 
 def test_values_and_limits_of_an_arm():
     robot, notes = read_mjcf(ARM.encode(), "arm.xml")
-    assert robot.name == "bent_arm" and [f.sigma for f in robot.frames] == [0, 0, 0, 1] and robot.massless == {2}
-    assert robot.values["FS1"] == 0.3 and robot.values["Ia1"] == 0.02 and robot.values["Ia3"] == 0.001 and robot.values["K2"] == 3
-    assert robot.values["OFFSET2"] == pytest.approx(-3 * np.deg2rad(10)) and dict(robot.constants)["gx"] == 0.5
+    assert (
+        robot.name == "bent_arm"
+        and [f.sigma for f in robot.frames] == [0, 0, 0, 1]
+        and robot.massless == {2}
+    )
+    assert (
+        robot.values["FS1"] == 0.3
+        and robot.values["Ia1"] == 0.02
+        and robot.values["Ia3"] == 0.001
+        and robot.values["K2"] == 3
+    )
+    assert (
+        robot.values["OFFSET2"] == pytest.approx(-3 * np.deg2rad(10))
+        and dict(robot.constants)["gx"] == 0.5
+    )
     assert "not read: <actuator>, <asset>, <sensor>, <visual>" in notes
 
 
 def test_relations_of_joints_and_tendons():
-    """q4 = 0.01 + 0.002 + 1.5 q3;  2 q1 - 0.5 (q2 - 0.2) = 0.1, solved for the joint that no motor drives: MuJoCo finds them met."""
+    """q4 = 0.01 + 0.002 + 1.5 q3;  2 q1 - 0.5 (q2 - 0.2) = 0.1, solved for the joint that no motor
+    drives: MuJoCo finds them met.
+    """
     robot, _ = read_mjcf(GRIPPER.encode(), "gripper.xml")
-    assert robot.joints == (1, 3) and {j: str(e) for j, e in robot.constraints.items()} == {2: "4*q1", 4: "3*q3/2 + 0.012"}
+    assert robot.joints == (1, 3) and {j: str(e) for j, e in robot.constraints.items()} == {
+        2: "4*q1",
+        4: "3*q3/2 + 0.012",
+    }
     states, _, _ = motion(robot, 3)
     model = mujoco.MjModel.from_xml_string(GRIPPER)
     data = mujoco.MjData(model)

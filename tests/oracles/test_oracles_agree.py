@@ -1,6 +1,7 @@
 """Pinocchio and Lagrange, two routes without common code, on random and hand-built robots.
 
-Tolerance 1e-10 of the largest entry (of each column for regressors): rounding of a few thousand operations stays below 1e-12.
+Tolerance 1e-10 of the largest entry (of each column for regressors): rounding of a few thousand
+operations stays below 1e-12.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import pytest
 from oracles.named_robots import four_bar, planar_2r, six_r
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
-from symgen.derive.lagrange import Lagrange, numeric_regressor
+from symgen.derive.lagrange import Lagrange, sampled
 from symgen.description import load_robot, packaged_robots
 from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
@@ -24,7 +25,9 @@ TOLERANCE = 1e-10
 def close(a, b, axis=None):
     a, b = np.asarray(a), np.asarray(b)
     assert a.shape == b.shape
-    assert np.all(np.abs(a - b).max(axis=axis) <= TOLERANCE * np.maximum(np.abs(b).max(axis=axis), 1e-3))
+    assert np.all(
+        np.abs(a - b).max(axis=axis) <= TOLERANCE * np.maximum(np.abs(b).max(axis=axis), 1e-3)
+    )
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda r: r.name)
@@ -52,23 +55,36 @@ def test_single_state_has_no_leading_axis() -> None:
 
 
 def test_planar_2r_by_hand() -> None:
-    """Inertia matrix and gravity of the two-link arm as in any textbook, z horizontal, gravity along -y."""
+    """Inertia matrix and gravity of the two-link arm as in any textbook, z horizontal, gravity
+    along -y.
+    """
     robot = planar_2r()
-    chi = dict.fromkeys(robot.parameters, 0.0) | {"ZZ1": 0.3, "ZZ2": 0.2, "MX1": 0.4, "MX2": 0.5, "M2": 2.0}
+    chi = dict.fromkeys(robot.parameters, 0.0) | {
+        "ZZ1": 0.3,
+        "ZZ2": 0.2,
+        "MX1": 0.4,
+        "MX2": 0.5,
+        "M2": 2.0,
+    }
     q, L, g = np.array([0.3, 0.8]), robot.constants["L1"], robot.constants["g"]
     model, x = Lagrange(robot), np.array(list(chi.values()))
     c2 = np.cos(q[1])
     coupling = 0.2 + 0.5 * L * c2
-    close(model.inertia_matrix(q, x), [[0.3 + 0.2 + 2.0 * L**2 + 2 * 0.5 * L * c2, coupling], [coupling, 0.2]])
+    close(
+        model.inertia_matrix(q, x),
+        [[0.3 + 0.2 + 2.0 * L**2 + 2 * 0.5 * L * c2, coupling], [coupling, 0.2]],
+    )
     elbow = 0.5 * g * np.cos(q.sum())
     close(model.gravity(q, x), [(0.4 + 2.0 * L) * g * np.cos(q[0]) + elbow, elbow])
 
 
 def test_numeric_regressor() -> None:
     robot = six_r()
-    W, names = numeric_regressor(robot, states=40, seed=5)
+    W, names = sampled(robot, states=40, seed=5).W, robot.parameters
     assert W.shape == (6 * 40, len(names)) and names == robot.parameters
-    assert not W[:40, names.index("FV2")].any() and W[40:80, names.index("FV2")].all()  # rows joint-major
+    assert (
+        not W[:40, names.index("FV2")].any() and W[40:80, names.index("FV2")].all()
+    )  # rows joint-major
 
 
 def test_parallelogram_closes() -> None:
@@ -86,7 +102,9 @@ def test_parallelogram_closes() -> None:
 
 
 def test_general_loop_moves_as_its_power_says() -> None:
-    """Velocities and accelerations against central differences (step 1e-4 s); d(E + U)/dt = Gamma_a qda without friction."""
+    """Velocities and accelerations against central differences (step 1e-4 s); d(E + U)/dt = Gamma_a
+    qda without friction.
+    """
     robot = four_bar(rocker=0.45, start={1: 1.4, 2: -0.9, 3: 1.1, 4: 0.6})
     model, h = Lagrange(robot), 1e-4
 
@@ -95,8 +113,14 @@ def test_general_loop_moves_as_its_power_says() -> None:
         return 1.4 + 0.3 * np.sin(2 * t), 0.6 * np.cos(2 * t), -1.2 * np.sin(2 * t)
 
     times = np.array([0.1, 0.4, 0.8])
-    (q0, v0, _, _), (q, v, acc, _), (q1, v1, _, _) = (model.motion(*path(times + k * h)) for k in (-1, 0, 1))
-    assert np.isfinite(q).all() and np.allclose((q1 - q0) / (2 * h), v, atol=1e-6) and np.allclose((v1 - v0) / (2 * h), acc, atol=1e-6)
+    (q0, v0, _, _), (q, v, acc, _), (q1, v1, _, _) = (
+        model.motion(*path(times + k * h)) for k in (-1, 0, 1)
+    )
+    assert (
+        np.isfinite(q).all()
+        and np.allclose((q1 - q0) / (2 * h), v, atol=1e-6)
+        and np.allclose((v1 - v0) / (2 * h), acc, atol=1e-6)
+    )
     friction = [k for k, name in enumerate(robot.parameters) if name.startswith("F")]
     chi = random_parameters(robot, seed=4)
     chi[friction] = 0
@@ -112,17 +136,42 @@ def test_general_loop_moves_as_its_power_says() -> None:
 
 def test_numeric_regressor_of_loops() -> None:
     for robot in (four_bar(), four_bar(rocker=0.45, start={1: 1.4, 2: -0.9, 3: 1.1, 4: 0.6})):
-        W, _ = numeric_regressor(robot, states=30, seed=1)
+        W = sampled(robot, states=30, seed=1).W
         assert W.shape == (30, len(robot.parameters)) and np.isfinite(W).all()
     with pytest.raises(DescriptionError, match="close in 0 of"):
-        numeric_regressor(four_bar(rocker=3.0), states=5)
+        sampled(four_bar(rocker=3.0), states=5)
 
 
 def test_mix_of_random_robots() -> None:
     mix = describe_mix(random_robot(seed) for seed in range(250))
-    assert mix["oblique axes"] >= 0.3 and mix["prismatic"] >= 0.3 and mix["zero or in-plane gravity"] >= 0.2
-    assert min(mix[name] for name in ("tree", "fixed frame", "parallel axes", "perpendicular axes", "theta offset")) >= 0.2
     assert (
-        min(mix[name] for name in ("symbolic angle", "massless links", "coupled or special elements", "gamma or b", "general gravity"))
+        mix["oblique axes"] >= 0.3
+        and mix["prismatic"] >= 0.3
+        and mix["zero or in-plane gravity"] >= 0.2
+    )
+    assert (
+        min(
+            mix[name]
+            for name in (
+                "tree",
+                "fixed frame",
+                "parallel axes",
+                "perpendicular axes",
+                "theta offset",
+            )
+        )
+        >= 0.2
+    )
+    assert (
+        min(
+            mix[name]
+            for name in (
+                "symbolic angle",
+                "massless links",
+                "coupled or special elements",
+                "gamma or b",
+                "general gravity",
+            )
+        )
         >= 0.1
     )

@@ -1,4 +1,6 @@
-"""Planar loops of one and two degrees of freedom, drawn at random: exact certificates, generation below a second, torques by Lagrange multipliers."""
+"""Planar loops of one and two degrees of freedom, drawn at random: exact certificates, generation
+below a second, torques by Lagrange multipliers.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from oracles.multipliers import Multipliers
 from oracles.random_loops import KINDS, random_loop
 from oracles.random_robots import random_parameters
 from oracles.test_loops_agree import whole
-from symgen import Robot, certify, regrouping
+from symgen import Robot, regrouping
+from symgen.certify.modules import certify
 from symgen.derive.loops import close
 from symgen.emit.generate import generate_module
 from symgen.regroup.regrouping import EXACT
@@ -34,11 +37,15 @@ def module_of(text: str, folder: Path) -> ModuleType:
 
 
 def torques_agree(robot: Robot, module: ModuleType) -> None:
-    """Around the start, at the states farthest from dead points of many, to 1e-10 of the largest torque."""
+    """Around the start, at the states farthest from dead points of many, to 1e-10 of the largest
+    torque.
+    """
     rng, start, joints = np.random.default_rng(3), close(robot).start, robot.joints
     size = max(abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0))
     reach = [0.1 * size if robot.frame(j).sigma else 0.3 for j in joints]
-    q = np.array([start[j] for j in joints]) + np.array(reach) * rng.uniform(-1, 1, (20, len(joints)))
+    q = np.array([start[j] for j in joints]) + np.array(reach) * rng.uniform(
+        -1, 1, (20, len(joints))
+    )
     q = q[[closes(module, one) for one in q]]
     assert len(q) >= 4
     at, zero = whole(robot, q, module.passive_joints(q)), np.zeros((1, len(joints)))
@@ -46,7 +53,10 @@ def torques_agree(robot: Robot, module: ModuleType) -> None:
     qd, qdd = rng.standard_normal((2, 4, len(joints)))
     oracle, chi = Multipliers(robot, at[keep], qd, qdd), random_parameters(robot, seed=7)
     X, tau = module.base_parameters(chi), oracle.torque(chi)
-    for found in (module.inverse_dynamics(q[keep], qd, qdd, X), module.regressor(q[keep], qd, qdd) @ X):
+    for found in (
+        module.inverse_dynamics(q[keep], qd, qdd, X),
+        module.regressor(q[keep], qd, qdd) @ X,
+    ):
         assert np.abs(found - tau).max() < 1e-10 * np.abs(tau).max()
 
 
@@ -66,13 +76,20 @@ def check(kind: str, seed: int, folder: Path) -> None:
     spent = time.process_time() - begun
     assert spent < SECOND, (kind, seed, spent)
     found = regrouping(robot)
-    certificate = certify(found, text)
-    assert found.method == EXACT and certificate.valid and len(certificate.primes) >= 2, (kind, seed, str(certificate))
+    certificate = certify(found, {f"{robot.name}.py": text})
+    assert found.method == EXACT and certificate.valid and len(certificate.primes) >= 2, (
+        kind,
+        seed,
+        str(certificate),
+    )
     assert not certificate.rank_in_floats
     torques_agree(robot, module_of(text, folder))
 
 
-@pytest.mark.parametrize("kind", sampled(KINDS, 5, always=("kite across the ground", "antiparallelogram", "slotted lever")))
+@pytest.mark.parametrize(
+    "kind",
+    sampled(KINDS, 5, always=("kite across the ground", "antiparallelogram", "slotted lever")),
+)
 def test_exact_and_quick(kind: str, tmp_path: Path) -> None:
     """Constants for every other kind, numbers for the rest."""
     check(kind, KINDS.index(kind) % 2, tmp_path)

@@ -1,4 +1,6 @@
-"""Torques of robots read from URDF equal pinocchio's from the same text; URDF to Khalil to URDF likewise."""
+"""Torques of robots read from URDF equal pinocchio's from the same text; URDF to Khalil to URDF
+likewise.
+"""
 
 import re
 from types import ModuleType
@@ -29,7 +31,12 @@ def legend(notes: tuple[str, ...]) -> dict[int, str]:
 
 def kept_frames(notes: tuple[str, ...]) -> dict[int, str]:
     """Names of the links that are kept frames, by number."""
-    return {int(j): name for note in notes if note.startswith("fixed frames") for j, name in re.findall(r"frame (\d+) = '([^']*)'", note)}
+    return {
+        int(j): name
+        for note in notes
+        if note.startswith("fixed frames")
+        for j, name in re.findall(r"frame (\d+) = '([^']*)'", note)
+    }
 
 
 def loaded(robot: Robot) -> ModuleType:
@@ -48,16 +55,25 @@ class Pinocchio:
     def poses(self, names: list[str], q: np.ndarray, links: list[str]) -> np.ndarray:
         """(4, 4) of each link in the root link's frame."""
         pin.framesForwardKinematics(self.model, self.data, self.configuration(names, q))
-        return np.array([self.data.oMf[self.model.getFrameId(link, pin.FrameType.BODY)].homogeneous for link in links])
+        return np.array(
+            [
+                self.data.oMf[self.model.getFrameId(link, pin.FrameType.BODY)].homogeneous
+                for link in links
+            ]
+        )
 
     def configuration(self, names: list[str], q: np.ndarray) -> np.ndarray:
         x = np.array(pin.neutral(self.model))
         for k, name in enumerate(names):
             joint = self.model.joints[self.model.getJointId(name)]
-            x[joint.idx_q : joint.idx_q + joint.nq] = [q[k]] if joint.nq == 1 else [np.cos(q[k]), np.sin(q[k])]
+            x[joint.idx_q : joint.idx_q + joint.nq] = (
+                [q[k]] if joint.nq == 1 else [np.cos(q[k]), np.sin(q[k])]
+            )
         return x
 
-    def torque(self, names: list[str], q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    def torque(
+        self, names: list[str], q: np.ndarray, qd: np.ndarray, qdd: np.ndarray
+    ) -> np.ndarray:
         model = self.model
         x, v, a = self.configuration(names, q), np.zeros(model.nv), np.zeros(model.nv)
         for k, name in enumerate(names):
@@ -68,7 +84,9 @@ class Pinocchio:
 
 
 def difference(text: str, robot: Robot, names: dict[int, str], seed: int) -> float:
-    """Largest difference of torque over the largest torque, links alone: friction is none of pinocchio's."""
+    """Largest difference of torque over the largest torque, links alone: friction is none of
+    pinocchio's.
+    """
     rng = np.random.default_rng(seed)
     n, samples = len(robot.moving), 5
     reach = [1.0 if robot.frame(j).sigma == PRISMATIC else np.pi for j in robot.moving]
@@ -81,9 +99,15 @@ def difference(text: str, robot: Robot, names: dict[int, str], seed: int) -> flo
         q[:, k] += q @ (follow[k] * (np.arange(n) != k))
         qd[:, k], qdd[:, k] = qd @ follow[k], qdd @ follow[k]
     oracle = Pinocchio(text)
-    theirs = np.array([oracle.torque([names[j] for j in robot.moving], *s) for s in zip(q, qd, qdd, strict=True)])
+    theirs = np.array(
+        [oracle.torque([names[j] for j in robot.moving], *s) for s in zip(q, qd, qdd, strict=True)]
+    )
     active = [robot.moving.index(j) for j in robot.joints]
-    chi = [value if name[:2] not in ("FV", "FS") else 0.0 for name in robot.parameters for value in (robot.values[name],)]
+    chi = [
+        value if name[:2] not in ("FV", "FS") else 0.0
+        for name in robot.parameters
+        for value in (robot.values[name],)
+    ]
     if robot.constraints:  # torques of the tree do no work beyond those of the joints that lead
         theirs = theirs @ follow[:, active]
         model = loaded(robot)
@@ -97,53 +121,82 @@ def difference(text: str, robot: Robot, names: dict[int, str], seed: int) -> flo
 @pytest.mark.parametrize("make", NAMED, ids=lambda make: make.__name__)
 def test_torques_of_published_robots(make) -> None:
     text = make()
-    robot, notes = read_urdf(text.encode(), f"{make.__name__}.urdf")
+    robot, notes = read_urdf(text.encode(), f"{make.__name__}.urdf", exact=True)
     assert difference(text, robot, legend(notes), 1) < TOLERANCE
     again, said = write_urdf(robot)
     assert any("formulas" in note for note in said)
     names = {j: f"q{j}" for j in robot.moving}
     assert difference(again, robot, names, 2) < TOLERANCE
-    back, notes = read_urdf(again.encode(), "again.urdf")
-    assert difference(again, back, legend(notes), 3) < TOLERANCE and len(back.frames) == len(robot.frames)
+    back, notes = read_urdf(again.encode(), "again.urdf", exact=True)
+    assert difference(again, back, legend(notes), 3) < TOLERANCE and len(back.frames) == len(
+        robot.frames
+    )
 
 
 def test_random_trees() -> None:
     aside = 0
     for seed in range(20):
         text = random_tree(seed)
-        robot, notes = read_urdf(text.encode(), "tree.urdf")
+        robot, notes = read_urdf(text.encode(), "tree.urdf", exact=True)
         aside += any(f.sigma == FIXED for f in robot.frames)
         assert difference(text, robot, legend(notes), seed) < TOLERANCE, seed
         again, _ = write_urdf(robot)
-        back, notes = read_urdf(again.encode(), "again.urdf")
+        back, notes = read_urdf(again.encode(), "again.urdf", exact=True)
         assert difference(again, back, legend(notes), seed) < TOLERANCE, seed
         assert difference(again, robot, {j: f"q{j}" for j in robot.moving}, seed) < TOLERANCE, seed
     assert aside > 3  # nearly parallel axes took part
 
 
 def pose_difference(text: str, robot: Robot, notes: tuple[str, ...], seed: int) -> float:
-    """Largest difference (m, or of an entry of a rotation) of the poses of the kept frames; joints that follow others included."""
+    """Largest difference (m, or of an entry of a rotation) of the poses of the kept frames; joints
+    that follow others included.
+    """
     names, kept = legend(notes), kept_frames(notes)
     oracle = Pinocchio(text)
     largest = 0.0
     for q in np.random.default_rng(seed).uniform(-1, 1, (3, len(robot.joints))) if kept else ():
         position = {f"q{j}": x for j, x in zip(robot.joints, q, strict=True)}
         position |= {f"q{j}": e.value(position) for j, e in robot.constraints.items()}
-        theirs = oracle.poses([names[j] for j in robot.moving], np.array([position[f"q{j}"] for j in robot.moving]), list(kept.values()))
-        poses = frame_poses(Geometry(robot, FloatAlgebra(robot, {j: np.array(position[f"q{j}"]) for j in robot.moving}), close(robot)))
-        ours = [np.column_stack([np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]) for j in kept]
+        theirs = oracle.poses(
+            [names[j] for j in robot.moving],
+            np.array([position[f"q{j}"] for j in robot.moving]),
+            list(kept.values()),
+        )
+        poses = frame_poses(
+            Geometry(
+                robot,
+                FloatAlgebra(robot, {j: np.array(position[f"q{j}"]) for j in robot.moving}),
+                close(robot),
+            )
+        )
+        ours = [
+            np.column_stack(
+                [np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]
+            )
+            for j in kept
+        ]
         largest = max(largest, float(np.abs(np.array(ours) - theirs[:, :3]).max()))
     return largest
 
 
 @pytest.mark.parametrize("make", NAMED, ids=lambda make: make.__name__)
 def test_kept_frames_of_published_robots(make) -> None:
-    """tool0, hand, base mounts ...: poses equal pinocchio's, torques do not care, and the frames that move are the same."""
+    """tool0, hand, base mounts ...: poses equal pinocchio's, torques do not care, and the frames
+    that move are the same.
+    """
     text = make()
     merged, _ = read_urdf(text.encode(), "arm.urdf")
     robot, notes = read_urdf(text.encode(), "arm.urdf", keep_fixed=True)
-    assert robot.frames[: len(merged.frames)] == merged.frames and robot.parameters == merged.parameters and robot.values == merged.values
-    assert len(kept_frames(notes)) == text.count('type="fixed"') == len(robot.frames) - len(merged.frames)
+    assert (
+        robot.frames[: len(merged.frames)] == merged.frames
+        and robot.parameters == merged.parameters
+        and robot.values == merged.values
+    )
+    assert (
+        len(kept_frames(notes))
+        == text.count('type="fixed"')
+        == len(robot.frames) - len(merged.frames)
+    )
     assert pose_difference(text, robot, notes, 4) < 1e-12
     assert difference(text, robot, legend(notes), 1) < TOLERANCE
     again, _ = write_urdf(robot)
@@ -155,7 +208,7 @@ def test_kept_frames_of_random_trees() -> None:
     for seed in range(40):
         text = random_tree(seed)
         if 'type="fixed"' in text:
-            robot, notes = read_urdf(text.encode(), "tree.urdf", keep_fixed=True)
+            robot, notes = read_urdf(text.encode(), "tree.urdf", exact=True, keep_fixed=True)
             kept += len(kept_frames(notes))
             assert pose_difference(text, robot, notes, seed) < 1e-12, seed
             assert difference(text, robot, legend(notes), seed) < TOLERANCE, seed

@@ -1,6 +1,8 @@
-"""The table of public URDF files in docs/names.md: joints, base parameters, certificate, torques against pinocchio; run with `python -m oracles.urdf_table`.
+"""The table of public URDF files in docs/names.md: joints, base parameters, certificate, torques
+against pinocchio; run with `python -m oracles.urdf_table`.
 
-Of each file as it is read by default, angles snapped, against the same text with its angles snapped; then of the file as it is.
+Of each file as it is read by default, angles snapped, against the same text with its angles
+snapped; then of the file as it is.
 """
 
 import math
@@ -13,22 +15,27 @@ from pathlib import Path
 import numpy as np
 
 from oracles.test_urdf_agrees import Pinocchio, legend
+from symgen.certify.modules import certify
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.description import Robot
-from symgen.description.files import SNAP
+from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
 from symgen.description.urdf import SNAPPED, read_urdf
-from symgen.emit.certified import certify
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
 
 SITE = Path(sysconfig.get_paths()["purelib"])
 FOLDERS = ("airo_models", "cmeel.prefix/share/example-robot-data/robots")
 MOVES = ('type="revolute"', 'type="prismatic"', 'type="continuous"')
-FOUND = sorted(p for folder in FOLDERS for p in (SITE / folder).rglob("*.urdf") if any(word in p.read_text("utf-8") for word in MOVES))
+FOUND = sorted(
+    p
+    for folder in FOLDERS
+    for p in (SITE / folder).rglob("*.urdf")
+    if any(word in p.read_text("utf-8") for word in MOVES)
+)
 
 
 def snapped_text(text: str) -> str:
@@ -46,22 +53,33 @@ def snapped_text(text: str) -> str:
 
 def open_tree(robot: Robot) -> Robot:
     """The mechanism with every joint its own and nothing but its links."""
-    values = {name: robot.values[name] for j in robot.links for p in INERTIAL if (name := parameter(p, j)) in robot.values}
+    values = {
+        name: robot.values[name]
+        for j in robot.links
+        for p in INERTIAL
+        if (name := parameter(p, j)) in robot.values
+    }
     frames = tuple(replace(f, mu=int(f.sigma != FIXED)) for f in robot.frames)
     return replace(robot, frames=frames, constraints={}, elements=(), limits={}, values=values)
 
 
 def difference(text: str, robot: Robot, names: dict[int, str]) -> float:
-    """Largest difference of torque over the largest torque, every joint on its own, whatever follows what."""
+    """Largest difference of torque over the largest torque, every joint on its own, whatever
+    follows what.
+    """
     tree, rng = open_tree(robot), np.random.default_rng(7)
-    reach = np.array([1.0 if f.sigma == PRISMATIC else np.pi for f in tree.frames if f.sigma != FIXED])
+    reach = np.array(
+        [1.0 if f.sigma == PRISMATIC else np.pi for f in tree.frames if f.sigma != FIXED]
+    )
     oracle, closure, largest, error = Pinocchio(text), close(tree), 0.0, 0.0
     for _ in range(3):
         x = rng.standard_normal((3, len(reach)))
         x[0] = rng.uniform(-1, 1, len(reach)) * reach
         theirs = oracle.torque([names[j] for j in tree.joints], *x)
         states = [{j: np.array(v) for j, v in zip(tree.joints, row, strict=True)} for row in x]
-        gamma = joint_torques(Motion(Geometry(tree, FloatAlgebra(tree, *states), closure)), dict(tree.values))
+        gamma = joint_torques(
+            Motion(Geometry(tree, FloatAlgebra(tree, *states), closure)), dict(tree.values)
+        )
         ours = np.array([float(gamma[j]) for j in tree.joints])
         largest, error = max(largest, np.abs(theirs).max()), max(error, np.abs(ours - theirs).max())
     return error / largest if largest else error
@@ -71,24 +89,33 @@ def row(path: Path) -> str:
     """One line of the table, or why the file is refused."""
     text, start = path.read_text("utf-8"), time.process_time()
     try:
-        robot, notes = read_urdf(text.encode(), path.name, nearly=SNAP)
+        robot, notes = read_urdf(text.encode(), path.name)
         regrouping = regroup(robot)
         certificate = certify(regrouping)
         seconds = time.process_time() - start
-        as_it_is, said = read_urdf(text.encode(), path.name)
+        as_it_is, said = read_urdf(text.encode(), path.name, exact=True)
     except SymgenError as error:
         return f"| `{path.stem}` | | | | refused: {str(error).partition(' (')[0]} | | | |"
     angles = sum(note.startswith(SNAPPED) for note in notes)
     torques = ["no masses", "no masses"]
     if robot.values:
-        torques = [f"{difference(snapped_text(text), robot, legend(notes)):.0e}", f"{difference(text, as_it_is, legend(said)):.0e}"]
+        torques = [
+            f"{difference(snapped_text(text), robot, legend(notes)):.0e}",
+            f"{difference(text, as_it_is, legend(said)):.0e}",
+        ]
     joints = f"{len(robot.joints)}" + f" + {len(robot.passive)}" * bool(robot.passive)
     verdict = "valid" if certificate.valid else "**FALSE**"
-    return f"| `{path.stem}` | {joints} | {angles} | {len(regrouping)} | {verdict} | {' | '.join(torques)} | {seconds:.1f} |"
+    return (
+        f"| `{path.stem}` | {joints} | {angles} | {len(regrouping)} | {verdict} | "
+        f"{' | '.join(torques)} | {seconds:.1f} |"
+    )
 
 
 if __name__ == "__main__":
-    print("| file | joints | angles snapped | base parameters | certificate | torques, snapped | torques, `--snap 0` | s |")
+    print(
+        "| file | joints | angles snapped | base parameters | certificate | torques, snapped | "
+        "torques, `--exact` | s |"
+    )
     print("|---|---|---|---|---|---|---|---|")
     for folder in FOLDERS:
         for p in FOUND:

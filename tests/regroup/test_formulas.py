@@ -1,4 +1,6 @@
-"""Regrouping formulas and counts against published ones: eq. (27) of the chapter, counts of Khalil's robots."""
+"""Regrouping formulas and counts against published ones: eq. (27) of the chapter, counts of
+Khalil's robots.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +28,14 @@ EQ27 = {
     "MY5R": "MY5 - MZ6",
     "XX6R": "XX6 - YY6",
 }
-TABLE1_SIGNS = {  # with the alpha of Table 1 as printed: the OpenSYMORO listing of the RX-90 has these
+# with the alpha of Table 1 as printed: the OpenSYMORO listing of the RX-90 has these
+TABLE1_SIGNS = {
     "MY3R": "MY3 + MZ4 + (M4 + M5 + M6)*RL4",
     "MY4R": "MY4 - MZ5",
     "MY5R": "MY5 + MZ6",
 }
-# Base parameters with Ia, FV, FS, OFFSET on every joint; regrouping theory, numerical ranks of several authors.
+# Base parameters with Ia, FV, FS, OFFSET on every joint; regrouping theory, numerical ranks of
+# several authors.
 COUNTS = {
     "tx40_table1": 58, "tx40": 60, "rx90": 58, "puma560": 58, "stanford": 55, "scara": 22, "panda": 69,
     "emps": 4, "emps_asymmetric": 5, "planar_2r": 13,
@@ -44,11 +48,15 @@ def regrouped(regrouping: Regrouping) -> dict[str, object]:
 
 
 def test_eq_27_term_by_term() -> None:
-    assert regrouped(regroup(load_robot("tx40"))) == {name: parse(text) for name, text in EQ27.items()}
+    assert regrouped(regroup(load_robot("tx40"))) == {
+        name: parse(text) for name, text in EQ27.items()
+    }
 
 
 def test_table_1_changes_three_signs() -> None:
-    assert regrouped(regroup(load_robot("tx40_table1"))) == {name: parse(text) for name, text in (EQ27 | TABLE1_SIGNS).items()}
+    assert regrouped(regroup(load_robot("tx40_table1"))) == {
+        name: parse(text) for name, text in (EQ27 | TABLE1_SIGNS).items()
+    }
 
 
 @pytest.mark.parametrize(("name", "count"), COUNTS.items())
@@ -84,4 +92,6 @@ def test_prismatic_mass_stands_before_actuator_inertia() -> None:
 
 def test_seed_does_not_change_the_result() -> None:
     robot = load_robot("two_branch")
-    assert [b.formula for b in regroup(robot).base] == [b.formula for b in regroup(robot, seed=77).base]
+    assert [b.formula for b in regroup(robot).base] == [
+        b.formula for b in regroup(robot, seed=77).base
+    ]

@@ -1,7 +1,9 @@
-"""Decimal angles about parallel axes: their sums are no new random angles over F_p (three of them once broke a right certificate)."""
+"""Decimal angles about parallel axes: their sums are no new random angles over F_p (three of them
+once broke a right certificate).
+"""
 
+from symgen.certify.modules import certify
 from symgen.description import parse_robot
-from symgen.emit.certified import certify
 from symgen.regroup.regrouping import regroup
 
 TEXT = """\

@@ -12,7 +12,9 @@ from symgen.regroup.regrouping import _regrouped
 def test_regrouping_ends(monkeypatch):
     _regrouped.cache_clear()
     monkeypatch.setattr(time_limit, "SECONDS", 0.0)
-    with pytest.raises(SymgenError, match="the regrouping of scara takes more than 0 s of processor time"):
+    with pytest.raises(
+        SymgenError, match="the regrouping of scara takes more than 0 s of processor time"
+    ):
         regrouping(load_robot("scara"))
 
 
@@ -22,4 +24,6 @@ def test_check_ends_with_one_sentence(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["symgen", "check", "scara"])
     with pytest.raises(SystemExit) as end:
         main()
-    assert end.value.code == 2 and "takes more than 0 s" in " ".join(capsys.readouterr().err.split())
+    assert end.value.code == 2 and "takes more than 0 s" in " ".join(
+        capsys.readouterr().err.split()
+    )

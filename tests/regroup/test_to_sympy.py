@@ -1,4 +1,6 @@
-"""Formulas in every language: sympy reads the text as what `to_sympy` gives; Python, LaTeX and MathML say the same terms."""
+"""Formulas in every language: sympy reads the text as what `to_sympy` gives; Python, LaTeX and
+MathML say the same terms.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,25 @@ from oracles.random_robots import random_robot
 from symgen.description import load_robot
 from symgen.description.expression import call, with_known_cosines
 from symgen.description.grammar import parse
-from symgen.regroup import mathml
 from symgen.regroup.formula import Formula, Plain, Python
-from symgen.regroup.latex import Latex
 from symgen.regroup.regrouping import regroup
+from symgen.symbols import mathml, trees
+from symgen.symbols.latex import latex
 
-ROBOTS = [load_robot("tx40"), load_robot("two_branch"), *(random_robot(seed) for seed in (4, 7, 9, 13, 43, 113))]
+ROBOTS = [
+    load_robot("tx40"),
+    load_robot("two_branch"),
+    *(random_robot(seed) for seed in (4, 7, 9, 13, 43, 113)),
+]
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_export_equals_text(robot) -> None:
     names = {name: sympy.Symbol(name, real=True) for name in (*robot.parameters, *robot.constants)}
     for b in regroup(robot).base:
-        read = sympy.sympify(str(b.formula), locals=names, rational=True)  # our own text, not a user's
+        read = sympy.sympify(
+            str(b.formula), locals=names, rational=True
+        )  # our own text, not a user's
         assert sympy.expand(read - b.formula.to_sympy()) == 0, b.name
 
 
@@ -33,33 +41,57 @@ def test_sympy_text_is_read_back(robot) -> None:
     """To SymPy and back: the grammar of robot files reads what SymPy writes as the same formula."""
     known = {*robot.parameters, *robot.constants}
     for b in regroup(robot).base:
-        assert with_known_cosines(parse(str(b.formula.to_sympy()), known)) == with_known_cosines(parse(str(b.formula), known)), b.name
+        assert with_known_cosines(parse(str(b.formula.to_sympy()), known)) == with_known_cosines(
+            parse(str(b.formula), known)
+        ), b.name
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_python_evaluates_to_the_expressions(robot) -> None:
-    values = dict(zip(robot.parameters, np.random.default_rng(0).standard_normal(len(robot.parameters)), strict=True)) | dict(
-        robot.constants
-    )
+    values = dict(
+        zip(
+            robot.parameters,
+            np.random.default_rng(0).standard_normal(len(robot.parameters)),
+            strict=True,
+        )
+    ) | dict(robot.constants)
     for b in regroup(robot).base:
         found = eval(Python("np").formula(b.formula), {"np": np}, values)  # noqa: S307 (our own output)
-        assert found == pytest.approx(sum(c.value(robot.constants) * values[name] for name, c in b.combination.items()), rel=1e-13)
+        assert found == pytest.approx(
+            sum(c.value(robot.constants) * values[name] for name, c in b.combination.items()),
+            rel=1e-13,
+        )
 
 
 def test_every_printer_writes_every_piece() -> None:
     a = parse("a", {"a", "b"})
     angle = parse("pi/3 + b", {"a", "b"})
-    c = call("cos", angle) ** 2 * parse("2/3", set()) - call("sqrt", a) * call("inv", parse("a + b", {"a", "b"}))
+    c = call("cos", angle) ** 2 * parse("2/3", set()) - call("sqrt", a) * call(
+        "inv", parse("a + b", {"a", "b"})
+    )
     f = Formula(
-        {"ZZ1": parse("1", set()), "YY2": parse("1", set()), "XX2": -parse("1", set()), "M3": c, "M4": -parse("0.25*a**2/b", {"a", "b"})}
+        {
+            "ZZ1": parse("1", set()),
+            "YY2": parse("1", set()),
+            "XX2": -parse("1", set()),
+            "M3": c,
+            "M4": -parse("0.25*a**2/b", {"a", "b"}),
+        }
     )
     cos = "cos(b + pi/3)" if "cos(b" in str(c) else "cos(pi/3 + b)"
     assert str(f) == f"ZZ1 + YY2 - XX2 + ({Plain().expression(c)})*M3 - a**2/(4*b)*M4".replace(
         "a**2/(4*b)", Plain().expression(parse("0.25*a**2/b", {"a", "b"}))
     )
     assert Plain().expression(c) == str(c) and f"2*{cos}**2/3" in str(c)
-    assert "xp.cos(zero + " in Python("xp", "zero + ").formula(f) and "xp.pi" in Python("xp").formula(f)
-    latex = Latex().formula(f)
-    assert r"\cos^{2}\left(" in latex and r"\sqrt{a}" in latex and r"\frac{2" in latex and latex.startswith("ZZ_{1} + YY_{2} - XX_{2} + ")
-    terms = mathml.formula(f)
+    assert "xp.cos(zero + " in Python("xp", "zero + ").formula(f) and "xp.pi" in Python(
+        "xp"
+    ).formula(f)
+    typeset = latex(trees.formula(f))
+    assert (
+        r"\cos^{2}{\left(" in typeset
+        and r"\sqrt{a}" in typeset
+        and r"\frac{2" in typeset
+        and typeset.startswith("ZZ_{1} + YY_{2} - XX_{2} + ")
+    )
+    terms = mathml.terms(trees.formula(f))
     assert len(terms) == 5 and all(ElementTree.fromstring(term).tag == "math" for term in terms)

@@ -1,4 +1,6 @@
-"""The report page: well-formed, escaping, one self-contained file whose policy names its one script; tables that fit their header."""
+"""The report page: well-formed, escaping, one self-contained file whose policy names its one
+script; tables that fit their header.
+"""
 
 import json
 import re
@@ -15,17 +17,45 @@ from runtime.reporting.page import Image, Matrix, Number, Page, Section, embedde
 from runtime.reporting.series import Series
 from runtime.table import Table
 
-HOSTILE = "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 }} <!-- ]]>"
+HOSTILE = (
+    "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 "
+    "}} "
+    "<!-- ]]>"
+)
 
 
 def page(text, *, live=True):
     t = np.arange(3.0)
     table = Table(
-        text, (text, "b"), [(text, element("details", element("summary", text), text))], text, kinds=(text,), only=text, sortable=live
+        text,
+        (text, "b"),
+        [(text, element("details", element("summary", text), text))],
+        text,
+        kinds=(text,),
+        only=text,
+        sortable=live,
     )
     image = Image(text, b"<svg/>", text, Series(t, t, t, (text, text), text, 3) if live else None)
-    section = Section(text, (text,), [image], [table], text, [Matrix(text, (text, symbol(text)), ((1.0, -0.5), (-0.5, 1.0)))])
-    return Page(text, text, [section], text, text, "no", text, text, [(text, text)], [Number(text, text, "doubtful")])
+    section = Section(
+        text,
+        (text,),
+        [image],
+        [table],
+        text,
+        [Matrix(text, (text, symbol(text)), ((1.0, -0.5), (-0.5, 1.0)))],
+    )
+    return Page(
+        text,
+        text,
+        [section],
+        text,
+        text,
+        "no",
+        text,
+        text,
+        [(text, text)],
+        [Number(text, text, "doubtful")],
+    )
 
 
 def policy(html):
@@ -50,15 +80,25 @@ def test_nothing_is_fetched():
 
 def test_policy_allows_this_script_and_this_style_alone():
     html = render(page("text"))
-    script, style = re.search(r"<script>(.*?)</script>", html, re.DOTALL)[1], re.search(r"<style>(.*?)</style>", html, re.DOTALL)[1]
-    digests = [f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in (style, script)]
+    script, style = (
+        re.search(r"<script>(.*?)</script>", html, re.DOTALL)[1],
+        re.search(r"<style>(.*?)</style>", html, re.DOTALL)[1],
+    )
+    digests = [
+        f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in (style, script)
+    ]
     assert policy(html) == (
-        f"default-src 'none'; img-src data:; style-src {digests[0]}; script-src {digests[1]}; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; img-src data:; style-src {digests[0]}; script-src {digests[1]}; "
+        "base-uri 'none'; form-action 'none'"
     )
 
 
 def test_a_page_without_figures_to_zoom_has_no_script():
-    plain = Page("t", "v", [Section("s", images=[Image("c", b"<svg/>", "a")], tables=[Table("t", ("a",), [("1",)])])])
+    plain = Page(
+        "t",
+        "v",
+        [Section("s", images=[Image("c", b"<svg/>", "a")], tables=[Table("t", ("a",), [("1",)])])],
+    )
     html = render(plain)
     assert "<script" not in html and "script-src" not in policy(html)
 

@@ -1,21 +1,19 @@
-"""What a notebook shows of a Regrouping, an Estimate and a resolution study: well-formed, complete, escaped; and a notebook that is run."""
+"""What a notebook shows of formulas, an Estimate and a resolution study: well-formed, complete,
+escaped; and a notebook that is run.
+"""
 
 import re
-from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import nbformat
 import numpy as np
-import pytest
 from nbclient import NotebookClient
 
 from runtime.estimators.estimate import Estimate, JointFit
-from runtime.observation.observation import Observation
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.runs import Level, Run, Runs
-from symgen.description import load_robot
-from symgen.regroup.regrouping import regroup
+from runtime.rows.observation import Observation
 
 HOSTILE = "<script>alert(1)</script>\"'&"
 
@@ -38,10 +36,21 @@ class Elements(HTMLParser):
 def fit(names=("ZZ1R", "FV1"), **changes):
     b = len(names)
     values = {
-        "names": names, "X": np.arange(1.0, b + 1), "sigma": np.full(b, 0.1), "covariance": 0.01 * np.eye(b), "sigma_corrected": np.full(b, np.nan),
-        "sigma_rho": 0.5, "cond": 10.0, "cond_unit": 5.0, "rank": b, "residual_norm": 3.0, "relative_error": 2.5,
-        "per_joint": (JointFit("1", 100, 3.0, 2.5, 0.5),), "method": "ols", "units": {"ZZ1R": "kg*m**2"},
-    }  # fmt: skip
+        "names": names,
+        "X": np.arange(1.0, b + 1),
+        "sigma": np.full(b, 0.1),
+        "covariance": 0.01 * np.eye(b),
+        "sigma_corrected": np.full(b, np.nan),
+        "sigma_rho": 0.5,
+        "cond": 10.0,
+        "cond_unit": 5.0,
+        "rank": b,
+        "residual_norm": 3.0,
+        "relative_error": 2.5,
+        "per_joint": (JointFit("1", 100, 3.0, 2.5, 0.5),),
+        "method": "ols",
+        "units": {"ZZ1R": "kg*m**2"},
+    }
     return Estimate(**values | changes)
 
 
@@ -74,7 +83,13 @@ def test_estimate_is_a_table():
 
 
 def test_nothing_in_a_result_is_markup():
-    bad = fit((HOSTILE, "FV1"), units={HOSTILE: HOSTILE}, message=HOSTILE, method=HOSTILE, per_joint=(JointFit(HOSTILE, 1, 1.0, 1.0, 1.0),))
+    bad = fit(
+        (HOSTILE, "FV1"),
+        units={HOSTILE: HOSTILE},
+        message=HOSTILE,
+        method=HOSTILE,
+        per_joint=(JointFit(HOSTILE, 1, 1.0, 1.0, 1.0),),
+    )
     page = Elements(bad._repr_html_())
     ElementTree.fromstring(bad._repr_html_())
     assert "script" not in {tag for tag, _ in page.tags} and page.text.count("<script>") == 5
@@ -84,40 +99,29 @@ def test_resolution_study_is_a_table():
     rng = np.random.default_rng(0)
     W = rng.standard_normal((50, 2))
     Y = W @ [1.0, 2.0] + 0.01 * rng.standard_normal(50)
-    seen = Observation(np.asfortranarray(W), Y, (50,), ("ZZ1R", "FV1"), np.arange(50.0), np.zeros(50, int), 1.0)
+    seen = Observation(
+        np.asfortranarray(W), Y, (50,), ("ZZ1R", "FV1"), np.arange(50.0), np.zeros(50, int), 1.0
+    )
     reference = fit(X=np.linalg.lstsq(W, Y, rcond=None)[0], residual_norm=0.07)
     runs = Runs.of([Run(0, k, (0.99, 2.0 + 0.001 * k), 0.08) for k in range(3)], 2)
-    shown = Cestac(("ZZ1R", "FV1"), reference, (level_result(Level(2 * np.pi / 5000), runs, seen, reference),))
+    shown = Cestac(
+        ("ZZ1R", "FV1"), reference, (level_result(Level(2 * np.pi / 5000), runs, seen, reference),)
+    )
     page = Elements(shown._repr_html_())
     assert "2*pi/5000" in page.text and "%e(rho)" in page.text and shown.verdict in page.text
     assert ElementTree.fromstring(shown._repr_html_()).find("table") is not None
 
 
-@pytest.mark.parametrize("name", ["tx40", "two_branch"])
-def test_regrouping_is_typeset(name):
-    regrouping = regroup(load_robot(name))
-    root = ElementTree.fromstring(regrouping._repr_html_())
-    shown = {e.get("data-p") for e in root.iter() if e.get("data-p")}
-    assert shown == {*regrouping.names, *regrouping.robot.parameters} - {b.own for b in regrouping.base if b.own not in b.combination}
-    assert len(root.find("table").findall("tbody/tr")) == sum(b.name != b.own for b in regrouping.base)
-    latex = regrouping._repr_latex_()
-    assert latex.startswith("$$") and latex.count(r"\\") == len(regrouping) and latex.count("{") == latex.count("}")
-
-
-def test_titles_are_escaped():
-    regrouping = regroup(load_robot("two_branch"))
-    regrouping = replace(regrouping, robot=replace(regrouping.robot, title=HOSTILE.replace('"', "")))
-    assert "script" not in {tag for tag, _ in Elements(regrouping._repr_html_()).tags}
-
-
 def test_a_notebook_shows_them():
-    """Run in a kernel: both results come as HTML and LaTeX beside the text."""
+    """Run in a kernel: formulas come as LaTeX beside the text."""
     book = nbformat.v4.new_notebook()
     book.cells = [
-        nbformat.v4.new_code_cell("import symgen\nsymgen.regrouping(symgen.load_robot('planar_2r'))"),
+        nbformat.v4.new_code_cell(
+            "import symgen\nsymgen.symbolic('planar_2r').formulas('base_parameters')"
+        ),
         nbformat.v4.new_code_cell("from runtime.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]
-    assert {"text/html", "text/latex", "text/plain"} <= set(data) and "<math>" in data["text/html"]
+    assert {"text/latex", "text/plain"} <= set(data)
     assert re.search(r"ZZ_\{1R\}", data["text/latex"])

@@ -1,4 +1,6 @@
-"""Figures: made without a window or global state, deterministic, broken lines where rows are missing."""
+"""Figures: made without a window or global state, deterministic, broken lines where rows are
+missing.
+"""
 
 import sys
 
@@ -38,11 +40,19 @@ def test_lines_break_at_gaps(comparison):
 def test_panels_stand_apart_and_inside_the_figure():
     t = np.linspace(0, 1, 50)
     y = 1e5 * np.sin(5 * t)
-    figure = plots.torque_overlay(Comparison(tuple(JointComparison(str(j), t, 10.0**-j * y, 0.9 * 10.0**-j * y) for j in range(7))))
+    figure = plots.torque_overlay(
+        Comparison(
+            tuple(JointComparison(str(j), t, 10.0**-j * y, 0.9 * 10.0**-j * y) for j in range(7))
+        )
+    )
     plots.png(figure)
-    boxes = [ax.get_tightbbox() for ax in figure.axes if ax.get_visible()] + [figure.legends[0].get_window_extent()]
+    boxes = [ax.get_tightbbox() for ax in figure.axes if ax.get_visible()] + [
+        figure.legends[0].get_window_extent()
+    ]
     width, height = figure.get_size_inches() * figure.dpi
-    assert all(box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height for box in boxes)
+    assert all(
+        box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height for box in boxes
+    )
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
 
 
@@ -53,5 +63,9 @@ def test_logarithmic_axes_read_as_numbers():
         plots.logarithmic(ax)
         ax.set(xlim=(1e-6, 1e2), ylim=(1e-2, 1e4))
         plots.png(figure)
-        labels = {text.get_text() for axis in (ax.xaxis, ax.yaxis) for text in axis.get_ticklabels()}
-    assert labels >= {"10⁻⁶", "0.01", "1", "100", "10⁴"} and not any("$" in label for label in labels)
+        labels = {
+            text.get_text() for axis in (ax.xaxis, ax.yaxis) for text in axis.get_ticklabels()
+        }
+    assert labels >= {"10⁻⁶", "0.01", "1", "100", "10⁴"} and not any(
+        "$" in label for label in labels
+    )

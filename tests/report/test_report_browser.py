@@ -1,4 +1,6 @@
-"""report.html in headless Chromium: wide, narrow and printed; figures and tables by pointer and keys; what a checker of web pages asks."""
+"""report.html in headless Chromium: wide, narrow and printed; figures and tables by pointer and
+keys; what a checker of web pages asks.
+"""
 
 import base64
 import json
@@ -18,27 +20,51 @@ from symgen.emit.generate import generate_module
 pytestmark = campaign
 
 DRAWN = "[...document.querySelectorAll('.plot .line')].map((n) => n.getAttribute('d')).join('|')"
-SPAN = "[...document.querySelectorAll('.plot')[0].querySelectorAll('text')].map((n) => n.textContent)"
+SPAN = (
+    "[...document.querySelectorAll('.plot')[0].querySelectorAll('text')].map((n) => n.textContent)"
+)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The report of a 2R arm whose record has noise and a friction that the model does not know; and a resolution study of it."""
+    """The report of a 2R arm whose record has noise and a friction that the model does not know;
+    and a resolution study of it.
+    """
     folder = tmp_path_factory.mktemp("report")
     (folder / "planar_2r.py").write_text(generate_module(load_robot("planar_2r")))
-    model = load_model(folder / "planar_2r.py")
+    model = load_model(folder / "planar_2r.py", trust=True)
     t, rng = np.arange(6000) / 1000, np.random.default_rng(3)
     w = 2 * np.pi * np.array([0.3, 0.7, 1.1, 1.9])[:, None, None]
     a, p = rng.uniform(0.1, 0.5, (4, 1, 2)), rng.uniform(0, 6, (4, 1, 2))
     q, qd, qdd = (
         np.sum(x, axis=0)
-        for x in (a * np.sin(w * t[:, None] + p), a * w * np.cos(w * t[:, None] + p), -a * w**2 * np.sin(w * t[:, None] + p))
+        for x in (
+            a * np.sin(w * t[:, None] + p),
+            a * w * np.cos(w * t[:, None] + p),
+            -a * w**2 * np.sin(w * t[:, None] + p),
+        )
     )
     X = np.linspace(1.0, 2.0, len(model.BASE_PARAMETERS))
-    tau = model.inverse_dynamics(q, qd, qdd, X) + 0.5 * np.exp(-((qd / 0.3) ** 2)) * np.sign(qd) + rng.normal(size=q.shape)
-    np.savetxt(folder / "record.csv", np.column_stack([t, q, tau]), delimiter=",", header="t,q1,q2,tau1,tau2", comments="", fmt="%.9g")
-    for verb, *options in (("report", "--encoder", "2*pi/2000"), ("cestac", "--delta", "2*pi/5000")):
-        result = CliRunner().invoke(app, [verb, "planar_2r", str(folder / "record.csv"), "-o", str(folder / verb), *options])
+    tau = (
+        model.inverse_dynamics(q, qd, qdd, X)
+        + 0.5 * np.exp(-((qd / 0.3) ** 2)) * np.sign(qd)
+        + rng.normal(size=q.shape)
+    )
+    np.savetxt(
+        folder / "record.csv",
+        np.column_stack([t, q, tau]),
+        delimiter=",",
+        header="t,q1,q2,tau1,tau2",
+        comments="",
+        fmt="%.9g",
+    )
+    for verb, *options in (
+        ("report", "--encoder", "2*pi/2000"),
+        ("cestac", "--delta", "2*pi/5000"),
+    ):
+        result = CliRunner().invoke(
+            app, [verb, "planar_2r", str(folder / "record.csv"), "-o", str(folder / verb), *options]
+        )
         assert result.exit_code in (0, 1), result.output
     return folder
 
@@ -60,57 +86,129 @@ def test_nothing_complains_is_asked_for_or_scrolls_sideways(browser, folder, ver
     for width in (1280, 390):
         browser.open(path, width)
         assert browser.complaints == []
-        assert [address for address in browser.requests if not address.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
-        assert browser.run("document.documentElement.scrollWidth <= window.innerWidth && window.innerWidth") == width
+        assert [
+            address
+            for address in browser.requests
+            if not address.startswith("data:image/svg+xml;base64,")
+        ] == [path.as_uri()]
+        assert (
+            browser.run(
+                "document.documentElement.scrollWidth <= window.innerWidth && window.innerWidth"
+            )
+            == width
+        )
 
 
 @pytest.mark.parametrize("verb", ["report", "cestac"])
 def test_structure(browser, folder, verb):
-    """One h1, no level left out, language, title, viewport; images have a text, drawings are hidden from readers, cells have headers."""
+    """One h1, no level left out, language, title, viewport; images have a text, drawings are hidden
+    from readers, cells have headers.
+    """
     browser.open(folder / verb / "report.html")
-    levels = browser.run("[...document.querySelectorAll('h1, h2, h3, h4, h5, h6')].map((n) => Number(n.tagName[1]))")
+    levels = browser.run(
+        "[...document.querySelectorAll('h1, h2, h3, h4, h5, h6')].map((n) => Number(n.tagName[1]))"
+    )
     assert levels.count(1) == 1 and levels[0] == 1 and all(b - a <= 1 for a, b in pairwise(levels))
-    assert browser.run("document.documentElement.lang") == "en" and browser.run("document.title.length") > 5
-    assert "width=device-width" in browser.run("document.querySelector('meta[name=viewport]').content")
+    assert (
+        browser.run("document.documentElement.lang") == "en"
+        and browser.run("document.title.length") > 5
+    )
+    assert "width=device-width" in browser.run(
+        "document.querySelector('meta[name=viewport]').content"
+    )
     assert browser.run("[...document.images].filter((n) => n.alt.length < 10).length") == 0
     assert browser.run("[...document.images].every((n) => n.complete && n.naturalWidth > 0)")
-    assert browser.run("[...document.querySelectorAll('svg')].filter((n) => n.getAttribute('aria-hidden') !== 'true').length") == 0
-    assert browser.run("[...document.querySelectorAll('th')].filter((n) => !['row', 'col'].includes(n.scope)).length") == 0
-    assert browser.run("[...document.querySelectorAll('table')].filter((n) => !n.caption).length") == 0
+    assert (
+        browser.run(
+            "[...document.querySelectorAll('svg')].filter((n) => n.getAttribute('aria-hidden') !== "
+            "'true').length"
+        )
+        == 0
+    )
+    assert (
+        browser.run(
+            "[...document.querySelectorAll('th')].filter((n) => !['row', "
+            "'col'].includes(n.scope)).length"
+        )
+        == 0
+    )
+    assert (
+        browser.run("[...document.querySelectorAll('table')].filter((n) => !n.caption).length") == 0
+    )
     links = browser.run("[...document.querySelectorAll('a')].map((n) => n.getAttribute('href'))")
-    assert links and all(browser.run(f"document.querySelectorAll('{link}').length") == 1 for link in links)
+    assert links and all(
+        browser.run(f"document.querySelectorAll('{link}').length") == 1 for link in links
+    )
     ids = browser.run("[...document.querySelectorAll('[id]')].map((n) => n.id)")
     assert len(ids) == len(set(ids))
 
 
 def test_axes_tell_a_scale_and_texts_stay_in_their_cells(shown):
-    """Two labels at least on either vertical axis of every chart; no text, such as a hash, that leaves its cell."""
-    labels = "[...document.querySelectorAll('.plot svg')].map((s) => [...s.querySelectorAll('text[text-anchor=end]')].map((n) => Number(n.getAttribute('y'))))"
+    """Two labels at least on either vertical axis of every chart; no text, such as a hash, that
+    leaves its cell.
+    """
+    labels = (
+        "[...document.querySelectorAll('.plot svg')].map((s) => "
+        "[...s.querySelectorAll('text[text-anchor=end]')].map((n) => "
+        "Number(n.getAttribute('y'))))"
+    )
     for places in shown.run(labels):
         assert sum(y < 190 for y in places) >= 2 and sum(y > 190 for y in places) >= 2
     assert (
-        shown.run("[...document.querySelectorAll('td, th')].filter((n) => n.scrollWidth > n.clientWidth + 1).map((n) => n.textContent)")
+        shown.run(
+            "[...document.querySelectorAll('td, th')].filter((n) => n.scrollWidth > n.clientWidth "
+            "+ 1).map((n) => n.textContent)"
+        )
         == []
     )
 
 
 def test_verdict_is_said_in_words_and_first(shown, page):
     answer = shown.run("document.querySelector('.answer').textContent.trim()")
-    assert answer.split()[0] in "✓!✕" and answer[1:].strip() in ("Yes", "Yes, as far as judged", "With care", "No")
+    assert answer.split()[0] in "✓!✕" and answer[1:].strip() in (
+        "Yes",
+        "Yes, as far as judged",
+        "With care",
+        "No",
+    )
     text = shown.run("document.querySelector('.verdict').textContent")
     assert "Can I use these values?" in text and "Biggest doubt:" in text and "Next:" in text
     assert shown.run("document.querySelector('.verdict').getBoundingClientRect().bottom") < 500
     sections = shown.run("[...document.querySelectorAll('main h2')].map((n) => n.textContent)")
-    for title in ("Checks", "Parameters", "Friction curves", "Resolution advice", "Resolution study", "Settings", "Provenance"):
+    for title in (
+        "Checks",
+        "Parameters",
+        "Friction curves",
+        "Resolution advice",
+        "Resolution study",
+        "Settings",
+        "Provenance",
+    ):
         assert title in sections
 
 
 def test_everything_that_can_be_focused_has_a_name(shown):
     """Names as Chromium's accessibility tree gives them to a screen reader."""
     nodes = shown.call("Accessibility.getFullAXTree")["nodes"]
-    named = {"button", "link", "application", "toolbar", "region", "table", "image", "DisclosureTriangle", "navigation"}
-    found = [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n["ignored"] and n["role"]["value"] in named]
-    assert {"button", "link", "application", "toolbar", "region", "table", "image"} <= {role for role, _ in found}
+    named = {
+        "button",
+        "link",
+        "application",
+        "toolbar",
+        "region",
+        "table",
+        "image",
+        "DisclosureTriangle",
+        "navigation",
+    }
+    found = [
+        (n["role"]["value"], n.get("name", {}).get("value", ""))
+        for n in nodes
+        if not n["ignored"] and n["role"]["value"] in named
+    ]
+    assert {"button", "link", "application", "toolbar", "region", "table", "image"} <= {
+        role for role, _ in found
+    }
     assert [f for f in found if not f[1].strip()] == []
     assert ("button", "Zoom in") in found and ("button", "measured") in found
 
@@ -126,7 +224,8 @@ def test_lines_are_the_torques(shown, folder):
     """Norm of the error in the page against the residual norm of the essential parameters."""
     fit = json.loads((folder / "report" / "estimate.json").read_text())["essential"]["per_joint"]
     norms = shown.run(
-        "JSON.parse(document.getElementById('data').textContent).map((d) => { const a = floats(d.first), b = floats(d.second);"
+        "JSON.parse(document.getElementById('data').textContent).map((d) => { const a = "
+        "floats(d.first), b = floats(d.second);"
         " return Math.sqrt(a.reduce((sum, x, k) => sum + (x - b[k] || 0) ** 2, 0)); })"
     )
     assert norms == pytest.approx([joint["residual_norm"] for joint in fit], rel=1e-5)
@@ -137,7 +236,9 @@ def test_keyboard_reaches_and_zooms_a_figure(shown):
         shown.press("Tab")
         if shown.run("document.activeElement.className") == "plot":
             break
-    assert shown.run("document.activeElement.getAttribute('aria-label')").startswith("Torque of joint 1")
+    assert shown.run("document.activeElement.getAttribute('aria-label')").startswith(
+        "Torque of joint 1"
+    )
     seen = [shown.run(DRAWN)]
     for key in ("+", "+", "ArrowRight", "-", "0"):
         shown.press(key)
@@ -152,7 +253,9 @@ def test_pointer_zooms_all_figures_and_legend_hides_lines(shown):
     shown.drag(".plot", 90, 0)
     shown.run(FRAME)
     assert shown.run(SPAN) != whole
-    assert all(new != old for new, old in zip(shown.run(DRAWN).split("|"), drawn.split("|"), strict=True))
+    assert all(
+        new != old for new, old in zip(shown.run(DRAWN).split("|"), drawn.split("|"), strict=True)
+    )
     shown.hover(".plot")
     assert "measured" in shown.run("document.querySelector('.readout').textContent")
     near = shown.run(DRAWN)
@@ -165,23 +268,38 @@ def test_pointer_zooms_all_figures_and_legend_hides_lines(shown):
     assert shown.run(SPAN) == whole
     shown.click("[role=toolbar] button:nth-of-type(8)")
     shown.run(FRAME)
-    assert shown.run("[...new Set([...document.querySelectorAll('.plot .line')].map((n) => n.classList[1]))]") == ["first", "second"]
-    assert shown.run("document.querySelectorAll('.tools [aria-pressed=false]').length") == 2  # this one and that of the table
+    assert shown.run(
+        "[...new Set([...document.querySelectorAll('.plot .line')].map((n) => n.classList[1]))]"
+    ) == ["first", "second"]
+    assert (
+        shown.run("document.querySelectorAll('.tools [aria-pressed=false]').length") == 2
+    )  # this one and that of the table
     assert shown.complaints == []
 
 
 def test_parameters_are_sorted_and_filtered(shown):
-    values = "[...document.querySelector('.sortable').tBodies[0].rows].filter((r) => !r.hidden).map((r) => r.cells[{}].textContent)"
+    values = (
+        "[...document.querySelector('.sortable').tBodies[0].rows].filter((r) => "
+        "!r.hidden).map((r) => r.cells[{}].textContent)"
+    )
     first = shown.run(values.format(0))
     for expected in ("ascending", "descending"):
         shown.click(".sortable thead th:nth-child(4) button")
-        assert shown.run("document.querySelector('.sortable th:nth-child(4)').getAttribute('aria-sort')") == expected
+        assert (
+            shown.run(
+                "document.querySelector('.sortable th:nth-child(4)').getAttribute('aria-sort')"
+            )
+            == expected
+        )
         column = [float(x) for x in shown.run(values.format(3)) if x]
         assert column == sorted(column, reverse=expected == "descending")
     shown.click(".sortable thead th:nth-child(4) button")
     assert shown.run(values.format(0)) == first
     shown.click("[aria-pressed=false]")
-    essential = shown.run("[...document.querySelectorAll('.sortable tbody tr')].filter((r) => r.dataset.kind === 'essential').length")
+    essential = shown.run(
+        "[...document.querySelectorAll('.sortable tbody tr')].filter((r) => r.dataset.kind === "
+        "'essential').length"
+    )
     assert 0 < len(shown.run(values.format(0))) == essential
 
 
@@ -195,22 +313,30 @@ def test_formula_opens_by_key(shown):
 def test_targets_of_a_finger(browser, page):
     """At least 24 by 24 (WCAG 2.2 AA); buttons 44."""
     browser.open(page, 390)
-    size = "[...document.querySelectorAll('{}')].map((n) => n.getBoundingClientRect()).map((b) => Math.min(b.width, b.height))"
+    size = (
+        "[...document.querySelectorAll('{}')].map((n) => n.getBoundingClientRect()).map((b) => "
+        "Math.min(b.width, b.height))"
+    )
     assert min(browser.run(size.format("button"))) >= 44
     assert min(browser.run(size.format("nav a, summary"))) >= 24
 
 
 PRINTED = """(() => {
   const seen = (n) => n.getClientRects().length > 0, all = (s) => [...document.querySelectorAll(s)];
-  const cut = all('table, img, pre, p').filter((n) => seen(n) && n.getBoundingClientRect().right > n.closest('section, body').getBoundingClientRect().right + 1);
-  return { controls: all('.tools, .plot, .hint, nav, summary').filter(seen).length, images: all('figure img').every(seen), cut: cut.map((n) => n.textContent.slice(0, 40)),
-    folded: all('.formula').filter((n) => !n.getBoundingClientRect().height).length, listing: seen(all('pre')[0]),
+  const right = (n) => n.getBoundingClientRect().right;
+  const cut = all('table, img, pre, p').filter(
+    (n) => seen(n) && right(n) > right(n.closest('section, body')) + 1);
+  return { controls: all('.tools, .plot, .hint, nav, summary').filter(seen).length,
+    images: all('figure img').every(seen), cut: cut.map((n) => n.textContent.slice(0, 40)),
+    folded: all('.formula').filter((n) => !n.getBoundingClientRect().height).length,
+    listing: seen(all('pre')[0]),
     heads: [...new Set(all('thead button').map((n) => getComputedStyle(n).display))] };
 })()"""
 
 
 def test_print_is_whole(browser, page):
-    """As laid out on A4, 186 mm wide, and on the broad pages, 273 mm: nothing cut, no controls, figures as images, everything unfolded.
+    """As laid out on A4, 186 mm wide, and on the broad pages, 273 mm: nothing cut, no controls,
+    figures as images, everything unfolded.
 
     A button in a header would keep Chromium from repeating it on the next page.
     """
@@ -222,7 +348,10 @@ def test_print_is_whole(browser, page):
         broad = (
             []
             if width > 1000
-            else browser.run("[...document.querySelectorAll('section.broad table')].map((n) => n.textContent.slice(0, 40))")
+            else browser.run(
+                "[...document.querySelectorAll('section.broad table')].map((n) => "
+                "n.textContent.slice(0, 40))"
+            )
         )
         assert found == {
             "controls": 0,
@@ -232,8 +361,12 @@ def test_print_is_whole(browser, page):
             "listing": True,
             "heads": ["contents"],
         }
-    pdf = base64.b64decode(browser.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"])
-    assert pdf.startswith(b"%PDF") and browser.run("[...document.querySelectorAll('details')].every((n) => n.open)")
+    pdf = base64.b64decode(
+        browser.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"]
+    )
+    assert pdf.startswith(b"%PDF") and browser.run(
+        "[...document.querySelectorAll('details')].every((n) => n.open)"
+    )
 
 
 def test_without_scripts_figures_are_images(browser, page):
@@ -241,14 +374,22 @@ def test_without_scripts_figures_are_images(browser, page):
     try:
         browser.open(page)
         assert browser.run("document.querySelectorAll('.plot, .tools').length") == 0
-        assert browser.run("[...document.images].every((n) => n.getBoundingClientRect().height > 50)")
+        assert browser.run(
+            "[...document.images].every((n) => n.getBoundingClientRect().height > 50)"
+        )
     finally:
         browser.call("Emulation.setScriptExecutionDisabled", value=False)
 
 
 def test_policy_stops_other_scripts_and_requests(shown):
     """What an escape would bring in does not run and asks nobody."""
-    shown.run("document.body.append(Object.assign(document.createElement('script'), { textContent: 'window.broken = 1' }))")
-    shown.run("document.body.append(Object.assign(document.createElement('img'), { src: 'file:///nowhere.png' }))")
+    shown.run(
+        "document.body.append(Object.assign(document.createElement('script'), { textContent: "
+        "'window.broken = 1' }))"
+    )
+    shown.run(
+        "document.body.append(Object.assign(document.createElement('img'), { src: "
+        "'file:///nowhere.png' }))"
+    )
     assert shown.run("window.broken === undefined")
     assert sum("Content Security Policy" in text for text in shown.complaints) >= 2

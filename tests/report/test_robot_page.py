@@ -1,4 +1,6 @@
-"""The page of a robot: well-formed, self-contained, complete, and nothing in a robot file can bring in markup."""
+"""The page of a robot: well-formed, self-contained, complete, and nothing in a robot file can bring
+in markup.
+"""
 
 import json
 import re
@@ -20,15 +22,18 @@ from symgen.description.expression import Call, Expression
 from symgen.description.grammar import parse
 from symgen.emit.spec import module_spec
 from symgen.errors import SymgenError
-from symgen.regroup import mathml
 from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import regroup
 from symgen.report.effects import effects
 from symgen.report.page import embedded, robot_page
+from symgen.symbols import mathml, trees
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = ("tx40", "haptic", "scara", "four_bar")
-HOSTILE = "</script></title><script>alert('x')</script><img src=x onerror=alert(1)> {{ 7*7 }} & ' <!-- ]]> </style><b>"
+HOSTILE = (
+    "</script></title><script>alert('x')</script><img src=x onerror=alert(1)> {{ 7*7 }} & ' "
+    "<!-- ]]> </style><b>"
+)
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +54,29 @@ def data(html):
 def test_page_is_well_formed_and_asks_nobody(pages, name):
     html = pages[name][1]
     page = Strict(html)
-    assert page.tags.count("script") == 2 and page.tags.count("style") == 1 and page.tags.count("h1") == 1
+    assert (
+        page.tags.count("script") == 2
+        and page.tags.count("style") == 1
+        and page.tags.count("h1") == 1
+    )
     assert not {"img", "link", "iframe", "object", "embed", "form", "base"} & set(page.tags)
-    addresses = [value for _, attribute, value in page.attributes if attribute in ("src", "href", "action", "data", "srcset")]
+    addresses = [
+        value
+        for _, attribute, value in page.attributes
+        if attribute in ("src", "href", "action", "data", "srcset")
+    ]
     assert addresses and all(a.startswith("#") for a in addresses)
-    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg\")|url\(|@import|fetch\(|XMLHttp|import\(", html)
+    assert not re.search(
+        r"https?://(?!www\.w3\.org/2000/svg\")|url\(|@import|fetch\(|XMLHttp|import\(", html
+    )
     assert not [a for _, a, _ in page.attributes if a.startswith("on") or a == "style"]
     ids = [value for _, attribute, value in page.attributes if attribute == "id"]
     assert len(ids) == len(set(ids)) and {a[1:] for a in addresses} <= set(ids)
-    assert {value for tag, attribute, value in page.attributes if attribute in ("for", "aria-labelledby", "aria-describedby")} <= set(ids)
+    assert {
+        value
+        for tag, attribute, value in page.attributes
+        if attribute in ("for", "aria-labelledby", "aria-describedby")
+    } <= set(ids)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -68,7 +87,12 @@ def test_formulas_are_complete(pages, name):
     items = re.findall(r'<li data-p="(\w+)">(.*?)</li>', html, re.DOTALL)
     assert [n for n, _ in items] == list(regrouping.names)
     for (_, item), b in zip(items, regrouping.base, strict=True):
-        pointed = [node.get("data-p") for m in maths(item.partition("<span")[2]) for node in m.iter() if node.get("data-p")]
+        pointed = [
+            node.get("data-p")
+            for m in maths(item.partition("<span")[2])
+            for node in m.iter()
+            if node.get("data-p")
+        ]
         assert set(pointed) == (set(b.combination) if b.name != b.own else set())
         assert item.count("aria-hidden") == item.count('class="off"')
 
@@ -76,7 +100,10 @@ def test_formulas_are_complete(pages, name):
 def test_formula_reads_as_the_text():
     """ZZ1R of the TX40, eq. (27), with the invisible operators and spaces taken away."""
     b = regroup(load_robot("tx40")).base[0]
-    text = "".join("".join(ElementTree.fromstring(m).itertext()) for m in mathml.formula(b.formula))
+    text = "".join(
+        "".join(ElementTree.fromstring(m).itertext())
+        for m in mathml.terms(trees.formula(b.formula))
+    )
     assert text.replace("\u2062", "") == "ZZ1+Ia1+YY2+YY3+D32(M3+M4+M5+M6)"
 
 
@@ -87,15 +114,29 @@ def test_formula_reads_as_the_text():
     ("sqrt(L1)", "<msqrt><msub><mi>L</mi><mn>1</mn></msub></msqrt>"),
 ])  # fmt: skip
 def test_expressions(text, expected):
-    assert mathml.expression(parse(text)) == expected
+    assert mathml.math(trees.expression(parse(text))) == f"<math>{expected}</math>"
 
 
 def test_names_cannot_bring_in_markup():
     """Names are identifiers already; were they not, they would still be escaped."""
-    bad = Expression({((HOSTILE, 1), (Call("sin", Expression.symbol(HOSTILE)), 2)): parse("3").constant})
-    for made in (mathml.expression(bad), *mathml.formula(Formula({HOSTILE: parse("1"), HOSTILE + "2": bad}))):
+    bad = Expression(
+        {((HOSTILE, 1), (Call("sin", Expression.symbol(HOSTILE)), 2)): parse("3").constant}
+    )
+    for made in (
+        mathml.math(trees.expression(bad)),
+        *mathml.terms(trees.formula(Formula({HOSTILE: parse("1"), HOSTILE + "2": bad}))),
+    ):
         root = ElementTree.fromstring(made)
-        assert {node.tag for node in root.iter()} <= {"math", "mrow", "msub", "msup", "mi", "mn", "mo", "mspace"}
+        assert {node.tag for node in root.iter()} <= {
+            "math",
+            "mrow",
+            "msub",
+            "msup",
+            "mi",
+            "mn",
+            "mo",
+            "mspace",
+        }
 
 
 def test_hostile_texts_stay_text():
@@ -104,8 +145,12 @@ def test_hostile_texts_stay_text():
     page, harmless = Strict(html), Strict(plain)
     assert page.text["title"] == page.text["h1"] == HOSTILE
     assert "{{ 7*7 }}" in html and "49" not in page.text["h1"]
-    assert [t for t in page.tags if t not in ("p",)] == [t for t in harmless.tags if t not in ("p",)]
-    assert re.findall(r'content="(default-src[^"]*)"', html) == re.findall(r'content="(default-src[^"]*)"', plain)
+    assert [t for t in page.tags if t not in ("p",)] == [
+        t for t in harmless.tags if t not in ("p",)
+    ]
+    assert re.findall(r'content="(default-src[^"]*)"', html) == re.findall(
+        r'content="(default-src[^"]*)"', plain
+    )
 
 
 def test_embedded_values_do_not_end_the_script():
@@ -117,7 +162,9 @@ def test_embedded_values_do_not_end_the_script():
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_parameters_say_where_they_act(pages, name):
-    """The rows a base parameter enters are those where the emitted regressor is not zero; what has no effect has a reason."""
+    """The rows a base parameter enters are those where the emitted regressor is not zero; what has
+    no effect has a reason.
+    """
     regrouping, html = pages[name]
     robot, parameters = regrouping.robot, data(html)["parameters"]
     assert set(parameters) == {*regrouping.names, *robot.parameters}
@@ -127,7 +174,9 @@ def test_parameters_say_where_they_act(pages, name):
     q, qd, qdd = (rng.uniform(-0.3, 0.3, (20, len(middle))) for _ in range(3))
     D = model.regressor(middle + q, qd, qdd)
     for k, b in enumerate(regrouping.names):
-        assert parameters[b]["joints"] == [j for row, j in enumerate(robot.joints) if np.abs(D[:, row, k]).max() > 1e-9], b
+        assert parameters[b]["joints"] == [
+            j for row, j in enumerate(robot.joints) if np.abs(D[:, row, k]).max() > 1e-9
+        ], b
     for standard in robot.parameters:
         assert bool(parameters[standard]["why"]) == (standard in regrouping.no_effect), standard
         if standard in inertial_names(robot):
@@ -137,7 +186,10 @@ def test_parameters_say_where_they_act(pages, name):
 def test_reasons():
     """Axis 1 of the TX40 is vertical, axis 2 horizontal through the same point."""
     parameters = {e.name: e for e in effects(module_spec(regroup(load_robot("tx40"))))}
-    assert parameters["XX1"].why == "link 1 never turns about x1, and the energy has its rate as a factor"
+    assert (
+        parameters["XX1"].why
+        == "link 1 never turns about x1, and the energy has its rate as a factor"
+    )
     assert parameters["M2"].why.startswith("the origin of frame 2 does not move")
     assert "z2 keeps its angle to gravity" in parameters["MZ2"].why
     assert parameters["MX2"].why == "" and parameters["MX2"].base == ("MX2R",)
@@ -150,7 +202,7 @@ def test_same_robot_same_bytes(pages):
 def test_length_without_a_value_is_told():
     robot = replace(planar_2r(), constants={"L1": 1e300, "g": 9.81})
     frame = replace(robot.frames[1], d=parse("L1*L1*L1"))
-    with pytest.raises(SymgenError, match="d of frame 2"):
+    with pytest.raises(SymgenError, match=r"frames\.2\.d"):
         robot_page(regroup(replace(robot, frames=(robot.frames[0], frame))))
 
 
@@ -158,12 +210,24 @@ def test_command_writes_one_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["show", "planar_2r", "--html"])
     assert (result.exit_code, result.stdout) == (0, "planar_2r.html\n")
-    result = CliRunner().invoke(app, ["show", "planar_2r", "--html", "-o", str(tmp_path / "pages" / "arm.html")])
-    assert (tmp_path / "pages" / "arm.html").read_bytes() == (tmp_path / "planar_2r.html").read_bytes()
+    result = CliRunner().invoke(
+        app, ["show", "planar_2r", "--html", "-o", str(tmp_path / "pages" / "arm.html")]
+    )
+    assert (tmp_path / "pages" / "arm.html").read_bytes() == (
+        tmp_path / "planar_2r.html"
+    ).read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["pages", "planar_2r.html"]
 
 
-@pytest.mark.parametrize("arguments", [("--html", "--json"), ("--html", "--only", "XX2R"), ("-o", "x.html"), ("--html", "--recursive")])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--html", "--json"),
+        ("--html", "--only", "XX2R"),
+        ("-o", "x.html"),
+        ("--html", "--recursive"),
+    ],
+)
 def test_options_that_do_not_go_together(arguments):
     result = CliRunner().invoke(app, ["show", "planar_2r", *arguments])
     assert result.exit_code == 2 and "--html" in result.stderr and result.stdout == ""

@@ -1,4 +1,5 @@
-"""Closed forms against Lagrange's equations worked out in SymPy from the frame table alone, and identities of mechanics: all by difference zero.
+"""Closed forms against Lagrange's equations worked out in SymPy from the frame table alone, and
+identities of mechanics: all by difference zero.
 
 T_0j = prod Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r),   E = sum 1/2 tr(Td Sigma Td'),   U = -g' T Sigma e4
 """
@@ -32,15 +33,27 @@ elements:
 """
 ROBOTS = {
     "rpr": symgen.parse_robot(RPR, "rpr.yaml"),
-    **{name: symgen.load_robot(name) for name in ("planar_2r", "emps", "emps_asymmetric", "haptic")},
+    **{
+        name: symgen.load_robot(name) for name in ("planar_2r", "emps", "emps_asymmetric", "haptic")
+    },
 }
-LOOPS = {name: symgen.load_robot(name) for name in ("four_bar", "five_bar")}  # passive joints are symbols
-SLOW = [name if name in ("planar_2r", "emps", "emps_asymmetric") else pytest.param(name, marks=campaign) for name in ROBOTS]
+LOOPS = {
+    name: symgen.load_robot(name) for name in ("four_bar", "five_bar")
+}  # passive joints are symbols
+SLOW = [
+    name if name in ("planar_2r", "emps", "emps_asymmetric") else pytest.param(name, marks=campaign)
+    for name in ROBOTS
+]
 
 IDENTITIES = [("planar_2r", "base"), ("emps_asymmetric", "standard")]
 IDENTITIES += [
     pytest.param(name, kind, marks=campaign)
-    for name, kind in (("planar_2r", "standard"), ("rpr", "base"), ("rpr", "standard"), ("haptic", "base"))
+    for name, kind in (
+        ("planar_2r", "standard"),
+        ("rpr", "base"),
+        ("rpr", "standard"),
+        ("haptic", "base"),
+    )
 ]
 
 
@@ -56,26 +69,55 @@ def number(e):
 
 def screw(axis: int, angle, shift) -> Matrix:
     T, u, v = sympy.eye(4), (axis + 1) % 3, (axis + 2) % 3
-    T[u, u], T[u, v], T[v, u], T[v, v], T[axis, 3] = cos(angle), -sin(angle), sin(angle), cos(angle), shift
+    T[u, u], T[u, v], T[v, u], T[v, v], T[axis, 3] = (
+        cos(angle),
+        -sin(angle),
+        sin(angle),
+        cos(angle),
+        shift,
+    )
     return T
 
 
 def lagrange(robot) -> tuple[Matrix, object, object]:
-    """(Gamma in the actuated joints without friction, E, U): standard parameters; loops by their linear relations, or rates Gui of tied joints."""
+    """(Gamma in the actuated joints without friction, E, U): standard parameters; loops by their
+    linear relations, or rates Gui of tied joints.
+    """
     relations = close(robot)
     q = {i: real(f"q{i}") for i in relations.independent}
-    at = {j: sum((number(g) * q[i] for i, g in relations.row[j].items()), number(relations.offset[j])) for j in robot.moving}
+    at = {
+        j: sum((number(g) * q[i] for i, g in relations.row[j].items()), number(relations.offset[j]))
+        for j in robot.moving
+    }
     qd, qdd = ({i: real(f"{s}{i}") for i in q} for s in ("QP", "QDP"))
     T, E, U = {0: sympy.eye(4)}, 0, 0
     for f in robot.frames:
         theta, r = (number(x) for x in (f.theta0, f.r0))
-        theta, r = (theta + at[f.j], r) if f.sigma == 0 else (theta, r + at[f.j]) if f.sigma == 1 else (theta, r)
-        T[f.j] = T[f.ant] * screw(2, number(f.gamma), number(f.b)) * screw(0, number(f.alpha), number(f.d)) * screw(2, theta, r)
+        theta, r = (
+            (theta + at[f.j], r)
+            if f.sigma == 0
+            else (theta, r + at[f.j])
+            if f.sigma == 1
+            else (theta, r)
+        )
+        T[f.j] = (
+            T[f.ant]
+            * screw(2, number(f.gamma), number(f.b))
+            * screw(0, number(f.alpha), number(f.d))
+            * screw(2, theta, r)
+        )
     gravity = Matrix([*(number(e) for e in robot.gravity), 0])
     for j in robot.links:
-        XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (real(f"{p}{j}") for p in ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"])
+        XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (
+            real(f"{p}{j}") for p in ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"]
+        )
         S = Matrix(
-            [[(YY + ZZ - XX) / 2, -XY, -XZ, MX], [-XY, (XX + ZZ - YY) / 2, -YZ, MY], [-XZ, -YZ, (XX + YY - ZZ) / 2, MZ], [MX, MY, MZ, M]]
+            [
+                [(YY + ZZ - XX) / 2, -XY, -XZ, MX],
+                [-XY, (XX + ZZ - YY) / 2, -YZ, MY],
+                [-XZ, -YZ, (XX + YY - ZZ) / 2, MZ],
+                [MX, MY, MZ, M],
+            ]
         )
         Td = sum((T[j].diff(x) * qd[i] for i, x in q.items()), sympy.zeros(4, 4))
         E += (Td * S * Td.T).trace() / 2
@@ -90,8 +132,19 @@ def lagrange(robot) -> tuple[Matrix, object, object]:
     rows = {}
     for i, x in q.items():
         p = E.diff(qd[i])
-        rows[i] = sum(p.diff(q[k]) * qd[k] + p.diff(qd[k]) * qdd[k] for k in q) - E.diff(x) + U.diff(x)
-    return Matrix([rows[i] + sum(real(f"G{u}{i}") * rows[u] for u in relations.tied) for i in robot.joints]), E, U
+        rows[i] = (
+            sum(p.diff(q[k]) * qd[k] + p.diff(qd[k]) * qdd[k] for k in q) - E.diff(x) + U.diff(x)
+        )
+    return (
+        Matrix(
+            [
+                rows[i] + sum(real(f"G{u}{i}") * rows[u] for u in relations.tied)
+                for i in robot.joints
+            ]
+        ),
+        E,
+        U,
+    )
 
 
 @pytest.mark.parametrize("name", [*SLOW, *(pytest.param(name, marks=campaign) for name in LOOPS)])
@@ -106,7 +159,9 @@ def test_lagrange(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "kind"), IDENTITIES)
 def test_identities(name: str, kind: str) -> None:
-    """A is symmetric and d2E/dqd2; Ad - 2C is skew symmetric; dU/dq = Q; Gamma = A qdd + C qd + Q + friction = D chi; H = Gamma at qdd = 0."""
+    """A is symmetric and d2E/dqd2; Ad - 2C is skew symmetric; dU/dq = Q; Gamma = A qdd + C qd + Q +
+    friction = D chi; H = Gamma at qdd = 0.
+    """
     models = symbolic(ROBOTS[name], parameters=kind, passive="functions")
     q, qd, qdd = (Matrix(x) for x in (models.q, models.qd, models.qdd))
     A, C, Q, F = models.inertia_matrix(), models.coriolis(), models.gravity(), models.friction()
@@ -125,7 +180,9 @@ def test_identities(name: str, kind: str) -> None:
 def test_base_parameters_give_the_torques_of_standard_ones(name: str) -> None:
     base, standard = (symbolic(ROBOTS[name], parameters=kind) for kind in ("base", "standard"))
     made_of = base.base_parameters()
-    assert are_zero(base.inverse_dynamics().subs(made_of, simultaneous=True) - standard.inverse_dynamics())
+    assert are_zero(
+        base.inverse_dynamics().subs(made_of, simultaneous=True) - standard.inverse_dynamics()
+    )
     assert base.inverse_dynamics().free_symbols & {x for x, e in made_of.items() if x != e}
 
 
@@ -133,7 +190,9 @@ def test_base_parameters_give_the_torques_of_standard_ones(name: str) -> None:
 def test_direct_model_solves_the_inverse_one(name: str) -> None:
     models = symbolic(ROBOTS[name])
     torque = Matrix([models.symbols[f"GAM{j}"] for j in ROBOTS[name].joints])
-    inverse = models.inverse_dynamics().subs(dict(zip(models.qdd, models.forward_dynamics(), strict=True)), simultaneous=True)
+    inverse = models.inverse_dynamics().subs(
+        dict(zip(models.qdd, models.forward_dynamics(), strict=True)), simultaneous=True
+    )
     below = models.inertia_matrix().det()
     for e in inverse - torque:
         assert is_zero(sympy.numer(sympy.together(e))) and not is_zero(below)
@@ -141,7 +200,9 @@ def test_direct_model_solves_the_inverse_one(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["planar_2r", pytest.param("rpr", marks=campaign)])
 def test_kinematics(name: str) -> None:
-    """J of the origin is its derivative, V = J qd, Jd qd its derivative in space, VP = J qdd + Jd qd, in frame 0; in other frames turned."""
+    """J of the origin is its derivative, V = J qd, Jd qd its derivative in space, VP = J qdd + Jd
+    qd, in frame 0; in other frames turned.
+    """
     robot = ROBOTS[name]
     models = symbolic(robot)
     q, qd, qdd = (Matrix(x) for x in (models.q, models.qd, models.qdd))
@@ -150,13 +211,17 @@ def test_kinematics(name: str) -> None:
     assert are_zero(T[:3, 3].jacobian(q) - J[:3, :])
     rate = sum((T[:3, :3].diff(x) * v for x, v in zip(q, qd, strict=True)), sympy.zeros(3))
     w = J[3:, :] * qd
-    assert are_zero(rate - Matrix([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]) * T[:3, :3])
+    assert are_zero(
+        rate - Matrix([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]) * T[:3, :3]
+    )
     Jd = sum((J.diff(x) * v for x, v in zip(q, qd, strict=True)), sympy.zeros(6, len(q)))
     assert are_zero(models.velocity() - J * qd) and are_zero(models.jacobian_rate() - Jd * qd)
     assert are_zero(models.acceleration() - J * qdd - Jd * qd)
     for i in range(last + 1):
         A = models.pose(of=i)[:3, :3]
         turned = sympy.diag(A, A)
-        assert are_zero(turned * models.jacobian(frame=i) - J) and are_zero(turned * models.velocity(frame=i) - J * qd)
+        assert are_zero(turned * models.jacobian(frame=i) - J) and are_zero(
+            turned * models.velocity(frame=i) - J * qd
+        )
         for j in range(last + 1):
             assert are_zero(models.pose(of=i) * models.pose(of=j, frame=i) - models.pose(of=j))

@@ -1,4 +1,6 @@
-"""Values into URDF and MJCF texts written here, each for what the format has beside a plain chain; what is refused, and that nothing is half-written."""
+"""Values into URDF and MJCF texts written here, each for what the format has beside a plain chain;
+what is refused, and that nothing is half-written.
+"""
 
 from __future__ import annotations
 
@@ -28,23 +30,32 @@ URDF = """\
   <link name="upper &amp; arm">
     <inertial>\t<!-- <mass value="7"/> -->
       <mass value = '2.50'/>
-      <origin rpy="0.1 -0.2 0.3"   xyz="0.10  0 \t-2e-2"/><inertia ixx="0.03" ixy="0" ixz="1e-3" iyy="0.05" iyz="0" izz="0.04"/>
+      <origin rpy="0.1 -0.2 0.3"   xyz="0.10  0 \t-2e-2"/>
+        <inertia ixx="0.03" ixy="0" ixz="1e-3" iyy="0.05" iyz="0" izz="0.04"/>
     </inertial>
     <visual><geometry><mesh filename="package://arm/upper 1.5.stl"/></geometry></visual>
   </link>
-  <link name="fore"><inertial><mass value="1.5"/><inertia izz=".02" ixx="0.01" iyy="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="fore"><inertial><mass value="1.5"/>
+    <inertia izz=".02" ixx="0.01" iyy="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="sensor"><inertial><origin xyz="0.3 0 0"/><mass value="0.1"/></inertial></link>
-  <link name="tool"><inertial><origin xyz="0 0 .05"/><mass value="+0.4"/><inertia ixx="1e-3" ixy="0" ixz="0" iyy="1.E-3" iyz="0" izz="0.0005"/></inertial></link>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper &amp; arm"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="3" effort="90"/><dynamics friction="0.5" damping="1.25"/></joint>
+  <link name="tool"><inertial><origin xyz="0 0 .05"/><mass value="+0.4"/>
+    <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1.E-3" iyz="0" izz="0.0005"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper &amp; arm"/>
+    <axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" velocity="3" effort="90"/><dynamics friction="0.5" damping="1.25"/>
+      </joint>
   <joint name="elbow" type="revolute">
-    <parent link="upper &amp; arm"/><child link="fore"/><origin xyz="0.4 0 0.05" rpy="0.3 0 0"/><axis xyz="0.2 1 0"/>
+    <parent link="upper &amp; arm"/><child link="fore"/><origin xyz="0.4 0 0.05" rpy="0.3 0 0"/>
+      <axis xyz="0.2 1 0"/>
     <limit lower="-2" upper="2" velocity="3" effort="30"/>
   </joint>
-  <joint name="f1" type="fixed"><parent link="fore"/><child link="sensor"/><origin xyz="0 0 0.1" rpy="1 2 3"/></joint>
-  <joint name="f2" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="0.3 0 0"/></joint>
+  <joint name="f1" type="fixed"><parent link="fore"/><child link="sensor"/>
+    <origin xyz="0 0 0.1" rpy="1 2 3"/></joint>
+  <joint name="f2" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="0.3 0 0"/>
+    </joint>
   <gazebo reference="fore"><![CDATA[ <mass value="5"/> ]]></gazebo>
-  <transmission name="t"><joint name="shoulder"><hardwareInterface>1 2</hardwareInterface></joint></transmission>
+  <transmission name="t"><joint name="shoulder"><hardwareInterface>1 2</hardwareInterface></joint>
+    </transmission>
 </robot>
 """
 TEXTS = {"arm.urdf": URDF, "bent.xml": ARM, "gripper.xml": GRIPPER, "branches.xml": BRANCHES}
@@ -56,7 +67,12 @@ def written(folder: Path, name: str, text: str | bytes | None = None) -> Path:
     return path
 
 
-@pytest.fixture(params=[pytest.param(name, marks=() if name in ("arm.urdf", "gripper.xml") else campaign) for name in TEXTS])
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=() if name in ("arm.urdf", "gripper.xml") else campaign)
+        for name in TEXTS
+    ]
+)
 def file(request, tmp_path):
     """A file, its model, and other physical values."""
     path = written(tmp_path, request.param)
@@ -67,46 +83,87 @@ def file(request, tmp_path):
 def test_own_values_leave_every_byte(file) -> None:
     path, model, _ = file
     applied = symgen.apply(exact(model, dict(model.VALUES)), path)
-    assert applied.content == path.read_bytes() and not applied.changes and str(applied).startswith(f"{path.name}: no number changes")
+    assert (
+        applied.content == path.read_bytes()
+        and not applied.changes
+        and str(applied).startswith(f"{path.name}: no number changes")
+    )
 
 
 def test_other_values_change_numbers_alone_and_torques_are_theirs(file, tmp_path) -> None:
     path, model, chi = file
     estimate = exact(model, chi)
     applied = symgen.apply(estimate, path)
-    assert skeleton(applied.content, without=True) == skeleton(path.read_bytes(), without=True) != applied.content
+    assert (
+        skeleton(applied.content, without=True)
+        == skeleton(path.read_bytes(), without=True)
+        != applied.content
+    )
     (tmp_path / "out").mkdir()
     out = applied.write(tmp_path / "out" / path.name)
     states = motion(len(model.JOINTS), 2, 0.4, 10)[1:]
     again = symgen.model(read_robot(out)[0])
     placed = again.VALUES | dict(applied.placeless)
     ours = model.inverse_dynamics(*states, estimate.X)
-    assert_allclose(again.inverse_dynamics(*states, again.base_parameters(placed)), ours, rtol=1e-9, atol=1e-9)
-    if path.suffix == ".urdf":  # pinocchio reads the whole text; the other texts name meshes or tie joints
-        assert_allclose(torques_of(out, model, states, dict(applied.placeless), {}), ours, rtol=1e-9, atol=1e-9)
+    assert_allclose(
+        again.inverse_dynamics(*states, again.base_parameters(placed)), ours, rtol=1e-9, atol=1e-9
+    )
+    if (
+        path.suffix == ".urdf"
+    ):  # pinocchio reads the whole text; the other texts name meshes or tie joints
+        assert_allclose(
+            torques_of(out, model, states, dict(applied.placeless), {}), ours, rtol=1e-9, atol=1e-9
+        )
 
 
 def test_what_is_added_is_told(tmp_path) -> None:
     path = written(tmp_path, "arm.urdf")
     model = symgen.model(read_robot(path)[0])
-    applied = symgen.apply(exact(model, other_values(model, 4, offset=0.3) | {"FV2": 0.7, "Ia2": 0.2}), path)
-    assert any("<dynamics> in <joint>" in line for line in applied.added) and 'damping="0.7"' in applied.content.decode()
-    assert {"Ia2", "OFFSET1", "OFFSET2"} == applied.placeless.keys() and "Ia2 = 0.2 ± 0.001 (elbow)" in str(applied)
+    applied = symgen.apply(
+        exact(model, other_values(model, 4, offset=0.3) | {"FV2": 0.7, "Ia2": 0.2}), path
+    )
+    assert (
+        any("<dynamics> in <joint>" in line for line in applied.added)
+        and 'damping="0.7"' in applied.content.decode()
+    )
+    assert {
+        "Ia2",
+        "OFFSET1",
+        "OFFSET2",
+    } == applied.placeless.keys() and "Ia2 = 0.2 ± 0.001 (elbow)" in str(applied)
     row = next(c for c in applied.changes if c.place == "joint 'elbow'" and c.number == "damping")
-    assert (row.before, row.told_by) == (0.0, "record") and row.after == pytest.approx(0.7, abs=1e-12) and row.sigma == pytest.approx(1e-3)
+    assert (
+        (row.before, row.told_by) == (0.0, "record")
+        and row.after == pytest.approx(0.7, abs=1e-12)
+        and row.sigma == pytest.approx(1e-3)
+    )
     assert "mass" in " ".join(line for line in applied.undetermined if "upper" in line)
 
 
 def test_links_on_fixed_joints_stay_where_physics_allows(tmp_path) -> None:
     path = written(tmp_path, "arm.urdf")
     model = symgen.model(read_robot(path)[0])
-    applied = symgen.apply(exact(model, {name: x * (1.2 if name.endswith("2") else 1) for name, x in model.VALUES.items()}), path)
-    assert {c.place for c in applied.changes if c.place.startswith("link")} <= {"link 'upper & arm'", "link 'fore'"} and not applied.spread
+    applied = symgen.apply(
+        exact(
+            model,
+            {name: x * (1.2 if name.endswith("2") else 1) for name, x in model.VALUES.items()},
+        ),
+        path,
+    )
+    assert {c.place for c in applied.changes if c.place.startswith("link")} <= {
+        "link 'upper & arm'",
+        "link 'fore'",
+    } and not applied.spread
     lighter = {name: x * (0.2 if name.endswith("2") else 1) for name, x in model.VALUES.items()}
     applied = symgen.apply(exact(model, lighter), path)  # less than sensor and tool alone have
     assert set(applied.spread) == {"sensor", "tool"} and "changed too" in str(applied)
     again = read_robot(applied.write(tmp_path / "light.urdf"))[0]
-    assert_allclose(model.base_parameters(dict(again.values)), model.base_parameters(lighter), rtol=1e-9, atol=1e-9)
+    assert_allclose(
+        model.base_parameters(dict(again.values)),
+        model.base_parameters(lighter),
+        rtol=1e-9,
+        atol=1e-9,
+    )
 
 
 @campaign
@@ -115,7 +172,9 @@ def test_only_joints_that_differ_get_an_attribute_of_their_own(tmp_path) -> None
     model = symgen.model(read_robot(path)[0])
     joint = next(j for j, name in model.LABELS.items() if name == "roll")
     applied = symgen.apply(exact(model, dict(model.VALUES) | {f"FV{joint}": 0.9}), path)
-    assert [(c.place, c.number) for c in applied.changes] == [("joint 'roll'", "damping")] and len(applied.added) == 1
+    assert [(c.place, c.number) for c in applied.changes] == [("joint 'roll'", "damping")] and len(
+        applied.added
+    ) == 1
     assert applied.content.replace(b' damping="0.9"', b"") == path.read_bytes()
 
 
@@ -138,8 +197,13 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path)
     with pytest.raises(DescriptionError, match="other frames"):
         symgen.apply(exact(tx40, dict(tx40.VALUES)), path, robot="tx40")
-    named = replace(exact(symgen.model(path), dict(symgen.model(path).VALUES)), provenance={"labels": {"q1": "shoulder", "q2": "wrist"}})
-    with pytest.raises(DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: say --chain"):
+    named = replace(
+        exact(symgen.model(path), dict(symgen.model(path).VALUES)),
+        provenance={"labels": {"q1": "shoulder", "q2": "wrist"}},
+    )
+    with pytest.raises(
+        DescriptionError, match=r"q2 of the estimate is wrist, of arm\.urdf elbow: say --chain"
+    ):
         symgen.apply(named, path)
     with pytest.raises(DescriptionError, match="float given as estimate"):
         symgen.apply(1.0, path)
@@ -150,7 +214,9 @@ def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
 
 
 def test_a_converted_robot_with_other_elements(tmp_path) -> None:
-    """What was converted, then edited, is named: its drives and elements stand, its links are those of the URDF."""
+    """What was converted, then edited, is named: its drives and elements stand, its links are those
+    of the URDF.
+    """
     from symgen.description.files import write_robot
 
     path = written(tmp_path, "arm.urdf")
@@ -168,10 +234,22 @@ def test_a_converted_robot_with_other_elements(tmp_path) -> None:
 BOMB = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "' + "&a;" * 50 + '">]>'
 REFUSED = {
     "entities": ("arm.urdf", URDF.replace("<robot", BOMB + "<robot", 1), "document types"),
-    "external entity": ("arm.urdf", URDF.replace("<robot", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><robot', 1), "document types"),
+    "external entity": (
+        "arm.urdf",
+        URDF.replace("<robot", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><robot', 1),
+        "document types",
+    ),
     "100 MB": ("arm.urdf", URDF + " " * 100_000_000, "more than"),
-    "include": ("bent.xml", ARM.replace("<asset>", '<include file="more.xml"/><asset>'), "<include> is not read"),
-    "nested include": ("bent.xml", ARM.replace("<light ", '<include file="../more.xml"/><light ', 1), "<include> is not read"),
+    "include": (
+        "bent.xml",
+        ARM.replace("<asset>", '<include file="more.xml"/><asset>'),
+        "<include> is not read",
+    ),
+    "nested include": (
+        "bent.xml",
+        ARM.replace("<light ", '<include file="../more.xml"/><light ', 1),
+        "<include> is not read",
+    ),
     "xacro": ("arm.urdf", URDF.replace("<gazebo", '<xacro:arm name="x"/><gazebo', 1), "xacro"),
     "both formats": ("bent.xml", URDF, "expected <mujoco>"),
 }
@@ -184,7 +262,12 @@ def test_hostile_files_are_refused(kind, tmp_path) -> None:
     model = symgen.model("planar_2r")
     with pytest.raises(DescriptionError, match=words) as caught:
         symgen.apply(exact(model, dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)), path)
-    assert caught.value.file == name and "\n" not in str(caught.value) and len(text) > 100 and MAX_BYTES < 100_000_000
+    assert (
+        caught.value.file == name
+        and "\n" not in str(caught.value)
+        and len(text) > 100
+        and MAX_BYTES < 100_000_000
+    )
 
 
 def changed(tmp_path, name, text) -> bytes:
@@ -197,17 +280,24 @@ def changed(tmp_path, name, text) -> bytes:
 @campaign
 def test_encodings(tmp_path) -> None:
     expected = URDF.replace('damping="1.25"', 'damping="2.5"')
-    assert changed(tmp_path, "arm.urdf", b"\xef\xbb\xbf" + URDF.encode()) == b"\xef\xbb\xbf" + expected.encode()
+    assert (
+        changed(tmp_path, "arm.urdf", b"\xef\xbb\xbf" + URDF.encode())
+        == b"\xef\xbb\xbf" + expected.encode()
+    )
     latin = URDF.replace('"utf-8"', '"iso-8859-1"')
-    assert changed(tmp_path, "arm.urdf", latin.encode("latin-1")) == expected.replace('"utf-8"', '"iso-8859-1"').encode("latin-1")
+    assert changed(tmp_path, "arm.urdf", latin.encode("latin-1")) == expected.replace(
+        '"utf-8"', '"iso-8859-1"'
+    ).encode("latin-1")
     with pytest.raises(DescriptionError, match="save it as UTF-8"):
         changed(tmp_path, "arm.urdf", URDF.replace('"utf-8"', '"utf-16"').encode("utf-16"))
     with pytest.raises(DescriptionError, match="write digits"):
         changed(tmp_path, "arm.urdf", URDF.replace('damping="1.25"', 'damping="&#49;.25"'))
 
 
-MJCF = """<mujoco><compiler angle="radian"{compiler}/><worldbody><frame pos="0 0 1"><body name="a">{joint}
-  <frame euler="0.1 0 0"><body name="b"><joint name="k" axis="1 0 0"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/></body></frame>
+MJCF = """<mujoco><compiler angle="radian"{compiler}/><worldbody><frame pos="0 0 1">
+  <body name="a">{joint}
+  <frame euler="0.1 0 0"><body name="b"><joint name="k" axis="1 0 0"/>
+    <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/></body></frame>
   {inertial}</body></frame></worldbody></mujoco>"""
 JOINT = '<joint name="j" axis="0 1 0" damping="1"/>'
 TURNED = {
@@ -229,14 +319,20 @@ def test_principal_axes_in_every_way_of_writing(kind, tmp_path) -> None:
     chi = other_values(model, 1)
     applied = symgen.apply(exact(model, chi), path)
     again = read_robot(applied.write(tmp_path / "new.xml"))[0]
-    assert_allclose(model.base_parameters(dict(again.values)), model.base_parameters(chi), rtol=1e-9, atol=1e-9)
+    assert_allclose(
+        model.base_parameters(dict(again.values)), model.base_parameters(chi), rtol=1e-9, atol=1e-9
+    )
     assert len(re.findall(rb"<inertial", applied.content)) == 2  # that of the geom is inserted
 
 
 @campaign
 def test_inertia_from_geoms_is_switched_or_refused(tmp_path) -> None:
     compiler = ' inertiafromgeom="true"'
-    path = written(tmp_path, "a.xml", MJCF.format(compiler=compiler, joint=JOINT, inertial='<geom type="sphere" size="0.1"/>'))
+    path = written(
+        tmp_path,
+        "a.xml",
+        MJCF.format(compiler=compiler, joint=JOINT, inertial='<geom type="sphere" size="0.1"/>'),
+    )
     model = symgen.model(read_robot(path)[0])
     applied = symgen.apply(exact(model, other_values(model, 1)), path)
     assert b'inertiafromgeom="auto"' in applied.content and "inertiafromgeom=auto" in str(applied)
@@ -248,7 +344,11 @@ def test_inertia_from_geoms_is_switched_or_refused(tmp_path) -> None:
 
 def test_settings_that_would_change_what_is_written_are_noticed(tmp_path) -> None:
     inertial = '<inertial pos="0.1 0 0" mass="1.2" diaginertia="0.03 0.03 0.03"/>'
-    path = written(tmp_path, "a.xml", MJCF.format(compiler=' boundinertia="0.025"', joint=JOINT, inertial=inertial))
+    path = written(
+        tmp_path,
+        "a.xml",
+        MJCF.format(compiler=' boundinertia="0.025"', joint=JOINT, inertial=inertial),
+    )
     model = symgen.model(read_robot(path)[0])
     light = dict(model.VALUES) | {"ZZ1": model.VALUES["ZZ1"] - 0.01}
     with pytest.raises(DescriptionError, match="other values than written"):
@@ -258,10 +358,19 @@ def test_settings_that_would_change_what_is_written_are_noticed(tmp_path) -> Non
 @campaign
 def test_springs(tmp_path) -> None:
     joint = '<joint name="j" axis="0 1 0" stiffness="3" springref="0.2"/>'
-    path = written(tmp_path, "a.xml", MJCF.format(compiler="", joint=joint, inertial='<geom type="sphere" size="0.1"/>'))
+    path = written(
+        tmp_path,
+        "a.xml",
+        MJCF.format(compiler="", joint=joint, inertial='<geom type="sphere" size="0.1"/>'),
+    )
     model = symgen.model(read_robot(path)[0])
-    applied = symgen.apply(exact(model, dict(model.VALUES) | {"K1": 4.0}), path)  # OFFSET, -3 times 0.2, stays
-    assert b'stiffness="4.0" springref="0.15000000000000002"' in applied.content and not applied.placeless
+    applied = symgen.apply(
+        exact(model, dict(model.VALUES) | {"K1": 4.0}), path
+    )  # OFFSET, -3 times 0.2, stays
+    assert (
+        b'stiffness="4.0" springref="0.15000000000000002"' in applied.content
+        and not applied.placeless
+    )
 
 
 def test_the_record_leaves_nan(tmp_path) -> None:
@@ -283,7 +392,9 @@ def test_the_record_leaves_nan(tmp_path) -> None:
 @pytest.mark.parametrize("seed", [1, 2, 4, 7])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_trees_with_any_axes(suffix, seed, tmp_path) -> None:
-    """Frames in any direction, several joints of one body, fixed and bare links: own values leave every byte, others are read back."""
+    """Frames in any direction, several joints of one body, fixed and bare links: own values leave
+    every byte, others are read back.
+    """
     text = urdf_robots.random_tree(seed) if suffix == ".urdf" else mjcf_robots.random_tree(seed)
     path = written(tmp_path, f"tree{suffix}", text)
     model = symgen.model(read_robot(path)[0])
@@ -291,6 +402,8 @@ def test_trees_with_any_axes(suffix, seed, tmp_path) -> None:
     chi = other_values(model, seed)
     applied = symgen.apply(exact(model, chi), path)
     assert skeleton(applied.content, without=True) == skeleton(path.read_bytes(), without=True)
-    again = dict(read_robot(applied.write(tmp_path / f"new{suffix}"))[0].values) | dict(applied.placeless)
+    again = dict(read_robot(applied.write(tmp_path / f"new{suffix}"))[0].values) | dict(
+        applied.placeless
+    )
     X = model.base_parameters(chi)
     assert_allclose(model.base_parameters(again), X, rtol=1e-9, atol=1e-9 * np.abs(X).max())

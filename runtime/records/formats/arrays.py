@@ -1,4 +1,5 @@
-"""Columns of a file of named arrays (.npz, .mat): vectors of N samples, and matrices (N, k) or (k, N) that stand for k columns.
+"""Columns of a file of named arrays (.npz, .mat): vectors of N samples, and matrices (N, k) or (k,
+N) that stand for k columns.
 
 Samples run along the longer side: a record has more samples than joints.
 """
@@ -77,10 +78,18 @@ class ArrayTable(Table):
     def samples(self, groups: Groups) -> int:
         lengths = {name: samples_of(self._series(name).shape) for group in groups for name in group}
         if len(set(lengths.values())) > 1:
-            raise InputError(f"columns of different lengths: {', '.join(f'{k} {v}' for k, v in lengths.items())}", file=self.file)
+            raise InputError(
+                (
+                    "columns of different lengths: "
+                    f"{', '.join(f'{k} {v}' for k, v in lengths.items())}"
+                ),
+                file=self.file,
+            )
         return next(iter(lengths.values()))
 
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
         self.samples([names])
         return zip(*(self._series(name).blocks(size, start, stop) for name in names), strict=True)
 
@@ -91,12 +100,16 @@ class ArrayTable(Table):
     def scalar(self, name: str) -> float:
         x = self._array(name)
         if prod(x.shape) != 1:
-            raise InputError(f"{x.shape} values; expected a single number", file=self.file, column=name)
+            raise InputError(
+                f"{x.shape} values; expected a single number", file=self.file, column=name
+            )
         return float(next(x.blocks(1)).reshape(()))
 
     def _array(self, name: str) -> Series:
         if name in self.others:
-            raise InputError(f"{self.others[name]}; expected an array of numbers", file=self.file, column=name)
+            raise InputError(
+                f"{self.others[name]}; expected an array of numbers", file=self.file, column=name
+            )
         check_names([name], self.names, self.file)
         return self.arrays[name]
 
@@ -104,11 +117,17 @@ class ArrayTable(Table):
         """The array of that name, if it is one of samples."""
         x = self._array(name)
         if len(x.shape) > 2:
-            raise InputError(f"shape {x.shape}; expected (N,), (N, k) or (k, N), k columns of N samples", file=self.file, column=name)
+            raise InputError(
+                f"shape {x.shape}; expected (N,), (N, k) or (k, N), k columns of N samples",
+                file=self.file,
+                column=name,
+            )
         if not prod(x.shape):
             raise InputError("no samples", file=self.file, column=name)
         if prod(x.shape) // samples_of(x.shape) > WIDEST:
-            raise InputError(f"shape {x.shape}; at most {WIDEST} columns are read", file=self.file, column=name)
+            raise InputError(
+                f"shape {x.shape}; at most {WIDEST} columns are read", file=self.file, column=name
+            )
         return x
 
 

@@ -41,7 +41,9 @@ def serve() -> None:
             Path(os.environ["TMPDIR"]).rmdir()
 
 
-def answer_requests(source: Source, format_: Format, answers: BinaryIO, memory: int, seconds: int) -> None:
+def answer_requests(
+    source: Source, format_: Format, answers: BinaryIO, memory: int, seconds: int
+) -> None:
     """Until the pipe of requests is closed."""
     table: Table | None = None
     for request in sys.stdin.buffer:
@@ -66,7 +68,9 @@ def load(format_: Format) -> None:
 
 
 def results(table: Table, call: str, *arguments: Any) -> Iterator[Any]:
-    """What a method of the table gives: its value, or its blocks, which are tuples of arrays, and then None."""
+    """What a method of the table gives: its value, or its blocks, which are tuples of arrays, and
+    then None.
+    """
     if call == "describe":
         yield {"value": [table.names, table.joints, table.topic]}
     elif call == "blocks":
@@ -79,7 +83,9 @@ def results(table: Table, call: str, *arguments: Any) -> Iterator[Any]:
 def send(answers: BinaryIO, answer: Any) -> None:
     """One line of JSON, and the arrays of a block."""
     files = [npy(x) for x in answer] if isinstance(answer, tuple) else []
-    answers.write(json.dumps({"arrays": [len(data) for data in files]} if files else answer).encode() + b"\n")
+    answers.write(
+        json.dumps({"arrays": [len(data) for data in files]} if files else answer).encode() + b"\n"
+    )
     for data in files:
         answers.write(data)
     answers.flush()
@@ -101,13 +107,16 @@ def described(e: BaseException, format_: Format, memory: int) -> dict[str, str |
         return {"message": needed(format_)}
     if isinstance(e, MemoryError):
         return {
-            "message": f"needs more than {memory // 2**20} MiB of memory to be read; store it without compression, or cut it, if it is {format_.title}"
+            "message": (
+                f"needs more than {memory // 2**20} MiB of memory to be read; store it "
+                f"without compression, or cut it, if it is {format_.title}"
+            )
         }
     return {"message": f"damaged, or not {format_.title} ({first_line(e)[:200]}); write it again"}
 
 
 def limit_memory(memory: int, largest_file: int) -> None:
-    """From now on at most `memory` bytes more (Linux), no file larger than `largest_file`, no core."""
+    """At most `memory` bytes more (Linux), no file larger than `largest_file`, no core."""
     with suppress(ImportError):
         import resource
 

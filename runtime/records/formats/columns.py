@@ -1,4 +1,6 @@
-"""What every reader of a measured file offers: named columns of numbers, by blocks, as often as asked."""
+"""What every reader of a measured file offers: named columns of numbers, by blocks, as often as
+asked.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,11 @@ class Source:
     @property
     def size(self) -> int:
         """Bytes on disk, of a folder those of its files."""
-        return sum(p.stat().st_size for p in (self.path.iterdir() if self.path.is_dir() else [self.path]) if p.is_file())
+        return sum(
+            p.stat().st_size
+            for p in (self.path.iterdir() if self.path.is_dir() else [self.path])
+            if p.is_file()
+        )
 
     @cached_property
     def packed(self) -> bool:
@@ -60,7 +66,9 @@ class Source:
         return read_bytes(self.path)
 
     def content(self) -> Path | BytesIO:
-        """What libraries that take a path or a file are given: the path, or the bytes where they were compressed."""
+        """What libraries that take a path or a file are given: the path, or the bytes where they
+        were compressed.
+        """
         return BytesIO(self._unpacked) if self.packed else self.path
 
     def open(self) -> BinaryIO:
@@ -120,16 +128,31 @@ class Table(ABC):
         return True
 
     @abstractmethod
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
-        """One array of `size` samples by name, shape (B,) or (B, k), as often as there are blocks in [start, stop); names are in `names`."""
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
+        """One array of `size` samples by name, shape (B,) or (B, k), as often as there are blocks
+        in [start, stop); names are in `names`.
+        """
 
-    def blocks(self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, ...]]:
-        """One array of `size` samples by group, shape (B, k): its columns side by side. Samples [start, stop); default: all."""
+    def blocks(
+        self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[Array, ...]]:
+        """One array of `size` samples by group, shape (B, k): its columns side by side. Samples
+        [start, stop); default: all.
+        """
         names = list(dict.fromkeys(name for group in groups for name in group))
         self.require(names)
         for parts in self.parts(names, size, start, stop):
-            of = {name: np.asarray(part, dtype=float) for name, part in zip(names, parts, strict=True)}
-            yield tuple(np.column_stack([of[name] for name in group]) if group else np.empty((len(parts[0]), 0)) for group in groups)
+            of = {
+                name: np.asarray(part, dtype=float) for name, part in zip(names, parts, strict=True)
+            }
+            yield tuple(
+                np.column_stack([of[name] for name in group])
+                if group
+                else np.empty((len(parts[0]), 0))
+                for group in groups
+            )
 
     def widths(self, groups: Groups) -> list[int]:
         """Columns by group."""
@@ -151,7 +174,10 @@ class Table(ABC):
 
     def scalar(self, name: str) -> float:
         """The single number called `name`."""
-        raise InputError(f"no single number {name!r} in {self.what}; write the number itself in the settings", file=self.file)
+        raise InputError(
+            f"no single number {name!r} in {self.what}; write the number itself in the settings",
+            file=self.file,
+        )
 
     def row(self, i: int) -> str:
         """How the file counts sample i, from 0: "line 12", "sample 12"."""
@@ -163,8 +189,13 @@ class Table(ABC):
 
 
 def check_names(wanted: Sequence[str], present: Sequence[str], file: str) -> Sequence[str]:
-    """`wanted` itself if every name is present; InputError naming the missing and the present ones otherwise."""
+    """`wanted` itself if every name is present; InputError naming the missing and the present ones
+    otherwise.
+    """
     missing = [name for name in wanted if name not in present]
     if missing:
-        raise InputError(f"no column {', '.join(missing)}; the file has {', '.join(present) or 'none'}", file=file)
+        raise InputError(
+            f"no column {', '.join(missing)}; the file has {', '.join(present) or 'none'}",
+            file=file,
+        )
     return wanted

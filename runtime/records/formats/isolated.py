@@ -1,10 +1,15 @@
-"""A table whose file is read by a process of its own: damage that ends a library, or makes it take all time or memory, ends that process only.
+"""A table whose file is read by a process of its own: damage that ends a library, or makes it take
+all time or memory, ends that process only.
 
-Requests go out as lines of JSON, one at a time: a method of `Table` and its arguments. Answers come back as a line of JSON, {"value": ...},
-{"error": {...}}, or {"arrays": [sizes]} ahead of so many .npy files of that many bytes, one line for every block; nothing is pickled.
+Requests go out as lines of JSON, one at a time: a method of `Table` and its arguments. Answers come
+back as a line of JSON, {"value": ...},
+{"error": {...}}, or {"arrays": [sizes]} ahead of so many .npy files of that many bytes, one line
+for every block; nothing is pickled.
 
-The limits, all of them here: MEMORY for every file and GROWTH times its size; SECONDS of processor time and one more for every
-BYTES_PER_SECOND, by request. `runtime.records.formats.child` sets them: the memory on Linux, the time and the size of files wherever POSIX is.
+The limits, all of them here: MEMORY for every file and GROWTH times its size; SECONDS of processor
+time and one more for every
+BYTES_PER_SECOND, by request. `runtime.records.formats.child` sets them: the memory on Linux, the
+time and the size of files wherever POSIX is.
 """
 
 from __future__ import annotations
@@ -33,13 +38,18 @@ GROWTH = 6  # times the size of the file
 SECONDS = 3
 BYTES_PER_SECOND = 10**6
 
-START = "import sys; sys.path[:] = sys.argv[1:]; from runtime.records.formats.child import serve; serve()"
+START = (
+    "import sys; sys.path[:] = sys.argv[1:]; from runtime.records.formats.child import serve; "
+    "serve()"
+)
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "POLARS_MAX_THREADS", "MALLOC_ARENA_MAX"), "1")
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the process may use: memory and size of files in bytes, processor time of one request in s."""
+    """What the process may use: memory and size of files in bytes, processor time of one request in
+    s.
+    """
 
     memory: int
     seconds: int
@@ -51,11 +61,15 @@ class Limits:
 
 
 class Process:
-    """The other process: started, asked and ended. It ends with this object, and with the one that started it."""
+    """The other process: started, asked and ended. It ends with this object, and with the one that
+    started it.
+    """
 
     def __init__(self, source: Source) -> None:
         limits = Limits.of(source.size)
-        folder = TemporaryDirectory(prefix="symgen-record-")  # of the other process, which may be ended before it can tidy up
+        folder = TemporaryDirectory(
+            prefix="symgen-record-"
+        )  # of the other process, which may be ended before it can tidy up
         self.popen = subprocess.Popen(
             [sys.executable, "-P", "-c", START, *sys.path],
             stdin=subprocess.PIPE,
@@ -64,7 +78,15 @@ class Process:
             env={**os.environ, **ONE_THREAD, "TMPDIR": folder.name},
         )
         self.end = weakref.finalize(self, _ended, self.popen, folder)
-        self.send([str(source.path.absolute()), source.topic, source.decimal, limits.memory, limits.seconds])
+        self.send(
+            [
+                str(source.path.absolute()),
+                source.topic,
+                source.decimal,
+                limits.memory,
+                limits.seconds,
+            ]
+        )
 
     def send(self, request: Any) -> None:
         """One line of JSON; where the process has ended, the answer that does not come tells."""
@@ -73,7 +95,9 @@ class Process:
             cast(IO[bytes], self.popen.stdin).flush()
 
     def answer(self) -> Any:
-        """A value as {"value": ...}, a tuple of arrays, an error as {"error": ...}; None where the process has ended."""
+        """A value as {"value": ...}, a tuple of arrays, an error as {"error": ...}; None where the
+        process has ended.
+        """
         pipe = cast(IO[bytes], self.popen.stdout)
         line = pipe.readline()
         answer = json.loads(line) if line.endswith(b"\n") else None
@@ -87,7 +111,8 @@ class Process:
 
 @dataclass(eq=False, kw_only=True)
 class IsolatedTable(Table):
-    """Asks a process for everything. Blocks that are left unread end theirs; a request that comes between blocks has another.
+    """Asks a process for everything. Blocks that are left unread end theirs; a request that comes
+    between blocks has another.
 
     Attributes
     ----------
@@ -105,7 +130,9 @@ class IsolatedTable(Table):
 
     @classmethod
     def of(cls, source: Source, title: str, process: Process) -> IsolatedTable:
-        """The table of a file and of a process that waits for requests; InputError where the file cannot be opened."""
+        """The table of a file and of a process that waits for requests; InputError where the file
+        cannot be opened.
+        """
         table = cls(file=source.file, size=source.size, source=source, title=title)
         table.idle = process
         names, joints, table.topic = table._value("describe")
@@ -118,10 +145,14 @@ class IsolatedTable(Table):
     def note(self, groups: Groups) -> str:
         return "" if self.joints is None else str(self._value("note", groups))
 
-    def blocks(self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None) -> Iterator[tuple[Array, ...]]:
+    def blocks(
+        self, groups: Groups, size: int = BLOCK, start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[Array, ...]]:
         return self._answers("blocks", groups, size, start, stop)
 
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
         return self.blocks([[name] for name in names], size, start, stop)
 
     def widths(self, groups: Groups) -> list[int]:
@@ -168,9 +199,19 @@ class IsolatedTable(Table):
     def _death(self, code: int) -> InputError:
         seconds = Limits.of(self.size).seconds
         if -code in (signal.SIGXCPU, signal.SIGKILL):
-            return InputError(f"takes more than {seconds} s of processor time to read; expected {self.title}", file=self.file)
+            return InputError(
+                f"takes more than {seconds} s of processor time to read; expected {self.title}",
+                file=self.file,
+            )
         end = signal.Signals(-code).name if code < 0 else f"code {code}"
-        return InputError(f"damaged, or not {self.title} (the library that reads it ends with {end}); write it again", file=self.file)
+        return InputError(
+            (
+                f"damaged, or not {self.title} (the library that reads it ends with {end}); write "
+                "it "
+                "again"
+            ),
+            file=self.file,
+        )
 
 
 def _ended(process: subprocess.Popen[bytes], folder: TemporaryDirectory[str]) -> None:

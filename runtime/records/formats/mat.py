@@ -1,7 +1,9 @@
 """MATLAB files: versions 4 to 7 by scipy, 7.3 (an HDF5 file) by h5py (pip install symgen[tables]).
 
-Numeric and logical arrays are read, also those in structures, as rec.pos. Cells, arrays of structures, texts and sparse matrices are listed with
-their class: a column of one is refused by name. Arrays of version 7.3 are stored by columns, so that h5py shows them transposed; they are turned back.
+Numeric and logical arrays are read, also those in structures, as rec.pos. Cells, arrays of
+structures, texts and sparse matrices are listed with
+their class: a column of one is refused by name. Arrays of version 7.3 are stored by columns, so
+that h5py shows them transposed; they are turned back.
 """
 
 from __future__ import annotations
@@ -15,8 +17,17 @@ import numpy as np
 from runtime.records.formats.arrays import ArrayTable, Held, is_numeric
 from runtime.records.formats.columns import Source
 
-NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))  # classes of MATLAB
-WORDS = {"c": "complex array", "U": "char array", "O": "cell array"}  # by kind of the dtype that scipy gives
+NUMERIC = (
+    "double",
+    "single",
+    "logical",
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+)  # classes of MATLAB
+WORDS = {
+    "c": "complex array",
+    "U": "char array",
+    "O": "cell array",
+}  # by kind of the dtype that scipy gives
 STRUCT = "a MATLAB struct"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 PLACES = (0, 512)  # where an HDF5 file may begin; MATLAB writes a text of 512 bytes first
@@ -38,9 +49,18 @@ def open_mat(source: Source) -> ArrayTable:
                 classes = {name: kind for name, _, kind in whosmat(file)}
         except TypeError:  # an object of MATLAB, which has no name and no shape there
             classes = {}
-        others = {name: f"a MATLAB {kind} array" for name, kind in classes.items() if kind not in (*NUMERIC, "struct")}
+        others = {
+            name: f"a MATLAB {kind} array"
+            for name, kind in classes.items()
+            if kind not in (*NUMERIC, "struct")
+        }
         with source.open() as file:
-            loaded = loadmat(file, variable_names=[name for name in classes if name not in others] if classes else None)
+            loaded = loadmat(
+                file,
+                variable_names=[name for name in classes if name not in others]
+                if classes
+                else None,
+            )
     arrays: dict[str, np.ndarray] = {}
     for name, x in loaded.items():
         if isinstance(name, str) and not name.startswith("__") and name not in others:
@@ -48,8 +68,12 @@ def open_mat(source: Source) -> ArrayTable:
     return _table(source, arrays, others)
 
 
-def _flatten(name: str, x: Any, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0) -> None:
-    """Put an array of numbers, or those in a structure, among the `arrays`; what cannot be read among the `others`."""
+def _flatten(
+    name: str, x: Any, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0
+) -> None:
+    """Put an array of numbers, or those in a structure, among the `arrays`; what cannot be read
+    among the `others`.
+    """
     dtype = getattr(x, "dtype", None)
     if isinstance(x, np.ndarray) and is_numeric(x.dtype):
         arrays[name] = x
@@ -73,7 +97,9 @@ def _open_hdf5(source: Source) -> ArrayTable:
         return _table(source, arrays, others)
 
 
-def _flatten_hdf5(group: Any, path: str, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0) -> None:
+def _flatten_hdf5(
+    group: Any, path: str, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0
+) -> None:
     for key in group:
         if key.startswith("#"):
             continue
@@ -87,12 +113,21 @@ def _flatten_hdf5(group: Any, path: str, arrays: dict[str, np.ndarray], others: 
             arrays[name] = _array(group[key])
 
 
-def _table(source: Source, arrays: Mapping[str, np.ndarray], others: Mapping[str, str]) -> ArrayTable:
-    return ArrayTable(file=source.file, size=source.size, arrays={name: Held(x) for name, x in arrays.items()}, others=others)
+def _table(
+    source: Source, arrays: Mapping[str, np.ndarray], others: Mapping[str, str]
+) -> ArrayTable:
+    return ArrayTable(
+        file=source.file,
+        size=source.size,
+        arrays={name: Held(x) for name, x in arrays.items()},
+        others=others,
+    )
 
 
 def _unreadable(archive: Any, name: str) -> str:
-    """Why a member of a file of version 7.3 is not an array of numbers; "" where it is one. Links to other files are not followed."""
+    """Why a member of a file of version 7.3 is not an array of numbers; "" where it is one. Links
+    to other files are not followed.
+    """
     import h5py
 
     if not isinstance(archive.get(name, getlink=True), h5py.HardLink):
@@ -111,5 +146,7 @@ def _unreadable(archive: Any, name: str) -> str:
 
 
 def _array(x: Any) -> np.ndarray:
-    """The numbers as MATLAB shows them; a mark says where an array is empty and its dimensions are stored in its place."""
+    """The numbers as MATLAB shows them; a mark says where an array is empty and its dimensions are
+    stored in its place.
+    """
     return np.empty(0) if "MATLAB_empty" in x.attrs else np.asarray(x[()]).T

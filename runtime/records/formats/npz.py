@@ -1,4 +1,5 @@
-"""NumPy files: archives of arrays (.npz) and single arrays (.npy), from the file one block after the other; pickled objects are refused.
+"""NumPy files: archives of arrays (.npz) and single arrays (.npy), from the file one block after
+the other; pickled objects are refused.
 
 An array in Fortran order is read through one open file per column.
 """
@@ -47,7 +48,9 @@ def refused(what: str, file: str) -> Iterator[None]:
     except InputError:
         raise
     except DAMAGED as e:
-        raise InputError(f"damaged, or not {what} ({first_line(e)}); copy it again", file=file) from e
+        raise InputError(
+            f"damaged, or not {what} ({first_line(e)}); copy it again", file=file
+        ) from e
 
 
 @dataclass(frozen=True)
@@ -77,11 +80,17 @@ class Stored:
         columns = prod(self.shape) // N
         width = columns if self.fortran else 1  # files open at once
         stop = N if stop is None else min(stop, N)
-        handles = [self._opened((c * N + start * columns // width) * self.dtype.itemsize) for c in range(width)]
+        handles = [
+            self._opened((c * N + start * columns // width) * self.dtype.itemsize)
+            for c in range(width)
+        ]
         try:
             for a in range(start, stop, size):
                 count = min(size, stop - a)
-                parts = [self._read(handle, count * columns // width).reshape(count, -1) for handle in handles]
+                parts = [
+                    self._read(handle, count * columns // width).reshape(count, -1)
+                    for handle in handles
+                ]
                 yield parts[0] if width == 1 else np.hstack(parts)
         finally:
             for handle in handles:
@@ -110,7 +119,9 @@ class ArchiveTable(ArrayTable):
     def in_any_order(self) -> bool:
         return not self.compressed
 
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
         with refused(ARCHIVE, self.file):
             yield from super().parts(names, size, start, stop)
 
@@ -129,7 +140,9 @@ class MatrixTable(Table):
         self.require([name for group in groups for name in group])
         return samples_of(self.matrix.shape)
 
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
         with refused(SINGLE, self.file):
             for x in self.matrix.blocks(size, start, stop):
                 yield [x[:, int(name) - 1] for name in names]
@@ -143,8 +156,12 @@ def open_npz(source: Source) -> ArchiveTable:
     with refused(ARCHIVE, source.file):
         with zipfile.ZipFile(source.content()) as archive:
             members = _distinct(archive, source.file)
-            compressed = any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist())
-        stored = {name: _stored(partial(_member, source, member)) for name, member in members.items()}
+            compressed = any(
+                member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()
+            )
+        stored = {
+            name: _stored(partial(_member, source, member)) for name, member in members.items()
+        }
         if objects := [name for name, x in stored.items() if x.dtype.hasobject]:
             raise TypeError(f"{objects[0]} holds pickled objects")
     arrays = {name: x for name, x in stored.items() if is_numeric(x.dtype)}
@@ -163,14 +180,21 @@ def open_npy(source: Source) -> MatrixTable:
         or prod(shape) // samples_of(shape) > WIDEST
     ):
         raise InputError(
-            f"{matrix.dtype} of shape {shape}; expected numbers of shape (N,), (N, k) or (k, N), at most {WIDEST} columns", file=source.file
+            (
+                f"{matrix.dtype} of shape {shape}; expected numbers of shape (N,), (N, k) or (k, "
+                "N), "
+                f"at most {WIDEST} columns"
+            ),
+            file=source.file,
         )
     names = tuple(str(i + 1) for i in range(prod(shape) // samples_of(shape)))
     return MatrixTable(file=source.file, size=source.size, names=names, matrix=matrix)
 
 
 def archive_of(data: bytes, file: str) -> dict[str, Array]:
-    """Arrays by name of the bytes of a .npz file; InputError for pickled objects, damage, and more than such a file holds."""
+    """Arrays by name of the bytes of a .npz file; InputError for pickled objects, damage, and more
+    than such a file holds.
+    """
     with refused(ARCHIVE, file):
         with zipfile.ZipFile(BytesIO(data)) as packed:
             require_size(sum(member.file_size for member in packed.infolist()), len(data), file)
@@ -180,7 +204,9 @@ def archive_of(data: bytes, file: str) -> dict[str, Array]:
 
 
 def _distinct(archive: zipfile.ZipFile, file: str) -> dict[str, str]:
-    """Members of an archive that are arrays, by name. x and x.npy are one array to numpy, and a name may stand twice: which one counts would be a guess."""
+    """Members of an archive that are arrays, by name. x and x.npy are one array to numpy, and a
+    name may stand twice: which one counts would be a guess.
+    """
     members = archive.namelist()
     if len(members) > WIDEST:
         raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
@@ -195,7 +221,9 @@ def _member(source: Source, name: str) -> IO[bytes]:
 
 
 def _header(handle: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Shape, order and dtype of the array that begins here; the handle stands at its first number afterwards."""
+    """Shape, order and dtype of the array that begins here; the handle stands at its first number
+    afterwards.
+    """
     version = npy.read_magic(handle)
     return (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(handle)
 
@@ -204,4 +232,6 @@ def _stored(open_bytes: Callable[[], IO[bytes]]) -> Stored:
     with open_bytes() as handle:
         shape, fortran, dtype = _header(handle)
     turned = transposed(shape)  # (k, N) by rows is (N, k) by columns
-    return Stored(open_bytes, shape[::-1] if turned else shape, fortran != turned and len(shape) > 1, dtype)
+    return Stored(
+        open_bytes, shape[::-1] if turned else shape, fortran != turned and len(shape) > 1, dtype
+    )

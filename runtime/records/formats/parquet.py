@@ -25,7 +25,11 @@ class ParquetTable(Table):
         for name in names:
             if name in self.others:
                 raise InputError(
-                    f"it holds {self.others[name]}, no numbers; write them as numbers, a time in seconds, or give record.rate without columns.t",
+                    (
+                        f"it holds {self.others[name]}, no numbers; write them as numbers, a time "
+                        "in "
+                        "seconds, or give record.rate without columns.t"
+                    ),
                     file=self.file,
                     column=name,
                 )
@@ -35,7 +39,9 @@ class ParquetTable(Table):
         self.require([name for group in groups for name in group])
         return self.rows
 
-    def parts(self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None) -> Iterator[Sequence[Array]]:
+    def parts(
+        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
+    ) -> Iterator[Sequence[Array]]:
         import polars
 
         wanted = self.lazy.select(polars.col(list(names)).cast(polars.Float64))
@@ -52,7 +58,11 @@ def open_parquet(source: Source) -> ParquetTable:
 
     lazy = polars.scan_parquet(source.content())
     kinds = lazy.collect_schema()
-    names = tuple(name for name, kind in kinds.items() if kind.is_numeric() or kind == polars.Boolean)
+    names = tuple(
+        name for name, kind in kinds.items() if kind.is_numeric() or kind == polars.Boolean
+    )
     others = {name: str(kind) for name, kind in kinds.items() if name not in names}
     rows = int(lazy.select(polars.len()).collect().item())
-    return ParquetTable(file=source.file, size=source.size, names=names, lazy=lazy, rows=rows, others=others)
+    return ParquetTable(
+        file=source.file, size=source.size, names=names, lazy=lazy, rows=rows, others=others
+    )

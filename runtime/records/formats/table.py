@@ -1,7 +1,9 @@
 """The formats of measured files, one row each, and how a file is opened.
 
-A file that a library reads, and one that has to be unpacked whole, is read in a process of its own with limits of time and memory
-(`runtime.records.formats.isolated`). Text, which is unpacked line by line, and plain NumPy files are read here.
+A file that a library reads, and one that has to be unpacked whole, is read in a process of its own
+with limits of time and memory
+(`runtime.records.formats.isolated`). Text, which is unpacked line by line, and plain NumPy files
+are read here.
 """
 
 from __future__ import annotations
@@ -61,22 +63,44 @@ FORMATS = (
     Format("a text file", (".csv", ".txt", ".dat", ".tsv"), open_text, packed="parts"),
     Format("a file of one plain array", (".npy",), open_npy),
     Format("an archive of plain arrays", (".npz",), open_npz),
-    Format("a Parquet file", (".parquet",), open_parquet, ("polars",), "pip install symgen[tables]"),
-    Format("a MATLAB file", (".mat",), open_mat, ("scipy.io",), "pip install symgen[tables]", by_blocks=False),
-    Format("a whole bag", (".bag", ".mcap", ".db3"), open_bag, ("rosbags",), "pip install symgen[bags]", False, "", digest_of),
+    Format(
+        "a Parquet file", (".parquet",), open_parquet, ("polars",), "pip install symgen[tables]"
+    ),
+    Format(
+        "a MATLAB file",
+        (".mat",),
+        open_mat,
+        ("scipy.io",),
+        "pip install symgen[tables]",
+        by_blocks=False,
+    ),
+    Format(
+        "a whole bag",
+        (".bag", ".mcap", ".db3"),
+        open_bag,
+        ("rosbags",),
+        "pip install symgen[bags]",
+        False,
+        "",
+        digest_of,
+    ),
 )
 BY_ENDING = {ending: format_ for format_ in FORMATS for ending in format_.endings}
 KINDS = tuple(BY_ENDING)
 BAG = ".db3"  # a folder is read as one
 
 
-def open_table(path: Path, topic: str | None = None, decimal: str = ".", *, by_blocks: bool = False) -> Table:
-    """Table of a measured file; its hash is computed first, so that nothing that unpacks to more than a record holds is opened.
+def open_table(
+    path: Path, topic: str | None = None, decimal: str = ".", *, by_blocks: bool = False
+) -> Table:
+    """Table of a measured file; its hash is computed first, so that nothing that unpacks to more
+    than a record holds is opened.
 
     Parameters
     ----------
     path : Path
-        A file whose name ends as one of KINDS, perhaps followed by .gz, or the folder of a ROS 2 bag.
+        A file whose name ends as one of KINDS, perhaps followed by .gz, or the folder of a ROS 2
+        bag.
     topic : str, optional
         Of a bag; default: the only one that holds sensor_msgs/JointState.
     decimal : str
@@ -86,13 +110,19 @@ def open_table(path: Path, topic: str | None = None, decimal: str = ".", *, by_b
     """
     format_ = format_of(path)
     require_readable(path, format_, by_blocks)
-    if missing := [library for library in format_.libraries if find_spec(library.partition(".")[0]) is None]:
+    if missing := [
+        library for library in format_.libraries if find_spec(library.partition(".")[0]) is None
+    ]:
         raise InputError(needed(format_), file=path.name) from ImportError(missing[0])
     source = Source(path, topic, decimal)
     isolated = format_.libraries or (source.packed and format_.packed == "whole")
-    reader = Process(source) if isolated else None  # it loads its libraries while the hash is computed
+    reader = (
+        Process(source) if isolated else None
+    )  # it loads its libraries while the hash is computed
     digest = format_.digest(path)
-    table = format_.open(source) if reader is None else IsolatedTable.of(source, format_.title, reader)
+    table = (
+        format_.open(source) if reader is None else IsolatedTable.of(source, format_.title, reader)
+    )
     table.digest = digest
     return table
 
@@ -108,17 +138,38 @@ def require_readable(path: Path, format_: Format, by_blocks: bool) -> None:
     if by_blocks and not format_.by_blocks:
         what = "bags" if format_.digest is digest_of else f"{format_.endings[0]} files"
         choices = ", ".join(ending for ending, other in BY_ENDING.items() if other.by_blocks)
-        raise InputError(f"{what} are read whole; convert to {choices} to read by blocks, or set stream: off", file=str(path))
+        raise InputError(
+            f"{what} are read whole; convert to {choices} to read by blocks, or set stream: off",
+            file=str(path),
+        )
     if packed and not format_.packed:
         raise InputError("a bag within .gz; uncompress it", file=str(path))
-    if packed and by_blocks and format_.packed == "whole":
+    if by_blocks and not is_read_by_blocks(path):
         raise InputError(
-            f"a {format_.endings[0]} file within .gz cannot be read by blocks; uncompress it, or set stream: off", file=str(path)
+            (
+                f"a {format_.endings[0]} file within .gz cannot be read by blocks; uncompress it, "
+                "or "
+                "set stream: off"
+            ),
+            file=str(path),
         )
     if not path.exists():
         raise InputError("cannot be read: no such file", file=str(path))
     if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise InputError("a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study file in it", file=str(path))
+        raise InputError(
+            (
+                "a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study "
+                "file "
+                "in it"
+            ),
+            file=str(path),
+        )
+
+
+def is_read_by_blocks(path: Path) -> bool:
+    """Whether a file larger than memory can be read, as far as its name tells."""
+    format_, packed = format_of(path), path.suffix.lower() == ".gz"
+    return format_.by_blocks and not (packed and format_.packed != "parts")
 
 
 def is_measured(path: Path) -> bool:
@@ -134,6 +185,11 @@ def format_of(path: Path) -> Format:
         plain = ", ".join(ending for ending, other in BY_ENDING.items() if other.packed)
         bags = ", ".join(ending for ending, other in BY_ENDING.items() if not other.packed)
         raise InputError(
-            f"unknown kind of file {kind!r}; expected {plain}, plain or with .gz, {bags} or the folder of a ROS 2 bag", file=str(path)
+            (
+                f"unknown kind of file {kind!r}; expected {plain}, plain or with .gz, {bags} or "
+                "the "
+                "folder of a ROS 2 bag"
+            ),
+            file=str(path),
         )
     return BY_ENDING[kind]

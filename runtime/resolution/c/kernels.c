@@ -1,6 +1,6 @@
 /* Inner loops of resolution studies, for any robot whose C file gives its distinct signals.
 
-    fused_states      median-filtered positions -> q, qd, qdd: low-pass forward and backward, central differences (runtime/observation/filters.py)
+    fused_states      median-filtered positions -> q, qd, qdd: low-pass forward and backward, central differences (runtime/signals/filters.py)
     fused_gather      rows of q, qd, qdd from these
     fused_decimated   states -> signals -> kept samples of the zero-phase decimation (folding.py); the signals are never stored
     fused_normal      rows -> A_j = [W_j Y_j]'[W_j Y_j] of every joint on its own columns

@@ -1,13 +1,19 @@
-"""The C kernels of resolution studies (kernels.c), compiled on first use: filters, decimation and least squares around the signals of a robot in C.
+"""The C kernels of resolution studies (kernels.c), compiled on first use: filters, decimation and
+least squares around the signals of a robot in C.
 
-    FilteredStates(positions, rate, signals, room)          as runtime.observation.filters.filtered_states, of Positions(q, window, room)
-    SignalEntries(model, names)                             which signals stand where in the wanted columns
-    decimated(entries, states, samples, ...)                kept samples of the wanted signals; the signals are not stored
+    FilteredStates(positions, rate, signals, room)
+            as runtime.signals.filters.filtered_states, of Positions(q, window, room)
+    SignalEntries(model, names)
+            which signals stand where in the wanted columns
+    decimated(entries, states, samples, ...)
+            kept samples of the wanted signals; the signals are not stored
 
 Least squares on these rows: `runtime.resolution.c.least_squares`.
 
-The same matrices and the same order of operations as the NumPy path where that costs nothing: filtered states agree with scipy's in every bit on
-x86-64, the rest to rounding. Nothing is allocated in C; `Room` holds what calls reuse, one for each thread.
+The same matrices and the same order of operations as the NumPy path where that costs nothing:
+filtered states agree with scipy's in every bit on
+x86-64, the rest to rounding. Nothing is allocated in C; `Room` holds what calls reuse, one for each
+thread.
 """
 
 from __future__ import annotations
@@ -22,27 +28,41 @@ import numpy as np
 from scipy.signal import sosfilt_zi
 
 from runtime.errors import InputError
-from runtime.model.compile_cache import FLAGS, NotCompiledError, cache_folder, shared_object
+from runtime.model.compile_cache import FLAGS, NotCompiledError, shared_object
 from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel, constants_of
-from runtime.observation.filters import butterworth, decimation_plan, median_filtered, require_longer
+from runtime.model.loading import cache_folder
 from runtime.resolution.c.folding import STATE, folding_of
 from runtime.settings.study import Decimate, Lowpass
 from runtime.settings.study import Signals as SignalSettings
+from runtime.signals.filters import (
+    butterworth,
+    decimation_plan,
+    median_filtered,
+    require_longer,
+)
 
 Array = np.ndarray
 
 SOURCE = Path(__file__).with_name("kernels.c")
-FUSED_FLAGS = tuple({"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS)
+FUSED_FLAGS = tuple(
+    {"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS
+)
 ABI = 3
 LANES, SIDE, SPAN = 8, 4, 512  # of kernels.c; LANES is 1 without vector types
-TOGETHER = 640  # most samples of signals evaluated together, except where one block is longer: these stay in cache
-REFUSALS = {1: "arguments that do not fit each other", 2: "a block that the signals of the robot refuse"}
+# most samples of signals evaluated together, except where one block is longer: these stay in cache
+TOGETHER = 640
+REFUSALS = {
+    1: "arguments that do not fit each other",
+    2: "a block that the signals of the robot refuse",
+}
 
 
 def _fields(numbers: str = "", pointers: str = "") -> list[tuple[str, Any]]:
     """Fields of a structure: int64 numbers, then pointers."""
-    return [(name, ctypes.c_int64) for name in numbers.split()] + [(name, ctypes.c_void_p) for name in pointers.split()]
+    return [(name, ctypes.c_int64) for name in numbers.split()] + [
+        (name, ctypes.c_void_p) for name in pointers.split()
+    ]
 
 
 class LowpassStructure(ctypes.Structure):
@@ -67,7 +87,10 @@ class StatesStructure(ctypes.Structure):
 class SourceStructure(ctypes.Structure):
     """struct source."""
 
-    _fields_ = [*_fields(pointers="signals constants"), *_fields("count S tile length stride", "wanted U rows u")]
+    _fields_ = [
+        *_fields(pointers="signals constants"),
+        *_fields("count S tile length stride", "wanted U rows u"),
+    ]
 
 
 class DecimationStructure(ctypes.Structure):
@@ -93,13 +116,21 @@ class RowsStructure(ctypes.Structure):
     _fields_ = _fields("m tile count ystride mstride", "U Y mask")
 
 
-STRUCTURES = (StatesStructure, SourceStructure, DecimationStructure, EntriesStructure, RowsStructure)
+STRUCTURES = (
+    StatesStructure,
+    SourceStructure,
+    DecimationStructure,
+    EntriesStructure,
+    RowsStructure,
+)
 
 
 @lru_cache(maxsize=4)
 def library(folder: Path | None = None) -> ctypes.CDLL:
     """kernels.c, from the cache or compiled; NotCompiledError or OSError where it cannot be had."""
-    return shared_object(SOURCE, SOURCE.read_bytes(), folder or cache_folder(), _opened, FUSED_FLAGS)
+    return shared_object(
+        SOURCE, SOURCE.read_bytes(), folder or cache_folder(), _opened, FUSED_FLAGS
+    )
 
 
 def _opened(path: Path) -> ctypes.CDLL:
@@ -117,18 +148,25 @@ def _opened(path: Path) -> ctypes.CDLL:
         raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e
     expected = [SIDE, SPAN, *map(ctypes.sizeof, STRUCTURES)]
     if abi != ABI or layout[0] not in (1, LANES) or list(layout[1:]) != expected:
-        raise NotCompiledError(f"{SOURCE.name} has interface {abi} and sizes {list(layout)}, expected {ABI} and {[LANES, *expected]}")
+        raise NotCompiledError(
+            f"{SOURCE.name} has interface {abi} and sizes {list(layout)}, expected {ABI} and "
+            f"{[LANES, *expected]}"
+        )
     return opened
 
 
 class Room:
-    """Arrays that calls reuse, by name: a fresh one costs more than what is computed in it. One Room for each thread."""
+    """Arrays that calls reuse, by name: a fresh one costs more than what is computed in it. One
+    Room for each thread.
+    """
 
     def __init__(self) -> None:
         self._arrays: dict[str, Array] = {}
 
     def array(self, name: str, *shape: int, dtype: Any = float) -> Array:
-        """An array of this shape, not initialised, on a 64-byte boundary: the one given under this name before, where it fits."""
+        """An array of this shape, not initialised, on a 64-byte boundary: the one given under this
+        name before, where it fits.
+        """
         array = self._arrays.get(name)
         if array is None or array.shape != shape:
             size = int(np.prod(shape)) * np.dtype(dtype).itemsize
@@ -147,12 +185,16 @@ def call(name: str, *arguments: Any) -> None:
     """fused_NAME of the C file; InputError where it refuses."""
     status = getattr(library(), f"fused_{name}")(*arguments)
     if status:
-        raise InputError(f"fused_{name} in C refused {REFUSALS.get(status, f'its arguments with {status}')}")
+        raise InputError(
+            f"fused_{name} in C refused {REFUSALS.get(status, f'its arguments with {status}')}"
+        )
 
 
 @lru_cache(maxsize=8)
 def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStructure, Array, Array]:
-    """Filter of one signal, and the arrays it points to; no sections where the signal is not filtered."""
+    """Filter of one signal, and the arrays it points to; no sections where the signal is not
+    filtered.
+    """
     if low is None or name not in low.on:
         return LowpassStructure(0, 0, None, None), np.empty(0), np.empty(0)
     sos, pad = butterworth(rate, low)
@@ -161,7 +203,8 @@ def _lowpass(low: Lowpass | None, name: str, rate: float) -> tuple[LowpassStruct
 
 
 class Positions:
-    """Positions as C reads them: joints side by side in groups of LANES, the last group filled up with zeros.
+    """Positions as C reads them: joints side by side in groups of LANES, the last group filled up
+    with zeros.
 
     Parameters
     ----------
@@ -182,7 +225,8 @@ class Positions:
 
 
 class FilteredStates:
-    """q, qd, qdd of measured positions: low-pass, difference, low-pass, difference. As C keeps them, in `room`.
+    """q, qd, qdd of measured positions: low-pass, difference, low-pass, difference. As C keeps
+    them, in `room`.
 
     Parameters
     ----------
@@ -191,22 +235,40 @@ class FilteredStates:
     signals : SignalSettings
     room : Room
     up : ndarray of uint8, optional
-        Bits as `runtime.resolution.rounding.packed_bits` gives them: bit t*n + j moves position t of joint j, by +step where it is 1, else by -step.
+        Bits as `runtime.resolution.rounding.packed_bits` gives them: bit t*n + j moves position t
+        of joint j, by +step where it is 1, else by -step.
     step : float, rad or m
     """
 
     def __init__(
-        self, positions: Positions, rate: float, signals: SignalSettings, room: Room, *, up: Array | None = None, step: float = 0.0
+        self,
+        positions: Positions,
+        rate: float,
+        signals: SignalSettings,
+        room: Room,
+        *,
+        up: Array | None = None,
+        step: float = 0.0,
     ) -> None:
         self.N, self.n = positions.N, positions.n
         (on_q, *_), (on_qd, *_) = (_lowpass(signals.lowpass, name, rate) for name in ("q", "qd"))
         pad, ends = max(on_q.pad, on_qd.pad), 1 if signals.ends == "one-sided" else 2
         require_longer(self.N, max(pad, ends))
         if up is not None and up.size <= -(-self.N * self.n // 8):
-            raise InputError(f"{up.size} bytes for {self.N * self.n} bits; expected one byte more than these fill")
+            raise InputError(
+                f"{up.size} bytes for {self.N * self.n} bits; expected one byte more than these "
+                "fill"
+            )
         lanes = room.array("lanes", 3, len(positions.lanes), self.N + 2 * pad, LANES)
-        pointers = address(positions.lanes), None if up is None else address(up), *map(address, lanes)
-        self.lanes, self.structure = lanes, StatesStructure(self.N, self.n, pad, ends, rate, step, on_q, on_qd, *pointers)
+        pointers = (
+            address(positions.lanes),
+            None if up is None else address(up),
+            *map(address, lanes),
+        )
+        self.lanes, self.structure = (
+            lanes,
+            StatesStructure(self.N, self.n, pad, ends, rate, step, on_q, on_qd, *pointers),
+        )
         call("states", ctypes.byref(self.structure))
 
     def rows(self, samples: slice) -> Array:
@@ -214,12 +276,19 @@ class FilteredStates:
         m = samples.stop - samples.start
         states = np.empty((3, self.n, m))
         pointers = [ctypes.c_void_p(address(x)) for x in states]
-        call("gather", ctypes.byref(self.structure), *map(ctypes.c_int64, (samples.start, m)), *pointers, ctypes.c_int64(m))
+        call(
+            "gather",
+            ctypes.byref(self.structure),
+            *map(ctypes.c_int64, (samples.start, m)),
+            *pointers,
+            ctypes.c_int64(m),
+        )
         return states
 
 
 class SignalEntries:
-    """Where the signals of a robot stand in the columns `names`: entry e of joint j is sign[e]*U[wanted[number[e]]], start[j] <= e < start[j + 1].
+    """Where the signals of a robot stand in the columns `names`: entry e of joint j is
+    sign[e]*U[wanted[number[e]]], start[j] <= e < start[j + 1].
 
     Attributes
     ----------
@@ -238,33 +307,54 @@ class SignalEntries:
     def __init__(self, model: CompiledSignals, names: Sequence[str]) -> None:
         unknown = [name for name in names if name not in model.BASE_PARAMETERS]
         if unknown:
-            raise InputError(f"no column {', '.join(unknown)}; {model.NAME} has {', '.join(model.BASE_PARAMETERS)}")
+            raise InputError(
+                f"no column {', '.join(unknown)}; {model.NAME} has "
+                f"{', '.join(model.BASE_PARAMETERS)}"
+            )
         table, n = model.signals, len(model.JOINTS)
-        place = np.array([{name: k for k, name in enumerate(names)}.get(name, -1) for name in model.BASE_PARAMETERS])[table.column]
+        place = np.array(
+            [
+                {name: k for k, name in enumerate(names)}.get(name, -1)
+                for name in model.BASE_PARAMETERS
+            ]
+        )[table.column]
         order = np.lexsort((place, table.row))
         order = order[place[order] >= 0]
         self.model, self.names, self.n = model, tuple(names), n
-        self.start = np.concatenate([[0], np.cumsum(np.bincount(table.row[order], minlength=n))]).astype(np.int32)
+        self.start = np.concatenate(
+            [[0], np.cumsum(np.bincount(table.row[order], minlength=n))]
+        ).astype(np.int32)
         self.columns = tuple(place[order][self.start[j] : self.start[j + 1]] for j in range(n))
         self.place: Array = place[order]
         self.sign = np.ascontiguousarray(table.sign[order], dtype=float)
         self.wanted, number = np.unique(table.signal[order].astype(np.int32), return_inverse=True)
         self.whole_groups = np.pad(self.wanted, (0, -len(self.wanted) % LANES), mode="edge")
         self.number: Array = number.reshape(-1).astype(np.int32)
-        self.table = table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
+        self.table = (
+            table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
+        )
 
 
 def constant_values(model: CompiledSignals, constants: Mapping[str, float]) -> Array:
     """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
-    return np.array([*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float)
+    return np.array(
+        [*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float
+    )
 
 
 def decimated(
-    entries: SignalEntries, states: FilteredStates, samples: slice, factor: int, settings: Decimate | None, constants: Array, room: Room
+    entries: SignalEntries,
+    states: FilteredStates,
+    samples: slice,
+    factor: int,
+    settings: Decimate | None,
+    constants: Array,
+    room: Room,
 ) -> Array:
     """The kept samples of the wanted signals, shape (S, K): row i is signal entries.wanted[i].
 
-    samples : those used of the states.   constants : of `constant_values`.   The result is one of `room`.
+    samples : those used of the states.   constants : of `constant_values`.
+            The result is one of `room`.
     """
     p = decimation_plan(samples.stop - samples.start, factor, settings)
     if p is None:
@@ -275,27 +365,47 @@ def decimated(
     length = max(len(p.X0), len(p.A), p.L * most)
     U, rows = room.array("U", table.count, table.tile), room.array("rows", 3, states.n, table.tile)
     u = room.array("u", S, length + 2 * LANES)
-    y, d, x = room.array("y", S, p.K), room.array("d", p.blocks, S, 2 * STATE), room.array("x", S, STATE)
+    y, d, x = (
+        room.array("y", S, p.K),
+        room.array("d", p.blocks, S, 2 * STATE),
+        room.array("x", S, STATE),
+    )
     numbers = table.count, S, table.tile, length, u.shape[1]
-    source = SourceStructure(table.address, address(constants), *numbers, *map(address, (wanted, U, rows)), address(u) + 8 * LANES)
+    source = SourceStructure(
+        table.address,
+        address(constants),
+        *numbers,
+        *map(address, (wanted, U, rows)),
+        address(u) + 8 * LANES,
+    )
     sizes = p.blocks, most, len(p.X0), len(p.A), p.K - p.blocks * p.G, p.K
     pointers = map(address, (*folding.matrices, d, x, y))
-    plan = DecimationStructure(samples.start, p.N, p.phase, p.factor, p.G, *sizes, folding.direct, *pointers)
+    plan = DecimationStructure(
+        samples.start, p.N, p.phase, p.factor, p.G, *sizes, folding.direct, *pointers
+    )
     call("decimated", *map(ctypes.byref, (states.structure, source, plan)))
     return y[: len(entries.wanted)]
 
 
 def _blocks_together(L: int, tile: int) -> int:
-    """Blocks of L samples evaluated together: those that fill the tiles best, up to TOGETHER samples."""
+    """Blocks of L samples evaluated together: those that fill the tiles best, up to TOGETHER
+    samples.
+    """
     return min(range(1, max(1, TOGETHER // L) + 1), key=lambda k: (-k * L % tile) / (k * L))
 
 
-def _every_sample(entries: SignalEntries, states: FilteredStates, samples: slice, constants: Array, room: Room) -> Array:
+def _every_sample(
+    entries: SignalEntries, states: FilteredStates, samples: slice, constants: Array, room: Room
+) -> Array:
     """The wanted signals at all samples, shape (S, N)."""
     N, table = samples.stop - samples.start, entries.table
     U, rows = room.array("every", table.count, N), states.rows(samples)
     pointers = [ctypes.c_void_p(address(x)) for x in (*rows, constants, U)]
     size = ctypes.c_int64(N)
-    if ctypes.CFUNCTYPE(ctypes.c_int32)(table.address)(size, *pointers[:3], size, *pointers[3:], size):
+    if ctypes.CFUNCTYPE(ctypes.c_int32)(table.address)(
+        size, *pointers[:3], size, *pointers[3:], size
+    ):
         raise InputError(f"{entries.model.NAME}: its signals in C refused {N} samples")
-    return np.take(U, entries.wanted, axis=0, out=room.array("y", len(entries.wanted), N), mode="clip")
+    return np.take(
+        U, entries.wanted, axis=0, out=room.array("y", len(entries.wanted), N), mode="clip"
+    )

@@ -1,8 +1,10 @@
-"""Least squares in C on the rows of a resolution study: normal equations by joint with one refinement, or the structured triangular factor.
+"""Least squares in C on the rows of a resolution study: normal equations by joint with one
+refinement, or the structured triangular factor.
 
     least_squares(KeptRows(entries, parts, room))
 
-The function of `runtime.estimators.normal_equations`, with the same results to rounding and the same rule which of the two serves.
+The function of `runtime.estimators.normal_equations`, with the same results to rounding and the
+same rule which of the two serves.
 """
 
 from __future__ import annotations
@@ -13,10 +15,21 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg.lapack import dgeqrf
 
-from runtime.estimators.normal_equations import LIMIT, JointEquations, LeastSquares
+from runtime.estimators.normal_equations import JointEquations, LeastSquares
 from runtime.estimators.solution import solve
-from runtime.observation.qr_factor import Factor, JointFactor
-from runtime.resolution.c.kernels import LANES, SIDE, SPAN, EntriesStructure, Room, RowsStructure, SignalEntries, address, call
+from runtime.limits import LIMIT
+from runtime.resolution.c.kernels import (
+    LANES,
+    SIDE,
+    SPAN,
+    EntriesStructure,
+    Room,
+    RowsStructure,
+    SignalEntries,
+    address,
+    call,
+)
+from runtime.rows.factor import Factor, JointFactor
 
 Array = np.ndarray
 
@@ -24,10 +37,12 @@ PADDED = SPAN + LANES  # numbers from row to row of a block: no power of two
 QR_ROWS = 2048  # samples of one update of the triangular factors
 
 
-def least_squares(rows: KeptRows, limit: float = LIMIT) -> LeastSquares:
-    """X = argmin ||Y - W X|| by normal equations and one refinement; by the triangular factor where kappa reaches `limit`.
+def least_squares(rows: KeptRows, limit: float = LIMIT.NORMAL_EQUATIONS) -> LeastSquares:
+    """X = argmin ||Y - W X|| by normal equations and one refinement; by the triangular factor where
+    kappa reaches `limit`.
 
-    The residual norms are those before the refinement: it changes them by less than kappa^2 eps squared.
+    The residual norms are those before the refinement: it changes them by less than kappa^2 eps
+    squared.
     """
     equations = rows.normal()
     cholesky = equations.cholesky()
@@ -50,16 +65,22 @@ class KeptRows:
     entries : SignalEntries
         Where the signals stand in W.
     parts : sequence of (y, Y, mask), one for each record
-        Signals y, shape (S, K), as `kernels.decimated` gives them; torques Y, shape (n, K), N m (N); mask, bool, shape (n, K), of the rows used.
+        Signals y, shape (S, K), as `kernels.decimated` gives them; torques Y, shape (n, K), N m
+        (N); mask, bool, shape (n, K), of the rows used.
     room : Room
         Arrays that calls reuse.
     """
 
-    def __init__(self, entries: SignalEntries, parts: Sequence[tuple[Array, Array, Array]], room: Room) -> None:
+    def __init__(
+        self, entries: SignalEntries, parts: Sequence[tuple[Array, Array, Array]], room: Room
+    ) -> None:
         self.entries, self.room = entries, room
         self.counts = [len(C) + 1 for C in entries.columns]
         self.widths = [-(-count // SIDE) * SIDE for count in self.counts]
-        self.parts = [(y, np.ascontiguousarray(Y, dtype=float), np.ascontiguousarray(mask, dtype=np.uint8)) for y, Y, mask in parts]
+        self.parts = [
+            (y, np.ascontiguousarray(Y, dtype=float), np.ascontiguousarray(mask, dtype=np.uint8))
+            for y, Y, mask in parts
+        ]
 
     def normal(self) -> JointEquations:
         """Gram matrices of [W_j Y_j] by joint."""
@@ -78,14 +99,24 @@ class KeptRows:
         g.fill(0)
         by_entry = np.ascontiguousarray(X[self.entries.place])
         self._pass("residual", self._structure(g=g), ctypes.c_void_p(address(by_entry)))
-        parts = [part[:count] for part, count in zip(np.split(g, np.cumsum(self.widths)[:-1]), self.counts, strict=True)]
+        parts = [
+            part[:count]
+            for part, count in zip(
+                np.split(g, np.cumsum(self.widths)[:-1]), self.counts, strict=True
+            )
+        ]
         return [part[:-1].copy() for part in parts], np.array([part[-1] for part in parts])
 
     def factor(self) -> Factor:
-        """Structured triangular factor of [W Y]: R_j = R factor of [R_j; next rows], LAPACK in place."""
+        """Structured triangular factor of [W Y]: R_j = R factor of [R_j; next rows], LAPACK in
+        place.
+        """
         R = self.room.array("R", sum(count * (count + QR_ROWS) for count in self.counts))
         ends = np.cumsum([0] + [count * (count + QR_ROWS) for count in self.counts])
-        blocks = [R[end : end + c * (c + QR_ROWS)].reshape(c, c + QR_ROWS) for end, c in zip(ends, self.counts, strict=False)]
+        blocks = [
+            R[end : end + c * (c + QR_ROWS)].reshape(c, c + QR_ROWS)
+            for end, c in zip(ends, self.counts, strict=False)
+        ]
         for block, count in zip(blocks, self.counts, strict=True):
             block[:, :count] = 0
         taken = np.zeros(self.entries.n, dtype=np.int64)
@@ -95,7 +126,11 @@ class KeptRows:
             K = Y.shape[1]
             for k in range(0, K, QR_ROWS):
                 starts = y.ctypes.data + 8 * k, Y.ctypes.data + 8 * k, mask.ctypes.data + k
-                call("rows", ctypes.byref(entries), ctypes.byref(RowsStructure(min(QR_ROWS, K - k), y.shape[1], 0, K, K, *starts)))
+                call(
+                    "rows",
+                    ctypes.byref(entries),
+                    ctypes.byref(RowsStructure(min(QR_ROWS, K - k), y.shape[1], 0, K, K, *starts)),
+                )
                 for block, count, rows in zip(blocks, self.counts, taken, strict=True):
                     block[:, count + rows :] = 0
                     dgeqrf(block.T, overwrite_a=1)
@@ -104,7 +139,9 @@ class KeptRows:
                 taken.fill(0)
         joints = tuple(
             JointFactor(np.asarray(C), block[:, :count].T.copy(), int(rows))
-            for C, block, count, rows in zip(self.entries.columns, blocks, self.counts, total, strict=True)
+            for C, block, count, rows in zip(
+                self.entries.columns, blocks, self.counts, total, strict=True
+            )
         )
         return Factor.of(self.entries.names, joints)
 
@@ -112,11 +149,18 @@ class KeptRows:
         """One pass of fused_normal or fused_residual over all rows."""
         for y, Y, mask in self.parts:
             K = Y.shape[1]
-            call(task, ctypes.byref(entries), ctypes.byref(RowsStructure(K, K, 0, K, K, address(y), address(Y), address(mask))), *arguments)
+            call(
+                task,
+                ctypes.byref(entries),
+                ctypes.byref(RowsStructure(K, K, 0, K, K, address(y), address(Y), address(mask))),
+                *arguments,
+            )
 
     def _structure(self, most: int = 0, **arrays: Array) -> EntriesStructure:
         """The entries for C, with what this pass fills."""
         e = self.entries
         O = self.room.array("O", max(self.widths), PADDED)
         filled = {name: address(x) for name, x in arrays.items()}
-        return EntriesStructure(e.n, most, address(e.start), address(e.number), address(e.sign), O=address(O), **filled)
+        return EntriesStructure(
+            e.n, most, address(e.start), address(e.number), address(e.sign), O=address(O), **filled
+        )

@@ -1,6 +1,8 @@
-"""The workspace of a compiled model: filters, signals, decimation and least squares of `runtime.resolution.c.kernels` in place of NumPy's.
+"""The workspace of a compiled model: filters, signals, decimation and least squares of
+`runtime.resolution.c.kernels` in place of NumPy's.
 
-The same draws as with NumPy and the same estimates to rounding; the same bits for the same seed on one kind of machine, whoever works. Only
+The same draws as with NumPy and the same estimates to rounding; the same bits for the same seed on
+one kind of machine, whoever works. Only
 perturbed positions go in and small matrices come out; room is reused from run to run.
 """
 
@@ -9,7 +11,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -21,7 +22,13 @@ from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
-from runtime.resolution.perturbed import PreparedRecord, Task, run_position, stream_keys, torque_rows
+from runtime.resolution.perturbed import (
+    PreparedRecord,
+    Task,
+    run_position,
+    stream_keys,
+    torque_rows,
+)
 from runtime.resolution.rounding import packed_bits, stream
 from runtime.resolution.runs import Level
 
@@ -29,7 +36,9 @@ Array = np.ndarray
 
 
 def usable(model: GeneratedModel) -> GeneratedModel:
-    """`model`, or the NumPy module of a compiled one, with a FallbackWarning saying why, where the kernels of studies cannot be had."""
+    """`model`, or the NumPy module of a compiled one, with a FallbackWarning saying why, where the
+    kernels of studies cannot be had.
+    """
     if isinstance(model, CompiledSignals) and (reason := unavailable()):
         warnings.warn(f"{model.NAME}: NumPy in place of C: {reason}", FallbackWarning, stacklevel=3)
         return model.module
@@ -37,7 +46,8 @@ def usable(model: GeneratedModel) -> GeneratedModel:
 
 
 def model_of_runs(model: GeneratedModel, source: Path) -> GeneratedModel:
-    """`model` with its signals in C, for the runs of resolution studies; without a word `model` itself where that cannot be had.
+    """`model` with its signals in C, for the runs of resolution studies; without a word `model`
+    itself where that cannot be had.
 
     source : the C file of the robot.
     """
@@ -50,21 +60,20 @@ class CompiledWorkspace:
     """What one thread keeps from run to run of one task."""
 
     def __init__(self, task: Task, model: CompiledSignals) -> None:
-        self.task, self.compiled, self.entries = task, model, kernels.SignalEntries(model, task.names)
+        self.task, self.compiled, self.entries = (
+            task,
+            model,
+            kernels.SignalEntries(model, task.names),
+        )
         self.constants = kernels.constant_values(model, task.constants)
         self.room = kernels.Room()
-        self.records = [(record, self._positions(record, record.q, kernels.Room()), kernels.Room()) for record in task.records]
-        self.two_point = task.settings.rounding == "two-point" and (task.settings.side == "joint" or task.drives is None)
-
-    @property
-    def wanted(self) -> GeneratedModel:
-        """The same."""
-        return self.model
-
-    @property
-    def model(self) -> GeneratedModel:
-        """The model, its regressor in C."""
-        return cast(GeneratedModel, self.compiled)
+        self.records = [
+            (record, self._positions(record, record.q, kernels.Room()), kernels.Room())
+            for record in task.records
+        ]
+        self.two_point = task.settings.rounding == "two-point" and (
+            task.settings.side == "joint" or task.drives is None
+        )
 
     def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
         """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
@@ -76,7 +85,9 @@ class CompiledWorkspace:
         return least_squares(KeptRows(self.entries, rows, self.room))
 
     def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
-        """The same with the positions of every record moved by `errors`, shape (N, n) each, torques as measured."""
+        """The same with the positions of every record moved by `errors`, shape (N, n) each, torques
+        as measured.
+        """
         rows = []
         for (record, _, room), error in zip(self.records, errors, strict=True):
             moved = self._positions(record, record.q + error, room)
@@ -89,20 +100,40 @@ class CompiledWorkspace:
         return kernels.Positions(q, record.selection.signals.median, room)
 
     def _states(
-        self, record: PreparedRecord, measured: kernels.Positions, level: Level, key: tuple[int, ...], room: kernels.Room
+        self,
+        record: PreparedRecord,
+        measured: kernels.Positions,
+        level: Level,
+        key: tuple[int, ...],
+        room: kernels.Room,
     ) -> kernels.FilteredStates:
         """States of one draw."""
         settings, signals = self.task.settings, record.selection.signals
         if self.two_point and level.delta and signals.median == 1:  # the sum is left to C
             up = packed_bits(record.q.size, stream(settings.seed, *key))
-            return kernels.FilteredStates(measured, record.rate, signals, room, up=up, step=level.delta)
+            return kernels.FilteredStates(
+                measured, record.rate, signals, room, up=up, step=level.delta
+            )
         drawn = self._positions(record, run_position(self.task, record, level, key), room)
         return kernels.FilteredStates(drawn, record.rate, signals, room)
 
-    def _signals(self, record: PreparedRecord, states: kernels.FilteredStates, room: kernels.Room) -> Array:
+    def _signals(
+        self, record: PreparedRecord, states: kernels.FilteredStates, room: kernels.Room
+    ) -> Array:
         """Distinct signals of the wanted columns at the kept samples, shape (S, K)."""
         selection = record.selection
-        y = kernels.decimated(self.entries, states, selection.samples, selection.factor, selection.signals.decimate, self.constants, room)
+        y = kernels.decimated(
+            self.entries,
+            states,
+            selection.samples,
+            selection.factor,
+            selection.signals.decimate,
+            self.constants,
+            room,
+        )
         if not np.isfinite(y).all():
-            raise InputError(f"the regressor of {self.compiled.NAME} is not finite at perturbed positions; use smaller steps")
+            raise InputError(
+                f"the regressor of {self.compiled.NAME} is not finite at perturbed positions; use "
+                "smaller steps"
+            )
         return y

@@ -1,0 +1,155 @@
+"""What the checks of one study read, each part made once, when a check first asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from runtime.checks.delay import Delay, delay
+from runtime.checks.gravity import Gravity, gravity_direction
+from runtime.checks.known import KnownValues, known_values
+from runtime.checks.samples import Samples
+from runtime.checks.trials import Problem, problem_of
+from runtime.errors import InputError
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.records.record import Record
+from runtime.rows.observation import Observation
+from runtime.rows.observe import observe
+from runtime.rows.prepared import Prepared
+from runtime.settings.study import Study
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Records, study and robot file.
+
+    Attributes
+    ----------
+    model : GeneratedModel
+    given : sequence of Prepared
+        Records, or excerpts of those that are read by blocks, as they were read.
+    straight : sequence of Prepared
+        The same, counts that start anew unwrapped.
+    study : Study
+    samples : Samples
+        Of all records.
+    D : ndarray, shape (K, n, b)
+        Regressor at the samples.
+    variants : GeneratedModel or None
+        The module of `symgen.variants`.
+    """
+
+    model: GeneratedModel
+    given: Sequence[Prepared]
+    straight: Sequence[Prepared]
+    study: Study
+    samples: Samples
+    D: Array
+    variants: GeneratedModel | None
+
+    @property
+    def records(self) -> list[Record]:
+        """The records themselves, positions unwrapped."""
+        return [one.record for one in self.straight]
+
+    @cached_property
+    def units(self) -> list[str]:
+        """Units of the positions, by joint."""
+        return list(joint_units(self.model))
+
+    @property
+    def turning(self) -> Array:
+        """Whether each joint turns, (n,)."""
+        return np.array([unit == "rad" for unit in self.units])
+
+    def limits(self, key: str, *shape: int) -> Array | None:
+        """Limits of each joint by the robot file, shape (n, *shape); None where it has none."""
+        given = np.asarray(dict(getattr(self.model, "LIMITS", {}) or {}).get(key, ()), dtype=float)
+        return given if given.shape == (self.samples.n, *shape) else None
+
+    def joints(self, chosen: Array) -> str:
+        """Labels of the joints of a mask."""
+        return ", ".join(str(self.model.JOINTS[j]) for j in np.flatnonzero(chosen))
+
+    def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
+        """Values of the joints of a mask, with their units."""
+        return ", ".join(
+            f"{values[j]:.3g} {units[j]} (joint {self.model.JOINTS[j]})"
+            for j in np.flatnonzero(chosen)[:4]
+        )
+
+    @cached_property
+    def observation(self) -> Observation | None:
+        """Rows of the study; None where none is used, or counts cannot be read."""
+        try:
+            return observe(self.model, self.given, self.study)
+        except (InputError, np.linalg.LinAlgError):
+            return None
+
+    @cached_property
+    def physical(self) -> PhysicalModel | None:
+        """Conditions of a physical robot; None where the model has no standard parameters."""
+        try:
+            return physical_model(self.model)
+        except InputError:
+            return None
+
+    @cached_property
+    def silent(self) -> str:
+        """Why nothing is fitted; "" where the samples allow it."""
+        rows = self.samples.moving().sum(axis=0)
+        least = LIMIT.ROWS_PER_PARAMETER * len(self.model.BASE_PARAMETERS)
+        if self.physical is None:
+            return "the model has no standard parameters"
+        if self.samples.constant().any():
+            return "a torque never changes"
+        few = int(rows.sum()) <= least or int(rows.min()) <= LIMIT.FEWEST_ROWS
+        return "too few samples at which every joint moves" if few else ""
+
+    @cached_property
+    def sides(self) -> tuple[str, str]:
+        """Sides of positions and torques in the files."""
+        return self.study.record[0].sides if self.study.record else ("joint", "joint")
+
+    @cached_property
+    def problem(self) -> Problem | None:
+        """The study as it is, fitted; None where nothing is fitted."""
+        return None if self.silent else self._problem(values=True)
+
+    @cached_property
+    def alone(self) -> Problem | None:
+        """The same without the values of the robot file."""
+        return self.problem if self.robot_values is None else self._problem(values=False)
+
+    def _problem(self, *, values: bool) -> Problem:
+        return problem_of(
+            self.model, self.samples, self.variants, torque_side=self.sides[1], values=values
+        )
+
+    @cached_property
+    def robot_values(self) -> KnownValues | None:
+        """Torque of the values of the robot file, where it has them."""
+        problem = self.problem
+        return known_values(problem) if problem and problem.barrier.near_values else None
+
+    @cached_property
+    def gravity(self) -> Gravity | None:
+        """Direction of gravity fitted freely."""
+        return None if self.problem is None else gravity_direction(self.problem)
+
+    @cached_property
+    def late(self) -> Delay | None:
+        """Delay of the longest record; None where it is too short."""
+        own = max(self.straight, key=lambda one: len(one.record))
+        longest = min(LIMIT.LONGEST_DELAY, float(own.record.t[-1] - own.record.t[0]) / 20)
+        try:
+            return delay(self.model, own, self.study, longest=longest)
+        except (InputError, ValueError):
+            return None

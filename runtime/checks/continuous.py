@@ -1,0 +1,279 @@
+"""One number that the study takes as known, fitted beside the model: a factor of a joint, its zero,
+a length, an angle, the direction of gravity.
+
+Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of
+barrier and values, J = d(W chi)/d xi the effect of
+the number,
+
+    [A + B   W'J] [d chi]   [ 0  ]
+    [J'W     J'J] [d xi ] = [J'e ],      sigma_xi^2 = 1/(J'J - J'W (A + B)^-1 W'J),
+            gain = xi^2/(2 sigma_xi^2) nats,
+
+rows over their sigma. Only what this first step finds worth it is searched: fits of a physical
+robot at values of the number, by golden section.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from runtime.checks.alternatives import Alternative, unchanged
+from runtime.checks.fits import Grams, least_squares, quick_fit, solved
+from runtime.checks.trials import Problem, Trial
+from runtime.limits import LIMIT
+from runtime.model.generated import joint_units
+
+Array = np.ndarray
+
+ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
+GUESSES = {
+    2**0.5: "1.41: effective for peak values",
+    3**0.5: "1.73: phase for line values",
+    2.0: "2: half of a pair of motors",
+    9.81: "9.81: kp m for N m",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A number xi that is zero in the study as given.
+
+    Attributes
+    ----------
+    kind : str
+        factor, zero, length, angle.
+    of : str
+        What it is, in words.
+    span : float
+        Largest |xi| that is searched.
+    fields : function
+        xi to what it changes of an Alternative.
+    plain : Alternative
+        The study as it is.
+    """
+
+    kind: str
+    of: str
+    span: float
+    fields: Callable[[float], dict[str, Any]]
+    plain: Alternative
+
+    def change(self, xi: float) -> Alternative:
+        """The study with this xi."""
+        return replace(self.plain, kind=self.kind, of=self.of, **self.fields(xi))
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """First step of one quantity: xi, its deviation, its gain in nats; whether its effect lies in
+    the span of W.
+    """
+
+    xi: float
+    sigma: float
+    gain: float
+    within: bool = False
+
+
+def quantities(problem: Problem) -> list[Quantity]:
+    """Factors of all joints, zeros of those that turn; lengths and angles of the table where it is
+    free.
+    """
+    plain, model = unchanged(problem.samples.n), problem.model
+    number, several = np.arange(problem.samples.n), problem.samples.n > 1
+    free = {} if problem.variants is None else problem.variants.CONSTANTS
+    entries = [
+        (key, match[1], match[2], x)
+        for key, x in free.items()
+        if (match := ENTRY.fullmatch(key)) and (x or match[1] == "alpha")
+    ]
+    factors = [
+        Quantity(
+            "factor",
+            "a common factor of all torques",
+            2.6,
+            partial(_factor, problem, number >= 0, ""),
+            plain,
+        )
+    ]
+    for j, joint in enumerate(map(str, model.JOINTS if several else ())):
+        of = f"a factor of the torque of joint {joint}"
+        fields = partial(_factor, problem, number == j, joint)
+        factors.append(Quantity("factor", of, 2.6, fields, plain))
+    zeros = [
+        Quantity(
+            "zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint), plain
+        )
+        for j, joint in enumerate(model.JOINTS)
+        if joint_units(model)[j] == "rad"
+    ]
+    lengths = []
+    for key, name, frame, x in entries:
+        kind, span, entry = ("angle", 1.2, _angle) if name == "alpha" else ("length", 1.0, _length)
+        fields = partial(entry, key, name, frame, x)
+        lengths.append(Quantity(kind, f"{name} of frame {frame}", span, fields, plain))
+    return [*factors, *zeros, *lengths]
+
+
+def _factor(problem: Problem, chosen: Array, joint: str, xi: float) -> dict[str, Any]:
+    """exp(xi) = the torque that the joint would need, over that of the record."""
+    factor = float(np.exp(xi))
+    what = f"the torque of joint {joint} is" if joint else "all torques are"
+    look = (
+        f"ratio, torque constant and unit of joint {joint}"
+        if joint
+        else "unit, torque constants and side of the torques"
+    )
+    scale = np.diag(np.where(chosen, factor, 1.0))
+    return {
+        "cause": f"{what} to be multiplied by {factor:.3g}",
+        "remedy": f"look at {look} ({_guess(factor)})",
+        "T": np.linalg.inv(problem.F) @ scale @ problem.F,
+    }
+
+
+def _zero(chosen: Array, joint: int, xi: float) -> dict[str, Any]:
+    return {
+        "cause": f"the zero of joint {joint} is off by {np.degrees(xi):.3g} degrees",
+        "remedy": f"look at theta of the frame of joint {joint}, at drives.offset and at the "
+        "calibration of its encoder",
+        "p": np.where(chosen, xi, 0.0),
+    }
+
+
+def _angle(key: str, name: str, frame: str, value: float, xi: float) -> dict[str, Any]:
+    return {
+        "cause": f"{name} of frame {frame} is off by {np.degrees(xi):.3g} degrees",
+        "remedy": f"look at {name} of frame {frame}: {value + xi:.3f} rad fits",
+        "constants": {key: value + xi},
+    }
+
+
+def _length(key: str, name: str, frame: str, value: float, xi: float) -> dict[str, Any]:
+    length = value * float(np.exp(xi))
+    return {
+        "cause": f"{name} of frame {frame} is {length:.4g} m rather than {value:.4g} m",
+        "remedy": f"measure {name} of frame {frame}: {length:.4g} m fits",
+        "constants": {key: length},
+    }
+
+
+def _guess(factor: float) -> str:
+    """What a factor on a torque may be."""
+    return next(
+        (
+            text
+            for value, text in GUESSES.items()
+            if abs(abs(np.log(factor)) - np.log(value)) < 0.05
+        ),
+        "they are right when this factor is 1",
+    )
+
+
+def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
+    """xi, sigma, gain of each quantity on its own, to first order."""
+    chi, sigma = problem.given.X, problem.given.sigma
+    D, now, mask = _rows(problem, unchanged(problem.samples.n))
+    e = (problem.tau - now) / sigma * mask
+    A, _ = Grams.of(D, problem.tau, mask).weighted(sigma)
+    _, B = problem.barrier.derivatives(chi, LIMIT.BARRIER[-1])
+    H = A + B
+    share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
+    steps = []
+    for quantity in which:
+        J = (
+            _rows(problem, quantity.change(LIMIT.DIFFERENCE_STEP))[1] - now
+        ) / LIMIT.DIFFERENCE_STEP
+        within = (
+            np.linalg.norm(J) < LIMIT.DIFFERENCE_STEP**2 * np.linalg.norm(now)
+            or problem.beyond(J[:, :, None]) < LIMIT.NEARLY_HIDDEN
+        )
+        J = J / sigma * mask
+        WJ = np.einsum("kjp,kj->p", D, J / sigma)
+        left = float((J * J).sum() - WJ @ solved(H, WJ))
+        if within or left <= 0:
+            steps.append(Step(0.0, np.inf, 0.0, within))
+            continue
+        xi = float((J * e).sum()) / left
+        steps.append(Step(xi, float((left * share) ** -0.5), 0.5 * share * xi**2 * left))
+    return steps
+
+
+def _rows(problem: Problem, alternative: Alternative) -> tuple[Array, Array, Array]:
+    """Rows over the standard parameters, shape (K, n, p), torques that those of the study explain,
+    and the rows used.
+    """
+    rows = problem.rows(alternative)
+    if rows is None:  # a loop that does not close
+        return _rows(problem, unchanged(problem.samples.n))
+    D, Y, mask = rows
+    D = D @ problem.physical.K if alternative.on_data else D
+    return D, D @ problem.given.X + problem.tau - Y, mask
+
+
+def searched(problem: Problem) -> list[Trial]:
+    """The quantities whose first step is worth it, each at its best value."""
+    which = quantities(problem)
+    steps = first_steps(problem, which)
+    order = sorted(range(len(which)), key=lambda k: -steps[k].gain)[: LIMIT.NUMBERS_SEARCHED]
+    trials = []
+    for k in order:
+        if steps[k].gain >= LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE:
+            trials.append(_best(problem, which[k], steps[k]))
+    small = [
+        one.change(LIMIT.SMALLEST_CHANGE[one.kind])
+        for one, step in zip(which, steps, strict=True)
+        if step.within
+    ]
+    hidden = [
+        Trial(one, -np.inf, None, -np.inf, equivalent=True) for one in small if problem.hides(one)
+    ]
+    return [*(trial for trial in trials if trial is not None), *hidden]
+
+
+def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
+    """The best value by a coarse grid and golden section."""
+    scores: dict[float, float] = {}
+
+    def score(xi: float) -> float:
+        alternative = quantity.change(xi)
+        grams = problem.grams(alternative)
+        if grams is None:
+            return np.inf
+        fit = quick_fit(
+            problem.standard(grams),
+            problem.barrier,
+            problem.N,
+            least_squares(grams, problem.N).sigma,
+        )
+        scores[xi] = fit.score
+        return scores[xi]
+
+    near = float(np.clip(step.xi, -quantity.span, quantity.span))
+    for xi in sorted({near * 0.5, near, float(np.clip(1.6 * near, -quantity.span, quantity.span))}):
+        score(xi)
+    if (
+        not scores
+        or min(scores.values()) > problem.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
+    ):
+        return None
+    best = min(scores, key=lambda xi: scores[xi])
+    width = 0.5 * abs(best)
+    bounds = max(best - width, -quantity.span), min(best + width, quantity.span)
+    minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
+    xi = min(scores, key=lambda xi: scores[xi])
+    if abs(xi) < LIMIT.SMALLEST_CHANGE[quantity.kind]:
+        return None
+    alternative = quantity.change(xi)
+    grams = problem.grams(alternative)
+    if grams is None:
+        return None
+    trial = problem.fitted(alternative, grams)
+    return replace(trial, gain=trial.gain - 0.5 * float(np.log(problem.N)))  # one parameter more

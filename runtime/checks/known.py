@@ -1,0 +1,113 @@
+"""The values of the robot file against the record: gravity torque and inertia torque of every
+joint, ratio and sign.
+
+    Y_j = a_j (gravity torque by the values)_j + b_j (the rest of their torque)_j + friction and
+    offset,
+
+least squares joint by joint: a_j = b_j = 1 where values, gear and sign are right. A part is left
+out where it is small or cannot be told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.checks.trials import Problem
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.model.generated import elements_of
+from runtime.model.inertia import INERTIAL
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class KnownValues(Result):
+    """Torque of the values of the robot file beside that of the record.
+
+    Attributes
+    ----------
+    joints : tuple of str
+    gravity, inertia : ndarray, shape (n,)
+        Measured over computed; nan where the part is too small.
+    error : ndarray, shape (n,), %
+        Of the torque, with friction fitted and both ratios 1.
+    complete : bool
+        Whether every link has its ten values.
+    """
+
+    joints: tuple[str, ...]
+    gravity: Array
+    inertia: Array
+    error: Array
+    complete: bool
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """The ratios outside LIMIT.CAD_RATIOS, and errors above LIMIT.CAD_ERROR, in words."""
+        texts = []
+        for name, ratios in (("gravity", self.gravity), ("inertia", self.inertia)):
+            for joint, ratio in zip(self.joints, ratios, strict=True):
+                if np.isfinite(ratio) and not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1]:
+                    texts.append(
+                        f"{name} torque of joint {joint} {ratio:.2f} times that of the values"
+                    )
+        for joint, error in zip(self.joints, self.error, strict=True):
+            if (
+                self.complete
+                and error > LIMIT.CAD_ERROR
+                and not any(f"of joint {joint} " in text for text in texts)
+            ):
+                texts.append(
+                    f"they leave {error:.0f} % of the torque of joint {joint} unexplained, "
+                    "friction fitted"
+                )
+        return tuple(texts)
+
+
+def known_values(problem: Problem) -> KnownValues | None:
+    """The comparison; None where no link has all its values."""
+    physical, s = problem.physical, problem.samples
+    given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
+    if not any(given):
+        return None
+    inertial = [
+        k for j, known in zip(physical.links, given, strict=True) if known for k in physical.link(j)
+    ]
+    chi = np.zeros(len(physical.standard))
+    chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
+    for k, name in enumerate(physical.standard):
+        if name.startswith("Ia"):
+            chi[k] = physical.values.get(name, problem.given.X[k])
+    X = physical.K @ chi
+    at_rest = np.zeros_like(s.q)
+    gravity = problem.model.regressor(s.q, at_rest, at_rest) @ X
+    whole = problem.model.regressor(s.q, s.qd, s.qdd) @ X
+    Y, mask = s.tau - s.tau_known, s.moving()
+    columns = problem.model.regressor(s.q, s.qd, s.qdd) @ physical.K
+    beside = [
+        k
+        for k, name in enumerate(physical.standard)
+        if elements_of(problem.model).get(name, ("inertia",))[0] != "inertia"
+    ]
+    ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
+    for j in range(s.n):
+        rows = mask[:, j]
+        y = Y[rows, j]
+        if len(y) < 20:
+            continue
+        friction = columns[rows][:, j, beside]
+        parts = np.column_stack([gravity[rows, j], (whole - gravity)[rows, j]])
+        left = parts - friction @ np.linalg.lstsq(friction, parts, rcond=None)[0]
+        rest = y - friction @ np.linalg.lstsq(friction, y, rcond=None)[0]
+        size = np.linalg.norm(left, axis=0)
+        errors[j] = (
+            100 * np.linalg.norm(rest - left.sum(axis=1)) / max(float(np.linalg.norm(y)), 1e-300)
+        )
+        shown = size > LIMIT.SMALL_PART * np.linalg.norm(y)
+        if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
+            ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
+    joints = tuple(str(j) for j in problem.model.JOINTS)
+    return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))

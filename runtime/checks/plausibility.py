@@ -1,0 +1,280 @@
+"""What may be wrong with a record, a study or a robot file, found by computing: one call, one Check
+for each question.
+
+    CHECKS       of the record and the robot file, then of the fit: a family of slips a file
+    EXPLAINED    of the alternatives (`runtime.checks.alternatives`), which are tried where
+                 `variants`
+                 is given, or where something else is doubtful
+
+A new check is a function of a `Case` and its line in CHECKS (docs/contributing/finding.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.checks.alternatives import times_of
+from runtime.checks.case import Case
+from runtime.checks.check import WORST, Check, worst_of
+from runtime.checks.continuous import searched
+from runtime.checks.delay import Delay
+from runtime.checks.excited import motion_excites
+from runtime.checks.gravity import Gravity
+from runtime.checks.known import KnownValues
+from runtime.checks.physics import better, delayed, direction, not_asked, physics, size, values
+from runtime.checks.rest import rest
+from runtime.checks.samples import excerpts, samples_of
+from runtime.checks.sizes import (
+    accelerations,
+    inertias,
+    lengths,
+    positions,
+    speeds,
+    times,
+    torques,
+)
+from runtime.checks.through_time import change, cut_torques, jumps
+from runtime.checks.trials import Trial, decisive, tried
+from runtime.errors import InputError
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel
+from runtime.progress import at
+from runtime.records.stream import Stream
+from runtime.rows.prepared import Source, prepared, record_of
+from runtime.settings.study import Study
+from runtime.signals.states import unwrapped
+from runtime.table import Table
+
+CHECKS: tuple[Callable[[Case], Check | None], ...] = (
+    jumps,
+    positions,
+    speeds,
+    accelerations,
+    torques,
+    lengths,
+    inertias,
+    rest,
+    motion_excites,
+    not_asked,
+    cut_torques,
+    change,
+    physics,
+    size,
+    delayed,
+    values,
+)
+EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (direction, better)
+
+
+@dataclass(frozen=True, eq=False)
+class Plausibility(
+    Result, keys="checks named:named_causes equivalent delay gravity known_values:robot_values"
+):
+    """Checks of a record, a study and a robot file.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+    trials : tuple of Trial
+        Alternatives, the best first; empty where none were tried.
+    named : tuple of Trial
+        Those that explain the record decisively better.
+    equivalent : tuple of str
+        Changes that no fit of this record can tell from the study as given.
+    delay : Delay or None
+    gravity : Gravity or None
+    robot_values : KnownValues or None
+    """
+
+    checks: tuple[Check, ...]
+    trials: tuple[Trial, ...] = ()
+    named: tuple[Trial, ...] = ()
+    equivalent: tuple[str, ...] = ()
+    delay: Delay | None = None
+    gravity: Gravity | None = None
+    robot_values: KnownValues | None = None
+
+    @property
+    def worst(self) -> Check | None:
+        """The first finding that is not good."""
+        return worst_of(self.checks)
+
+    @property
+    def named_causes(self) -> list[dict[str, Any]]:
+        """Cause, remedy and gain of the changes that are named."""
+        return [
+            {"cause": t.alternative.cause, "remedy": t.alternative.remedy, "gain": t.gain}
+            for t in self.named
+        ]
+
+    @property
+    def line(self) -> str:
+        """The worst finding in one line; "" where there is none."""
+        return (
+            ""
+            if self.worst is None
+            else f"{self.worst.question} {self.worst.finding}. {_sentence(self.worst.remedy)}"
+        )
+
+    def to_text(self) -> str:
+        """Findings that are not good, then what was found besides."""
+        lines = [
+            f"{c.state}: {c.question} {c.finding}. {_sentence(c.remedy)}"
+            for c in self.checks
+            if c.state in WORST[:2]
+        ]
+        lines += [f"no record can tell: {text}" for text in self.equivalent]
+        return "\n".join(
+            lines or ["Record, study and robot file suit each other, as far as judged."]
+        )
+
+    def table(self) -> Table:
+        """The alternatives that come nearest, errors by joint in %."""
+        rows = [
+            (t.alternative.cause, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors))
+            for t in self.trials
+            if t.fit is not None
+        ]
+        joints = (
+            len(self.trials[0].fit.errors) if self.trials and self.trials[0].fit is not None else 0
+        )
+        header = ("changed", "gain, nats", *(f"joint {j + 1} %" for j in range(joints)))
+        return Table(
+            "What would explain the record better (gain above 0), or as well",
+            header,
+            rows[:10],
+            wide=(0,),
+        )
+
+
+def plausibility(
+    model: GeneratedModel,
+    records: Source | Sequence[Source],
+    study: Study | None = None,
+    *,
+    variants: GeneratedModel | None = None,
+) -> Plausibility:
+    """Whether record, study and robot file suit each other, and what explains the record better
+    where they do not.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    records : Record, Stream, Prepared, or a sequence of them
+        Joint side, SI. Of a record that is read by blocks some excerpts are judged.
+    study : Study, optional
+        Default: Study().
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: alternatives are then tried in any case, those of the table
+        of frames too.
+    """
+    study = study or Study()
+    several = list(records) if isinstance(records, Sequence) else [records]
+    at("plausibility of the record")
+    first = times([record_of(record) for record in several])
+    case = _case(model, several, study, variants)
+    if isinstance(case, Check):
+        return Plausibility((first, case))
+    checks = [first, *(found for check in CHECKS if (found := check(case)) is not None)]
+    if case.problem is None:
+        return Plausibility(tuple(checks))
+    trials: list[Trial] = []
+    if variants is not None or worst_of(checks) is not None:
+        at("what would explain the record better")
+        trials = _ranked([*tried(case.problem, case.sides), *searched(case.problem)])
+        if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
+            text = "Not asked: the loops of the robot file would not close with others"
+            question = "Are angles and lengths of the table of frames right?"
+            checks.append(Check(question, "open", text))
+    named = decisive(trials, case.problem.given)
+    asked = EXPLAINED if trials else EXPLAINED[:1]
+    checks += [found for check in asked if (found := check(case, named)) is not None]
+    hidden = dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent)
+    return Plausibility(
+        tuple(checks),
+        tuple(t for t in trials if t.fit is not None)[:10],
+        tuple(named),
+        tuple(hidden),
+        case.late,
+        case.gravity,
+        case.robot_values,
+    )
+
+
+def _case(
+    model: GeneratedModel,
+    records: Sequence[Source],
+    study: Study,
+    variants: GeneratedModel | None,
+) -> Case | Check:
+    """What the checks read; the finding where there is nothing to read."""
+    own = [
+        prepared(model, part, study)
+        for record in records
+        for part in (excerpts(record, study) if isinstance(record, Stream) else [record])
+    ]
+    try:
+        whole = [unwrapped(one.record, study.signals, one.drives) for one in own]
+        straight = [
+            one if record is one.record else replace(one, record=record)
+            for one, record in zip(own, whole, strict=True)
+        ]
+        samples = samples_of(straight, study)
+    except InputError as e:
+        question = "Do record and robot file suit each other?"
+        return Check(question, "open", f"Not asked: {e.message}")
+    try:
+        D = np.asarray(model.regressor(samples.q, samples.qd, samples.qdd))
+    except ValueError as e:
+        return closure(str(e))
+    return Case(model, own, straight, study, samples, D, variants)
+
+
+def _ranked(trials: Sequence[Trial]) -> list[Trial]:
+    """The best first; sampling rates as one, which has to gain LIMIT.RATE_GAIN more: a slower
+    motion gives the parameters more room.
+    """
+    rates = [
+        replace(t, gain=t.gain - LIMIT.RATE_GAIN)
+        for t in trials
+        if t.alternative.kind == "rate" and t.fit is not None
+    ]
+    kept = [t for t in trials if t.alternative.kind != "rate" or t.equivalent]
+    if rates:
+        best = max(rates, key=lambda t: t.gain)
+        alike = sorted(
+            t.alternative.rate
+            for t in rates
+            if t.gain >= best.gain - LIMIT.GAIN_ALIKE * abs(best.gain)
+        )
+        cause = f"the sampling rate is {times_of(alike)} the stated one"
+        kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
+    return sorted(kept, key=lambda trial: -trial.gain)
+
+
+def closure(message: str) -> Check:
+    """The loops of the robot file do not close in the positions of the record."""
+    remedy = (
+        "look at sign, zero and order of the positions, at their unit, and at the lengths "
+        "and "
+        "the start of the loop"
+    )
+    return Check(
+        "Do the loops close in the positions of the record?",
+        "no",
+        f"No: {message}",
+        "every instant",
+        remedy,
+    )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+__all__ = ["Plausibility", "plausibility"]

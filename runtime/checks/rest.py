@@ -1,0 +1,80 @@
+"""Do the joints move while they are used? Friction at rest is no law of motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.checks.case import Case
+from runtime.checks.check import Check, State
+from runtime.checks.samples import Samples
+from runtime.errors import InputError
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of
+from runtime.rows.observe import observe
+from runtime.rows.selection import per_joint
+from runtime.settings.study import EstimateSettings, Study
+
+Array = np.ndarray
+
+
+def rest(case: Case) -> Check:
+    """Share of the instants at which a joint stands, and what leaving them out changes."""
+    model, study = case.model, case.study
+    question = "Do the joints move while they are used?"
+    limit = f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used"
+    share = standing_share(case.samples, study)
+    worst = int(np.argmax(share))
+    text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
+    proposed = low_speed_of_rest(case.samples, study)
+    if proposed is None:
+        return Check(question, "good", text, limit)
+    stated = list(proposed) if isinstance(proposed, tuple) else proposed
+    remedy = (
+        f"set rows.low_speed: {stated} ({case.units[worst]}/s), or cut the record (rows.window)"
+    )
+    try:
+        moving = replace(study, rows=replace(study.rows, low_speed=proposed))
+        without = observe(model, case.given, moving)
+    except InputError:
+        without = None
+    if case.observation is None or without is None:
+        return Check(question, "doubtful", text, limit, remedy)
+    before, after = (
+        estimate_of(rows, EstimateSettings(), model=model).relative_error
+        for rows in (case.observation, without)
+    )
+    text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
+    state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
+    return Check(question, state, text, limit, remedy)
+
+
+def standing_share(samples: Samples, study: Study) -> Array:
+    """Share of the rows of each joint at which it stands, shape (n,)."""
+    speed = np.where(
+        samples.still(), np.inf, np.abs(samples.qd)
+    )  # a joint that never moves is told as such
+    used = speed >= per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    standing = used & (speed <= samples.standing())
+    return np.asarray(standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1))
+
+
+def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
+    """rows.low_speed that leaves out the rows of joints that stand, rad/s or m/s; None where at
+    most LIMIT.REST_SHARE of them stand.
+    """
+    if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
+        return None
+    low = per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    wanted = tuple(
+        _rounded_up(max(v, x))
+        for v, x in zip(np.where(samples.still(), 0.0, samples.standing()), low, strict=True)
+    )
+    return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
+
+
+def _rounded_up(x: float) -> float:
+    """x to two digits, not below x: a threshold rounded down would keep what it is to leave out."""
+    digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
+    return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")

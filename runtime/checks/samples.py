@@ -1,0 +1,184 @@
+"""Some instants of the records, filtered once: what every check and every alternative reads.
+
+Filters are linear: a sign, a scale or an exchange of columns acts on the filtered signals as on the
+measured ones, and a wrong rate
+scales velocities and accelerations. So an alternative costs the regressor at these instants and
+nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.limits import LIMIT
+from runtime.records.missing import Missing
+from runtime.records.record import Record
+from runtime.records.stream import PieceReader, Stream
+from runtime.rows.prepared import Prepared
+from runtime.rows.selection import window_of
+from runtime.settings.study import Study
+from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_filtered
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Filtered states and torques at K instants.
+
+    Attributes
+    ----------
+    t : ndarray, shape (K,), s
+    q, qd, qdd : ndarray, shape (K, n), rad or m, per s, per s^2
+    tau : ndarray, shape (K, n), N m or N
+        Measured at the joints, before known torques are subtracted.
+    tau_known : ndarray, shape (K, n), N m or N
+        Known torques.
+    record : ndarray of int, shape (K,)
+        Number of the record of each instant.
+    cutoff : float, Hz
+        Of the low-pass.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+    tau_known: Array
+    record: Array
+    cutoff: float
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def standing(self) -> Array:
+        """Speed below which each joint is taken to stand, shape (n,), rad/s or m/s."""
+        return np.asarray(LIMIT.STANDING * np.abs(self.qd).max(axis=0))
+
+    def moving(self) -> Array:
+        """Whether each joint moves at each instant, bool (K, n)."""
+        return np.asarray((np.abs(self.qd) > self.standing()) & (np.abs(self.qd) > 0))
+
+    def still(self) -> Array:
+        """Whether each joint stands still in the whole record, (n,)."""
+        return np.asarray(np.ptp(self.q, axis=0) < LIMIT.STILL)
+
+    def constant(self) -> Array:
+        """Whether the torque of each joint never changes, (n,)."""
+        size = np.maximum(np.abs(self.tau).max(axis=0), 1e-12)
+        return np.asarray(np.ptp(self.tau, axis=0) <= 1e-9 * size)
+
+    def take(self, chosen: Array) -> Samples:
+        """The instants of an index or a mask."""
+        arrays = {
+            name: getattr(self, name)[chosen]
+            for name in ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
+        }
+        return replace(self, **arrays)
+
+    def thinned(self, most: int) -> Samples:
+        """At most `most` instants, evenly drawn."""
+        step = -(-len(self) // most)
+        return self if step <= 1 else self.take(np.arange(0, len(self), step))
+
+
+def excerpts(stream: Stream, study: Study) -> list[Record]:
+    """EXCERPTS of a stream, evenly spread over the window; the whole of a short one."""
+    start, stop = window_of(stream.times(), study.rows.window, stream.name)
+    number, length = LIMIT.EXCERPTS
+    if stop - start <= number * length:
+        number, length = 1, stop - start
+    reader = PieceReader(stream)
+    begins = map(int, np.linspace(start, stop - length, number))
+    return [_excerpt(stream, *reader.read(a, a + length)) for a in begins]
+
+
+def _excerpt(stream: Stream, t: Array, q: Array, tau: Array, gaps: Array) -> Record:
+    missing = Missing(gaps, stream.follows) if gaps.any() else None
+    return Record(t, q, tau, name=stream.name, origin=stream.origin, missing=missing)
+
+
+def samples_of(
+    records: Sequence[Record | Prepared], study: Study, most: int = LIMIT.INSTANTS_KEPT
+) -> Samples:
+    """Filtered instants of all records, in their windows, at most `most`.
+
+    The cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that
+    is lower.
+
+    Raises
+    ------
+    InputError
+        Records too short for the filters.
+    """
+    own = [one if isinstance(one, Prepared) else Prepared(one, study) for one in records]
+    parts = [_filtered(one, study, number) for number, one in enumerate(own)]
+    names = ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
+    return every.thinned(most)
+
+
+def motion_cutoff(record: Record, study: Study) -> float:
+    """Cut-off of the low-pass, Hz: that of the study, or LIMIT.DYNAMIC times the frequency of the
+    motion where that is lower.
+    """
+    low = study.signals.lowpass
+    most = min(low.cutoff if low is not None else np.inf, 0.4 * record.rate)
+    power = np.abs(np.fft.rfft(np.diff(record.q - record.q.mean(axis=0), axis=0), axis=0)) ** 2
+    total = power.sum(axis=0)
+    f = np.fft.rfftfreq(len(record) - 1, 1 / record.rate)
+    shares = np.cumsum(power, axis=0) / np.where(total > 0, total, 1.0)
+    frequency = max(
+        (f[int(np.searchsorted(shares[:, j], 0.95))] for j in range(record.n) if total[j] > 0),
+        default=0.0,
+    )
+    return float(min(most, max(LIMIT.DYNAMIC * frequency, 20 * record.rate / len(record))))
+
+
+def moved(own: Prepared, study: Study, low: Lowpass) -> States:
+    """States of the positions as they are through another low-pass, shape (N, n) each."""
+    return own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
+
+
+def _filtered(own: Prepared, study: Study, number: int) -> Samples:
+    """One record, one sample in about 0.8 rate/(2 cutoff)."""
+    record = own.record
+    cutoff = motion_cutoff(record, study)
+    low = Lowpass(cutoff=cutoff)
+    states = moved(own, study, low)
+    known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
+    tau, known = (
+        lowpass_filtered(median_filtered(x, study.signals.median), record.rate, low)
+        for x in (record.tau, known)
+    )
+    step = max(1, int(0.8 * record.rate / (2 * cutoff)))
+    t0, t1 = study.rows.window
+    inside = (record.t >= (-np.inf if t0 is None else t0)) & (
+        record.t <= (np.inf if t1 is None else t1)
+    )
+    if record.missing is not None:
+        inside &= ~record.missing.near_gaps(step, 3 * step)
+    kept = np.flatnonzero(inside)[3 * step : -3 * step : step]
+    if len(kept) < 2:
+        raise InputError("no sample in the window", file=record.name)
+    return Samples(
+        record.t[kept],
+        states.q[kept],
+        states.qd[kept],
+        states.qdd[kept],
+        tau[kept],
+        known[kept],
+        np.full(len(kept), number),
+        cutoff,
+    )

@@ -1,0 +1,201 @@
+"""Before any fit: are positions, speeds, accelerations, torques and lengths those of this robot?
+
+Against `limits` of the robot file where it has them, against sane sizes otherwise. Sane sizes are
+conventions: an industrial joint turns a few rad/s and less than a turn or two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from runtime.checks.case import Case
+from runtime.checks.check import Check, State
+from runtime.estimators.physical import frame_origins
+from runtime.limits import LIMIT
+from runtime.model.inertia import PhysicalModel
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+
+Array = np.ndarray
+
+
+def times(records: Sequence[Record | Stream]) -> Check:
+    """Sampling rate and duration of the records."""
+    question, limit = (
+        "Are the times those of a log?",
+        f"{LIMIT.LOG_RATES[0]:g} Hz to {LIMIT.LOG_RATES[1] / 1e3:g} kHz",
+    )
+    record = min(records, key=lambda one: one.rate)
+    duration = len(record) / record.rate
+    text = f"{record.rate:.4g} Hz over {duration:.4g} s"
+    wrong = any(not LIMIT.LOG_RATES[0] <= one.rate <= LIMIT.LOG_RATES[1] for one in records)
+    remedy = "look at the unit of the time column (record.units.t: ms, us) and at record.rate"
+    return Check(question, "no" if wrong else "good", text, limit, remedy)
+
+
+def positions(case: Case) -> Check:
+    """Largest |q| against limits.q, else against a turn or two."""
+    question = "Are the positions those of this robot?"
+    q, turning = case.samples.q, case.turning
+    low, high = q.min(axis=0), q.max(axis=0)
+    largest = np.maximum(-low, high)
+    limits = case.limits("q", 2)
+    if limits is not None:
+        room = limits[:, 1] - limits[:, 0]
+        excess = np.maximum(limits[:, 0] - low, high - limits[:, 1])
+        out, far = excess > (LIMIT.LIMIT_EXCESS - 1) * room, high - low > 2 * room
+        limit = "limits.q of the robot file"
+    else:
+        angle, travel = LIMIT.LARGEST_ANGLE, LIMIT.LARGEST_TRAVEL
+        out, far = (largest > np.where(turning, *pair) for pair in zip(angle, travel, strict=True))
+        limit = f"{angle[0]:.3g} rad, {travel[0]:g} m (no limits.q in the robot file)"
+    rests = case.samples.still()
+    if not out.any() and rests.any() and len(rests) > 1:
+        several = int(np.count_nonzero(rests)) > 1
+        text = f"Joint{'s' * several} {case.joints(rests)} {'stand' if several else 'stands'} still"
+        remedy = "look at the columns of these positions; their parameters cannot be identified"
+        return Check(question, "doubtful", f"{text} in the whole record", limit, remedy)
+    shown = out if out.any() else np.arange(len(out)) == np.argmax(largest)
+    text = f"They reach {case.reaching(largest, case.units, shown)}"
+    if not out.any():
+        return Check(question, "good", text, limit)
+    turns = largest[turning]
+    degrees = (
+        bool((out & turning).any())
+        and float(np.median(turns)) * np.pi / 180 < 2 * np.pi
+        and float(turns.max()) > 2 * LIMIT.LARGEST_ANGLE[0]
+    )
+    remedy = (
+        "degrees read as rad? set record.units.q: deg; or motor side read as joint side "
+        "(record.side)"
+        if degrees
+        else "look at zero and sign of these joints (theta, drives.offset, ratio), the order of "
+        "the columns, the unit and the side of the positions"
+    )
+    return Check(question, "no" if far.any() or degrees else "doubtful", text, limit, remedy)
+
+
+def _against(
+    case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]], unit: str
+) -> tuple[State, str, str]:
+    units = [f"{one}/{unit}" for one in case.units]
+    limits = case.limits(key)
+    if limits is not None:
+        out, far, limit = (
+            values > 1.5 * limits,
+            values > 4 * limits,
+            f"limits.{key} of the robot file",
+        )
+    else:
+        bounds = np.array([sane[one] for one in case.units])
+        out, far = values > bounds.T
+        limit = f"{sane['rad'][0]:g} rad/{unit}, {sane['m'][0]:g} m/{unit}"
+    shown = out if out.any() else np.arange(len(out)) == int(np.argmax(values))
+    state: State = "no" if far.any() else "doubtful" if out.any() else "good"
+    return state, f"They reach {case.reaching(values, units, shown)}", limit
+
+
+def speeds(case: Case) -> Check:
+    """Largest speed of every joint; one that is far too slow too."""
+    largest = np.abs(case.samples.qd).max(axis=0)
+    state, text, limit = _against(case, "qd", largest, LIMIT.LARGEST_SPEED, "s")
+    remedy = (
+        "look at the sampling rate and the unit of time (record.rate, units.t), then at the "
+        "unit and the side of the positions"
+    )
+    if float(largest.max()) < LIMIT.NOTHING_MOVES:
+        state, text = "no", f"{text}: nothing moves"
+    return Check("Are the speeds those of this robot?", state, text, limit, remedy)
+
+
+def accelerations(case: Case) -> Check:
+    """Largest acceleration of every joint."""
+    largest = np.abs(case.samples.qdd).max(axis=0)
+    state, text, limit = _against(case, "qdd", largest, LIMIT.LARGEST_ACCELERATION, "s^2")
+    remedy = (
+        "look at the sampling rate and the unit of time; noise of the positions asks for a "
+        "lower signals.lowpass.cutoff"
+    )
+    state = "doubtful" if state == "no" and limit.startswith("limits") else state
+    return Check("Are the accelerations those of this robot?", state, text, limit, remedy)
+
+
+def torques(case: Case) -> Check:
+    """Largest torque against limits.tau, where the robot file gives them; torques that never
+    change.
+    """
+    question = "Are the torques those of this robot?"
+    remedy = (
+        "look at the unit, the side and the columns of the torques (record.units.tau, "
+        "torque_side, columns.tau)"
+    )
+    limits, limit = case.limits("tau"), "limits.tau of the robot file"
+    if (flat := case.samples.constant()).any():
+        text = f"The torque of joint {case.joints(flat)} is constant"
+        return Check(question, "no", text, "torques that change", remedy)
+    if limits is None:
+        text = "They change on every joint; the robot file gives no limits.tau"
+        return Check(question, "good", text, limit)
+    largest = np.abs(case.samples.tau).max(axis=0)
+    if (out := largest > 1.5 * limits).any():
+        units = np.where(case.turning, "N m", "N").tolist()
+        return Check(
+            question, "no", f"They reach {case.reaching(largest, units, out)}", limit, remedy
+        )
+    share = 100 * float((largest / limits).max())
+    if share < 1:
+        text = f"They reach {share:.2g} % of limits.tau at most"
+        return Check(question, "doubtful", text, limit, remedy)
+    return Check(question, "good", f"They reach {share:.0f} % of limits.tau", limit)
+
+
+def lengths(case: Case) -> Check | None:
+    """Reach and the longest link of the robot file, in the positions of the record."""
+    limit = f"links up to {LIMIT.LONGEST_LINK:g} m, none {LIMIT.LOPSIDED:g} times the others"
+    P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
+    if P is None or not P.shape[1]:
+        return None
+    P = np.concatenate([np.zeros_like(P[:, :1]), P], axis=1)
+    spans = np.linalg.norm(np.diff(P, axis=1), axis=-1).max(axis=0)
+    spans = np.where(np.isfinite(spans), spans, 0.0)
+    worst, longest, whole = int(np.argmax(spans)), float(spans.max()), float(spans.sum())
+    text = f"The longest link ends at frame {worst + 1}: {longest:.4g} m of {whole:.4g} m in all"
+    lopsided = longest > LIMIT.LOPSIDED * max(whole - longest, 1e-9)
+    state: State = "doubtful" if lopsided and np.count_nonzero(spans > 1e-9) > 1 else "good"
+    if longest > LIMIT.LONGEST_LINK or 0 < whole < LIMIT.SHORTEST_REACH:
+        state = "no"
+    remedy = "" if state == "good" else "give d and r of the robot file in m"
+    return Check("Are the lengths those of an arm?", state, text, limit, remedy)
+
+
+def inertias(case: Case) -> Check | None:
+    """Whether the values of the robot file are those of bodies: every pseudo-inertia positive
+    semidefinite.
+    """
+    if case.physical is None or not case.physical.values:
+        return None
+    question = "Can bodies have the values of the robot file?"
+    limit = "pseudo-inertia of every link not negative; inertia about the origin of the link frame"
+    wrong = list(_wrong_links(case.physical))
+    if not wrong:
+        return Check(question, "good", "Every link with ten values can exist", limit)
+    remedy = (
+        "give inertias about the origin of the link frame, not about the centre of mass; XY "
+        "= "
+        "-integral x y dm; kg m^2"
+    )
+    return Check(
+        question, "doubtful", f"No body has those of link {', '.join(wrong)}", limit, remedy
+    )
+
+
+def _wrong_links(physical: PhysicalModel) -> Iterator[str]:
+    for condition in physical.conditions:
+        names = [physical.standard[k] for k in condition.numbers]
+        if condition.name.startswith("link ") and all(name in physical.values for name in names):
+            chi = np.array([physical.values.get(name, 0.0) for name in physical.standard])
+            P = condition.matrix(chi)
+            if np.linalg.eigvalsh(P)[0] < -1e-3 * max(abs(np.trace(P)), 1e-12):
+                yield condition.name.removeprefix("link ")

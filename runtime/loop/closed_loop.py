@@ -1,0 +1,417 @@
+"""The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and
+CLOE compare the record with.
+
+    loop = closed_loop(model, records, study, simulator)
+    observation = loop.measured()             Y = W X + rho, to which the loop stays attached
+    runs = loop.run(X, g)                     one simulation per record, exact states, no noise, no
+                                              steps
+    loop.instruments(runs, observation)       Z = F_p[W(q_s, ...)], q_s through the filters of the
+                                              record                   IDIM-IV
+    loop.motion(runs, observation)            Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the
+                                              decimation alone       DIDIM
+
+g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands
+between position error and torque: the bandwidth
+of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by
+the velocity of the reference, never by that
+of the measured positions: a choice that depends on noise biases every method. Slow rows of joint j
+(`rows.low_speed`) are those where a dry friction
+that acts on it, coupled ones of a wrist included, slips slower: at rest its torque is anything
+between -FS and FS, not W X, and the decimation smears
+that into the rows `around`. Instants with the torque at its limit are left out.
+
+Where the reference is not known (`reference: measured`), the measured motion through the filters
+stands for it: then the instruments carry the
+noise of the same run, and DIDIM is output error about itself. The Estimate says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.ndimage import minimum_filter1d
+
+from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
+from runtime.loop.law_check import LawFit, law_fits, law_text
+from runtime.loop.reference import Reference, of_record, reference_of, require_rate
+from runtime.loop.result import Simulation
+from runtime.model.generated import GeneratedModel
+from runtime.progress import at
+from runtime.records.record import Record
+from runtime.rows.observation import LoopRows, Observation, stack
+from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states, prepared
+from runtime.rows.selection import Selection, certain_rows, select_rows
+from runtime.settings.controller import Controller
+from runtime.settings.study import Study
+from runtime.signals.counts.reading import REACH
+from runtime.signals.filters import States, decimated, filtered_states
+
+if TYPE_CHECKING:
+    from runtime.loop.simulation import Simulator  # CasADi
+
+Array = np.ndarray
+
+ASSUMED = (
+    "The reference of this record is not known; the measured motion through the filters stands for "
+    "it. Instruments then carry the noise of the same run, "
+    "and a simulated motion is compared with itself: bias is removed only as far as the noise does "
+    "not pass the loop."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopPart:
+    """One record.
+
+    Attributes
+    ----------
+    prepared : Prepared
+        The record as the study reads it.
+    reference : Reference
+        What the controller followed, at its rate; T ticks.
+    selection : Selection
+        Rows used.
+    torque : ndarray, shape (n, K), N m or N
+        Y before rows are left out.
+    feedforward, disturbance : ndarray, shape (T, n), N m or N, or None
+        Recorded feed-forward torque, and the known torque with the opposite sign: what acts on the
+        arm beside drives and model.
+    """
+
+    prepared: Prepared
+    reference: Reference
+    selection: Selection
+    torque: Array
+    feedforward: Array | None = None
+    disturbance: Array | None = None
+
+    @property
+    def record(self) -> Record:
+        """The record itself."""
+        return self.prepared.record
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What a simulation of this record takes beside parameters and reference."""
+        return {
+            "start": self.record.q[0],
+            "disturbance": self.disturbance,
+            "feedforward": self.feedforward,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """The records with their loop. `assumption`: what was assumed about the reference; empty where
+    it is known. `law`: what the control law explains of them.
+    """
+
+    model: GeneratedModel
+    study: Study
+    simulator: Simulator
+    parts: tuple[LoopPart, ...]
+    assumption: str = ""
+    law: tuple[LawFit, ...] = ()
+
+    def run(self, X: Array, g: Array | float = 1.0) -> list[Simulation]:
+        """One simulation per record with all base parameters X (b,), from the measured position at
+        its start, at rest.
+        """
+        return [
+            self.simulator.run(X, part.reference, g=g, ideal=True, **part.given)
+            for part in self.parts
+        ]
+
+    def torques(self, runs: Sequence[Simulation]) -> list[Array]:
+        """Torque of the drives in each run, (N, n), without the known torque of its record: what is
+        beside `Record.torque`.
+        """
+        pairs = zip(runs, (part.record.tau_known for part in self.parts), strict=True)
+        return [run.tau if known is None else run.tau[: len(known)] - known for run, known in pairs]
+
+    def measured(self) -> Observation:
+        """Y = W X + rho of the measured positions on the rows of the loop, which it carries
+        along.
+        """
+        states = [p.prepared.states for p in self.parts]
+        observation = self._observed([replace(s, errors=None) for s in states])
+        observation = replace(
+            observation, closed_loop=LoopRows(self, np.arange(len(observation.Y)))
+        )
+        if all(s.errors is None for s in states):
+            return observation
+        certain = [
+            certain_rows(self.model, s[p.selection.samples][p.selection.kept])
+            for s, p in zip(states, self.parts, strict=True)
+        ]
+        used = [
+            c[j, p.selection.mask[j]]
+            for j in range(observation.n)
+            for c, p in zip(certain, self.parts, strict=True)
+        ]
+        return observation.where(np.concatenate(used))
+
+    def instruments(self, runs: Sequence[Simulation], observation: Observation) -> Observation:
+        """The rows and columns of `observation` with Z of the simulated positions, through the
+        filters of the record, in place of W.
+        """
+        pairs = zip(runs, self.parts, strict=True)
+        return self._like(
+            observation,
+            [
+                filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals)
+                for run, p in pairs
+            ],
+        )
+
+    def motion(self, runs: Sequence[Simulation], observation: Observation) -> Observation:
+        """The rows and columns of `observation` with Z of the exact simulated states in
+        place of W.
+        """
+        sizes = [len(part.record) for part in self.parts]
+        return self._like(
+            observation,
+            [
+                States(run.q[:N], run.qd[:N], run.qdd[:N])
+                for run, N in zip(runs, sizes, strict=True)
+            ],
+        )
+
+    def sensitivity(self, X: Array) -> list[tuple[Simulation, Any]]:
+        """One simulation per record, with its derivatives by X."""
+        return [self.simulator.sensitivity(X, part.reference, **part.given) for part in self.parts]
+
+    def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
+        """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of
+        `observation`: shape (r,) or (r, c).
+        """
+        assert observation.closed_loop is not None
+        by_joint: list[Array] = []
+        kept = [self._decimated(x, part) for x, part in zip(signals, self.parts, strict=True)]
+        for j in range(len(self.model.JOINTS)):
+            by_joint += [
+                x[j][..., part.selection.mask[j]].T
+                for x, part in zip(kept, self.parts, strict=True)
+            ]
+        return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
+
+    def _decimated(self, x: Array, part: LoopPart) -> Array:
+        """(N, n, ...) to (n, ..., K)."""
+        chosen = np.moveaxis(x[: len(part.record)][part.selection.samples], 0, -1)
+        return decimated(
+            np.ascontiguousarray(chosen), part.selection.factor, part.selection.signals.decimate
+        )
+
+    def inertia(self, X: Array) -> Array:
+        """J_j, shape (n,): mean of A_jj over the references."""
+        functions: Any = self.model
+        q = np.concatenate(
+            [part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts]
+        )
+        return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
+
+    def _like(self, observation: Observation, states: Sequence[States]) -> Observation:
+        assert observation.closed_loop is not None
+        Z = self._observed(states).columns(observation.names).W
+        return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
+
+    def _observed(self, states: Sequence[States]) -> Observation:
+        observation = [
+            observation_from_states(
+                self.model, s, part.torque, part.selection, files=part.record.files
+            )
+            for s, part in zip(states, self.parts, strict=True)
+        ]
+        return observation[0] if len(observation) == 1 else stack(observation)
+
+
+def closed_loop(
+    model: GeneratedModel,
+    records: Sequence[Record | Prepared],
+    study: Study,
+    simulator: Simulator,
+    *,
+    reference: str = "known",
+    around: float = 0.0,
+    keep: Sequence[Array] = (),
+) -> ClosedLoop:
+    """The loop of a study with a section `controller`.
+
+    reference : "known" (that of the settings, or the columns qr1 ... of each record), or
+    "measured".
+    around : s; rows so near to slow ones (`rows.low_speed`) are left out too.
+    keep : bool, shape (N,) or (N, n) per record: samples that may be used.
+    """
+    if reference not in ("known", "measured"):
+        raise SettingsError(
+            f"{reference!r}; expected known or measured", path=("estimate", "options", "reference")
+        )
+    if not around >= 0:
+        raise SettingsError(
+            f"{around} s; expected 0 or more", path=("estimate", "options", "around")
+        )
+    controller = simulator.controller
+    parts = []
+    measured = [prepared(model, record, study) for record in records]
+    for k, own in enumerate(measured):
+        record = own.record
+        require_rate(record, controller)
+        rate = controller.rate / controller.record_every
+        if controller.feedforward == "record" and record.tau_ff is None:
+            raise SettingsError(
+                (
+                    f"{record.file} holds no feed-forward torque; name its columns in "
+                    "record.columns.tau_ff"
+                ),
+                path=("controller", "feedforward"),
+            )
+        followed = _reference(model, measured, k, controller, reference)
+        every = controller.record_every
+        if len(followed) // every + (len(followed) % every > 0) < len(record):
+            raise InputError(
+                (
+                    f"the reference ends after {len(followed) / controller.rate:g} s, the record "
+                    "after "
+                    f"{record.t[-1] - record.t[0]:g} s"
+                ),
+                file=record.file,
+            )
+        wanted = slowest(
+            slips(followed.qd[::every][: len(record)], simulator.friction.G), round(around * rate)
+        )
+        selection = select_rows(
+            record,
+            wanted,
+            study.signals,
+            study.rows,
+            keep=_usable(simulator, record, keep[k] if k < len(keep) else None),
+        )
+        known = (
+            None if record.tau_known is None else -_at_ticks(record.tau_known, every, len(followed))
+        )
+        fed = (
+            _at_ticks(record.tau_ff, every, len(followed))
+            if controller.feedforward == "record" and record.tau_ff is not None
+            else None
+        )
+        parts.append(
+            LoopPart(
+                own, followed, selection, decimated_torque(record.torque, selection), fed, known
+            )
+        )
+    if reference == "measured":
+        return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED)
+    references, selections = [part.reference for part in parts], [part.selection for part in parts]
+    fits = law_fits(
+        simulator.law,
+        [own.record for own in measured],
+        references,
+        selections,
+        controller,
+        model.JOINTS,
+    )
+    at(law_text(fits))
+    return ClosedLoop(model, study, simulator, tuple(parts), "", fits)
+
+
+def _at_ticks(x: Array, every: int, ticks: int) -> Array:
+    """Samples (N, n) at the ticks of the controller, (T, n), by straight lines; the last
+    one held.
+    """
+    places = np.arange(ticks) / every
+    return np.column_stack([np.interp(places, np.arange(len(x)), column) for column in x.T])
+
+
+def _reference(
+    model: GeneratedModel,
+    records: Sequence[Prepared],
+    k: int,
+    controller: Controller,
+    reference: str,
+) -> Reference:
+    """What the controller followed in record k, at its rate."""
+    record = records[k].record
+    if reference == "measured":
+        states = records[k].states
+        if controller.record_every == 1:
+            return Reference(controller.rate, states.q, states.qd, states.qdd)
+        ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every
+        each = [
+            np.column_stack([np.interp(ticks, np.arange(len(x)), column) for column in x.T])
+            for x in (states.q, states.qd, states.qdd)
+        ]
+        return Reference(controller.rate, *each)
+    if record.q_r is not None:
+        return of_record(record, controller)
+    given = controller.reference
+    if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
+        raise SettingsError(
+            f"what the controller followed in {record.file} is not known; give columns qr1 ... "
+            "(record.columns.qr) or controller.reference, or say "
+            "estimate.options.reference: measured",
+            path=("controller", "reference"),
+        )
+    if len(records) > 1 and given.record is None:
+        raise SettingsError(
+            f"one reference for {len(records)} records; give each record its columns qr1 ...",
+            path=("controller", "reference"),
+        )
+    return reference_of(
+        replace(controller, reference=replace(given, limits="ignore")),
+        model,
+        records=[own.record for own in records],
+    )
+
+
+def slips(qd: Array, G: Array) -> Array:
+    """Smallest speed of what rubs on each joint, its own included, shape (N, n).   qd : (N, n).   G
+    : (elements, n), slips G qd of dry friction.
+    """
+    speed: Array = np.abs(qd)
+    for element in G:
+        acts = np.flatnonzero(element)
+        speed[:, acts] = np.minimum(speed[:, acts], np.abs(qd @ element)[:, None])
+    return speed
+
+
+def slowest(speed: Array, samples: int) -> Array:
+    """Smallest of each column of speed, (N, n), so many samples before and after."""
+    return (
+        speed
+        if samples == 0
+        else np.asarray(minimum_filter1d(speed, 2 * samples + 1, axis=0, mode="nearest"))
+    )
+
+
+def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:
+    """`keep`, and the samples whose torque is not at its limit and whose positions are there or
+    missing for a moment only.
+    """
+    bound = np.broadcast_to(np.asarray(simulator.law.saturation, dtype=float), (record.n,))
+    if not np.isfinite(bound).any() and record.missing is None:
+        return keep
+    free: Array = np.abs(record.tau) <= LIMIT.CLIPPED * bound
+    if record.missing is not None:
+        free &= ~record.missing.near_gaps(
+            round(REACH / 2 * record.rate), round(REACH * record.rate)
+        )[:, None]
+    return free if keep is None else free & (keep if keep.ndim == 2 else keep[:, None])
+
+
+def loop_of(observation: Observation, method: str) -> ClosedLoop:
+    """The loop of an observation; raises SettingsError where `method` was asked for and there is
+    none.
+    """
+    if observation.closed_loop is None:
+        raise SettingsError(
+            f"{method} simulates the closed loop of the record, and this study tells none; give a "
+            "section `controller` with law, rate and reference "
+            "(symgen identify then makes it), or use ols, wls, irls or tls",
+            path=("estimate", "method"),
+        )
+    loop: ClosedLoop = observation.closed_loop.loop
+    return loop

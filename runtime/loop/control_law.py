@@ -1,0 +1,255 @@
+"""The laws of a controller as one: u = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  dI/dt = Ie e
++ Ir qd_r - Im qd_m,  torque = g sat(u).
+
+    pid      P = kp       Vr = Vm = kd                K = ki   Ie = 1    Ir = Im = 0
+    cascade  P = kv kp    Vr = kv cv    Vm = kv       K = ki   Ie = kp   Ir = cv   Im = 1
+
+all of P, Vr, Vm, K times the gain of the drive. g scales everything between position error and
+torque, the saturation too: with
+g_j = J_j(X)/J_j(reference) a simulation with other parameters keeps the bandwidth of the real loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import SettingsError
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel, drives_of
+from runtime.settings.controller import Controller
+from runtime.settings.schema import PerJoint
+
+Array = np.ndarray
+
+VECTORS = (
+    "P",
+    "Vr",
+    "Vm",
+    "K",
+    "Ie",
+    "Ir",
+    "Im",
+    "antiwindup",
+    "saturation",
+    "torque_step",
+    "encoder_step",
+    "g",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlLaw:
+    """The numbers of a closed loop of n joints, SI, joint side.
+
+    Attributes
+    ----------
+    P, Vr, Vm, K, Ie, Ir, Im : ndarray, shape (n,)
+        Gains of the head of this module.
+    antiwindup, saturation : ndarray, shape (n,)
+        Largest |I|, and largest |u| before g.
+    torque_step : ndarray, shape (n,), N m or N
+        Step of the converter.
+    encoder_step, encoder_noise : ndarray, shape (n,), rad or m
+        Step and deviation of the noise, on the side of R.
+    ca : ndarray, shape (n,)
+        Gain of qdd_r.
+    rate : float, Hz
+    delay : int
+        Ticks from the position to its torque, 0 or 1.
+    averaged : bool
+        Whether the velocity is the mean difference over two ticks.
+    R, offset : ndarray, shape (n, n) and (n,)
+        The encoder shows R (q - offset).
+    """
+
+    P: Array
+    Vr: Array
+    Vm: Array
+    K: Array
+    Ie: Array
+    Ir: Array
+    Im: Array
+    antiwindup: Array
+    saturation: Array
+    torque_step: Array
+    encoder_step: Array
+    encoder_noise: Array
+    ca: Array
+    rate: float
+    delay: int
+    averaged: bool
+    R: Array
+    offset: Array
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.P)
+
+    def matrix(self, g: Array, *, ideal: bool) -> Array:
+        """`law` of a tick, (n, columns): the vectors, R, R^-1, offset. ideal : no steps of encoder
+        and converter.
+        """
+        vectors = {name: getattr(self, name) for name in VECTORS if name != "g"} | {"g": g}
+        if ideal:
+            vectors |= {"encoder_step": np.zeros(self.joints), "torque_step": np.zeros(self.joints)}
+        return np.column_stack(
+            [*(vectors[name] for name in VECTORS), self.R, np.linalg.inv(self.R), self.offset]
+        )
+
+    def shown(self, q: Array) -> Array:
+        """What the encoders show of joint positions q (n,)."""
+        step = np.where(self.encoder_step > 0, self.encoder_step, 1.0)
+        qm = self.R @ (q - self.offset)
+        return np.asarray(
+            np.linalg.solve(
+                self.R, np.where(self.encoder_step > 0, step * np.floor(qm / step + 0.5), qm)
+            )
+            + self.offset
+        )
+
+    @property
+    def flags(self) -> Array:
+        """T, delay, weights of (y_k - y_(k-1))/T and (y_k - y_(k-2))/T in qd_m."""
+        return np.array(
+            [
+                1 / self.rate,
+                self.delay,
+                0.0 if self.averaged else 1.0,
+                0.5 if self.averaged else 0.0,
+            ]
+        )
+
+
+def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
+    """The numbers of the settings for the joints of a model; SettingsError where they do
+    not fit.
+    """
+    n, law = len(model.JOINTS), controller.law
+
+    def each(path: str, value: PerJoint[float] | None, absent: float = 0.0) -> Array:
+        x = np.atleast_1d(np.asarray(absent if value is None else value, dtype=float))
+        if len(x) not in (1, n):
+            raise SettingsError(
+                f"{len(x)} values; expected one or {n}, one per joint of {model.NAME}",
+                path=("controller", *path.split(".")),
+            )
+        return np.broadcast_to(x, (n,)).copy()
+
+    gain, kp, kd, kv, ki, cv, ca = (
+        each(f"law.{key}", getattr(law, key))
+        for key in ("gain", "kp", "kd", "kv", "ki", "cv", "ca")
+    )
+    if not kp.all():
+        raise SettingsError(
+            f"{law.kp}; expected a gain for every joint: nothing else holds its position",
+            path=("controller", "law", "kp"),
+        )
+    one, zero = np.ones(n), np.zeros(n)
+    if law.kind == "pid":
+        gains = {"P": kp, "Vr": kd, "Vm": kd, "K": ki}
+        integral = {"Ie": one, "Ir": zero, "Im": zero}
+    else:
+        gains = {"P": kv * kp, "Vr": kv * cv, "Vm": kv, "K": ki}
+        integral = {"Ie": kp, "Ir": cv, "Im": one}
+    drives = (
+        drives_of(model) if controller.encoder.side == "motor" else Drives(np.eye(n), zero, one)
+    )
+    if drives is None:
+        raise SettingsError(
+            f"motor; {model.NAME} has no drives", path=("controller", "encoder", "side")
+        )
+    return ControlLaw(
+        **{key: gain * x for key, x in gains.items()},
+        **integral,
+        antiwindup=each("law.antiwindup", law.antiwindup, np.inf),
+        saturation=each("torque.saturation", _saturation(controller, model.LIMITS), np.inf),
+        torque_step=each("torque.step", controller.torque.step),
+        encoder_step=each("encoder.step", controller.encoder.step),
+        encoder_noise=each("encoder.noise", controller.encoder.noise),
+        ca=gain * ca,
+        rate=controller.rate,
+        delay=controller.delay,
+        averaged=controller.velocity == "averaged",
+        R=drives.ratio,
+        offset=drives.offset,
+    )
+
+
+def _saturation(controller: Controller, limits: Mapping[str, Any]) -> PerJoint[float] | None:
+    given = controller.torque.saturation
+    if given != "limits":
+        return given
+    return tuple(limits["tau"]) if "tau" in limits else None
+
+
+def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
+    """Poles of the sampled loop about a point at rest: inertia A (n, n), viscous friction B (n, n),
+    torque held between ticks.
+
+    State: q, qd, y1, y2, I, u. An integral that acts on nothing is left out.
+    """
+    n, T = law.joints, 1 / law.rate
+    Phi, Gamma = _held(A, B, T)
+    last, average = law.flags[2:]
+    one, zero = np.eye(n), np.zeros((n, n))
+    difference = np.hstack(
+        [(last + average) / T * one, zero, -last / T * one, -average / T * one, zero, zero]
+    )  # qd_m
+    position = np.hstack([one, *[zero] * 5])
+    u = (
+        -law.P[:, None] * position
+        - law.Vm[:, None] * difference
+        + law.K[:, None] * np.hstack([*[zero] * 4, one, zero])
+    )
+    tau = g[:, None] * (np.hstack([*[zero] * 5, one]) if law.delay else u)
+    integral = np.hstack([*[zero] * 4, one, zero]) - T * (
+        law.Ie[:, None] * position + law.Im[:, None] * difference
+    )
+    following = np.vstack(
+        [
+            np.hstack([Phi, np.zeros((2 * n, 4 * n))]) + Gamma @ tau,
+            position,
+            np.hstack([zero, zero, one, *[zero] * 3]),
+            integral,
+            u,
+        ]
+    )
+    acting = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, law.delay == 1)])
+    return np.asarray(np.linalg.eigvals(following[np.ix_(acting, acting)]))
+
+
+def continuous_pole(law: ControlLaw, A: Array, B: Array, g: Array) -> float:
+    """Modulus of the fastest pole of the loop with continuous control, 1/s."""
+    n = law.joints
+    one, zero = np.eye(n), np.zeros((n, n))
+    inverse = np.linalg.inv(A)
+    P, Vm, K = (np.diag(g * x) for x in (law.P, law.Vm, law.K))
+    rates = np.vstack(
+        [
+            np.hstack([zero, one, zero]),
+            np.hstack([-inverse @ P, -inverse @ (Vm + B), inverse @ K]),
+            np.hstack([-np.diag(law.Ie), -np.diag(law.Im), zero]),
+        ]
+    )
+    return float(np.abs(np.linalg.eigvals(rates)).max())
+
+
+def _held(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+    """q, qd after T at constant torque: Phi (2n, 2n), Gamma (2n, n), by the exponential of one
+    matrix.
+    """
+    from scipy.linalg import expm
+
+    n = len(A)
+    inverse = np.linalg.inv(A)
+    rates = np.zeros((3 * n, 3 * n))
+    rates[:n, n : 2 * n] = np.eye(n)
+    rates[n : 2 * n, n : 2 * n] = -inverse @ B
+    rates[n : 2 * n, 2 * n :] = inverse
+    E = expm(T * rates)
+    return E[: 2 * n, : 2 * n], E[: 2 * n, 2 * n :]

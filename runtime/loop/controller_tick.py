@@ -1,0 +1,368 @@
+"""One controller tick of a closed loop as one CasADi function, compiled to C where there is a
+compiler.
+
+    y     = what the encoder shows of q                   qd_m = its difference
+    u     = P e + Vr qd_r - Vm qd_m + K I + feed-forward,  e = q_r - y
+            (both laws of the study file, runtime.loop.control_law)
+    tau   = g sat(u), u of this tick or of the one before, in steps of the converter, held until the
+          next tick
+    q, qd = Runge-Kutta of order 4 in equal substeps (or CVODES), cut where a slip stops
+    (`runtime.loop.dry_friction`)
+
+State of a tick: q, qd, the last two positions shown, I, and u. What changes from run to run is an
+input, so that one compilation serves them all.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.loop.control_law import VECTORS
+from runtime.loop.dry_friction import DryFriction
+from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
+from runtime.model.casadi import SymbolicModel
+from runtime.model.compile_cache import (
+    FallbackWarning,
+    NotCompiledError,
+    shared_object,
+)
+from runtime.model.loading import cache_folder
+
+Array = np.ndarray
+MX = Any  # casadi.MX
+
+FLAGS = (
+    "-std=c11",
+    "-O2",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ffp-contract=off",
+    "-shared",
+    "-fPIC",
+)
+CVODES = {"abstol": 1e-10, "reltol": 1e-9}
+
+
+@dataclass(frozen=True, eq=False)
+class LoopInputs:
+    """A run in numbers.
+
+    Attributes
+    ----------
+    x : ndarray, shape (6n,)
+        State of the loop at the first tick: q, qd, y1, y2, I, u.
+    signals : ndarray, shape (S + N, 5n)
+        q_r, qd_r, feed-forward, encoder noise, disturbance at every tick; during the first S =
+        `settling` ticks the loop only settles.
+    settling : int
+    X : ndarray, shape (b,)
+        Base parameters.
+    g : ndarray, shape (n,)
+        Factor on everything between position error and torque.
+    law : ndarray, shape (n, columns)
+        Of `ControlLaw.matrix`.
+    substeps : int
+        Integration steps per tick.
+    torque_noise : ndarray, shape (N, n), N m or N
+        Of the recorded torque.
+    """
+
+    x: Array
+    signals: Array
+    settling: int
+    X: Array
+    g: Array
+    law: Array
+    substeps: int
+    torque_noise: Array
+
+
+def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
+    """`size` rows at a time and how many of them count; the last block is filled up with copies of
+    its last row.
+    """
+    for k in range(0, len(rows), size):
+        block = rows[k : k + size]
+        yield np.vstack([block, np.repeat(block[-1:], size - len(block), axis=0)]), len(block)
+
+
+def tick_function(
+    model: SymbolicModel,
+    friction: DryFriction,
+    constants: Mapping[str, float],
+    substeps: int,
+    integrator: str,
+) -> Any:
+    """(x, signals, X, law, flags) -> x at the next tick, and y, tau, qdd of this one.
+
+    x : q, qd, y1, y2, I, u.   signals : q_r, qd_r, feed-forward, encoder noise, disturbance.
+            law : (n, columns) of `VECTORS`, then the encoder's
+    R, R^-1 and offset.   flags : T, delay, weights of the two differences.
+    """
+    n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+    x, signals, X = ca.MX.sym("x", 6 * n), ca.MX.sym("signals", 5 * n), ca.MX.sym("X", b)
+    law, flags = ca.MX.sym("law", n, len(VECTORS) + 2 * n + 1), ca.MX.sym("flags", 4)
+    q: Any
+    q, qd, y1, y2, I, u1 = ca.vertsplit(x, n)
+    *wanted, noise, disturbance = ca.vertsplit(signals, n)
+    y, tau, I_next, u = control_function(n)(
+        q, ca.vertcat(y1, y2), I, u1, ca.vertcat(*wanted), noise, law, flags
+    )
+    plus, minus = ca.DM(friction.plus) @ X, ca.DM(friction.minus) @ X
+    plant = plant_function(model, friction, dict(constants), integrator)
+    starts: list[MX] = []  # qdd at the start of every substep
+    for _ in range(substeps):
+        q, qd, qdd = plant(
+            q, qd, tau + disturbance, X * ca.DM(friction.smooth), plus, minus, flags[0] / substeps
+        )
+        starts.append(qdd)
+    results: list[MX] = [ca.vertcat(q, qd, y, y1, I_next, u), ca.vertcat(y, tau, starts[0])]
+    return ca.Function(
+        "tick",
+        [x, signals, X, law, flags],
+        results,
+        ["x", "signals", "X", "law", "flags"],
+        ["x1", "out"],
+    )
+
+
+def control_function(n: int) -> Any:
+    """(q, y1 y2, I, u of the tick before, q_r qd_r ff, noise, law, flags) -> y, tau, I, u."""
+    q, past, I, before, wanted, noise = (
+        ca.SX.sym(name, k * n)
+        for name, k in (("q", 1), ("past", 2), ("I", 1), ("u", 1), ("wanted", 3), ("noise", 1))
+    )
+    law, flags = ca.SX.sym("law", n, len(VECTORS) + 2 * n + 1), ca.SX.sym("flags", 4)
+    v = {name: law[:, k] for k, name in enumerate(VECTORS)}
+    R, R_inverse, offset = (
+        law[:, len(VECTORS) : len(VECTORS) + n],
+        law[:, len(VECTORS) + n : -1],
+        law[:, -1],
+    )
+    T, delay, last, average = (flags[k] for k in range(4))
+    q_r, qd_r, feedforward = ca.vertsplit(wanted, n)
+    y1, y2 = ca.vertsplit(past, n)
+    y = R_inverse @ _steps(R @ (q - offset) + noise, v["encoder_step"]) + offset
+    qd_m = (last * (y - y1) + average * (y - y2)) / T
+    e = q_r - y
+    u = v["P"] * e + v["Vr"] * qd_r - v["Vm"] * qd_m + v["K"] * I + feedforward
+    I_next = _clip(I + T * (v["Ie"] * e + v["Ir"] * qd_r - v["Im"] * qd_m), v["antiwindup"])
+    tau = _steps(
+        v["g"] * _clip(delay * before + (1 - delay) * u, v["saturation"]), v["torque_step"]
+    )
+    return ca.Function(
+        "control", [q, past, I, before, wanted, noise, law, flags], [y, tau, I_next, u]
+    )
+
+
+def _clip(x: MX, bound: MX) -> MX:
+    return ca.fmin(ca.fmax(x, -bound), bound)
+
+
+def _steps(x: MX, step: MX) -> MX:
+    """x on the grid of `step`; x itself for a step of 0."""
+    return ca.if_else(step > 0, step * ca.floor(x / step + 0.5), x)
+
+
+def plant_function(
+    model: SymbolicModel, friction: DryFriction, constants: dict[str, float], integrator: str
+) -> Any:
+    """(q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
+
+    Where every slip keeps its direction, one step of the flow; otherwise rounds, each until the
+    next slip stops.
+    """
+    n, m = friction.G.shape[1], len(friction.G)
+    inputs = plant_inputs(model, friction)
+    q, qd, tau, X, plus, minus, h = inputs
+    flow = flow_function(model, constants, integrator)
+    if not m:
+        return ca.Function("plant", inputs, list(flow(q, qd, tau, X, h)))
+    f, direction = sliding_friction(friction, qd, plus, minus)
+    sliding = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
+    calm = keeps_sliding(friction, direction, qd, sliding[1])
+    given = [*inputs, *(ca.MX.sym(name, n) for name in ("q1", "qd1", "qdd"))]
+    done = ca.Function("sliding", given, given[7:])
+    stopping = ca.Function(
+        "stopping", given, list(_rounds(model, friction, constants, flow)(*inputs))
+    )
+    return ca.Function(
+        "plant",
+        inputs,
+        list(ca.Function.if_else("either", done, stopping)(calm, *inputs, *sliding)),
+    )
+
+
+def sliding_friction(friction: DryFriction, qd: MX, plus: MX, minus: MX) -> tuple[MX, MX]:
+    """f and direction of every element where all of them slide."""
+    direction = ca.sign(ca.DM(friction.G) @ qd)
+    return kinetic(direction, plus, minus), direction
+
+
+def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
+    """Whether every slip keeps its direction from qd to `end`."""
+    G = ca.DM(friction.G)
+    return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
+
+
+def flow_function(model: SymbolicModel, constants: dict[str, float], integrator: str) -> Any:
+    """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start."""
+    return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
+
+
+def _rounds(
+    model: SymbolicModel, friction: DryFriction, constants: dict[str, float], flow: Any
+) -> Any:
+    """The plant where slips stop or rest: each round lasts until the next slip stops."""
+    inputs = plant_inputs(model, friction)
+    cut, whole = (round_function(model, friction, constants, flow, whole=k) for k in (0, 1))
+
+    # a switch gives only what is used: in C, CasADi crashes on a result of one that nobody takes
+    q, qd, *fixed, h = inputs
+    of_cut, results = list(cut(*inputs)[:4]), [q, qd, h]
+    again = ca.Function.if_else(
+        "again", ca.Function("next", inputs, of_cut[:3]), ca.Function("idle", inputs, results)
+    )
+    final = ca.Function.if_else(
+        "final",
+        ca.Function("last", inputs, list(whole(*inputs)[:2])),
+        ca.Function("idle", inputs, results[:2]),
+    )
+    q, qd, h, qdd = ca.Function("first", inputs, of_cut)(*inputs)
+    for _ in range(LIMIT.STICK_ROUNDS - 2):
+        q, qd, h = again(h > 0, q, qd, *fixed, h)
+    q, qd = final(h > 0, q, qd, *fixed, h)
+    return ca.Function("rounds", inputs, [q, qd, qdd])
+
+
+def round_function(
+    model: SymbolicModel,
+    friction: DryFriction,
+    constants: dict[str, float],
+    flow: Any,
+    *,
+    whole: int,
+) -> Any:
+    """The plant until the next slip stops, or the whole of h: q, qd, what is left of h, qdd, f,
+    direction, Y, slips that stopped.
+    """
+    inputs = plant_inputs(model, friction)
+    q, qd, tau, X, plus, minus, h = inputs
+    f, direction, qdd, Y = friction_function(model, friction, constants)(q, qd, tau, X, plus, minus)
+    q1, qd1, _ = flow(q, qd, tau - ca.DM(friction.G).T @ f, X, h)
+    qx, qdx, left, at_rest = event_function(friction)(q, qd, qdd, q1, qd1, h, direction, whole)
+    rest, held = rest_function(friction), direction == 0
+    results = [
+        q + rest(qx - q, Y, held),
+        rest(qdx, Y, at_rest),
+        left,
+        qdd,
+        f,
+        direction,
+        Y,
+        at_rest * (direction != 0),
+    ]
+    return ca.Function(f"round_{whole}", inputs, results)
+
+
+def plant_inputs(model: SymbolicModel, friction: DryFriction) -> list[MX]:
+    """q, qd, tau, Xs, plus, minus, h."""
+    n, m = friction.G.shape[1], len(friction.G)
+    names = {
+        "q": n,
+        "qd": n,
+        "tau": n,
+        "X": len(model.BASE_PARAMETERS),
+        "plus": m,
+        "minus": m,
+        "h": 1,
+    }
+    return [ca.MX.sym(name, rows) for name, rows in names.items()]
+
+
+def _flow_inputs(model: SymbolicModel) -> tuple[list[MX], Any]:
+    n = len(model.JOINTS)
+    inputs = [
+        ca.MX.sym(name, rows)
+        for name, rows in (
+            ("q", n),
+            ("qd", n),
+            ("tau", n),
+            ("X", len(model.BASE_PARAMETERS)),
+            ("h", 1),
+        )
+    ]
+    return inputs, n
+
+
+def _runge_kutta(model: SymbolicModel, constants: dict[str, float]) -> Any:
+    """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start; order 4."""
+    inputs, _ = _flow_inputs(model)
+    q, qd, tau, X, h = inputs
+
+    def qdd(q: MX, qd: MX) -> MX:
+        return model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+
+    a1 = qdd(q, qd)
+    v2 = qd + h / 2 * a1
+    a2 = qdd(q + h / 2 * qd, v2)
+    v3 = qd + h / 2 * a2
+    a3 = qdd(q + h / 2 * v2, v3)
+    v4 = qd + h * a3
+    a4 = qdd(q + h * v3, v4)
+    return ca.Function(
+        "runge_kutta",
+        inputs,
+        [q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4), qd + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), a1],
+    )
+
+
+def _cvodes(model: SymbolicModel, constants: dict[str, float]) -> Any:
+    """The same by CVODES, variable order and step."""
+    inputs, n = _flow_inputs(model)
+    q, qd, tau, X, h = inputs
+    x = ca.MX.sym("x", 2 * n)
+    a = model.forward_dynamics(q=x[:n], qd=x[n:], tau=tau, X=X, **constants)["qdd"]
+    problem = {"x": x, "p": ca.vertcat(tau, X, h), "ode": h * ca.vertcat(x[n:], a)}
+    end = ca.integrator("cvodes", "cvodes", problem, 0, 1, CVODES)(
+        x0=ca.vertcat(q, qd), p=ca.vertcat(tau, X, h)
+    )["xf"]
+    start = model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+    return ca.Function("flow", inputs, [end[:n], end[n:], start])
+
+
+def compiled(function: Any, cache: Path | None = None) -> Any:
+    """The function in C, from the cache of compiled files; the function itself, with a
+    FallbackWarning, where that cannot be had.
+    """
+    generator = ca.CodeGenerator(f"{function.name()}.c")
+    generator.add(function)
+    text = generator.dump().encode()
+    objects: list[Path] = []
+
+    def opened(path: Path) -> ctypes.CDLL:
+        library = ctypes.CDLL(str(path))
+        if not hasattr(library, function.name()):
+            raise NotCompiledError(f"no function {function.name()} in {path}")
+        objects.append(path)
+        return library
+
+    try:
+        shared_object(Path(f"{function.name()}.c"), text, cache or cache_folder(), opened, FLAGS)
+    except (NotCompiledError, OSError) as e:
+        warnings.warn(
+            f"simulation: CasADi's own interpreter in place of C: {e}",
+            FallbackWarning,
+            stacklevel=2,
+        )
+        return function
+    return ca.external(function.name(), str(objects[-1]))

@@ -1,0 +1,49 @@
+"""DIDIM: direct and inverse dynamic identification models; measured torques on the regressor of the
+simulated motion.
+
+    X^(k+1) = argmin sum_j ||Y_j - Z_j^k X||^2 / s_j^2,
+            Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k
+
+Needs the measured torque and the reference; of the measured position only its start. Z passes the
+decimation alone: simulated states are
+exact. It is output error on the torque with the Jacobian of the loop left out (the loop holds q_s
+near q_r). C = (Z'VZ)^-1. The residual is that
+of the simulated motion, larger than that of IV with the same X: what moved the arm besides the
+model is not in Z.
+
+Reference: Gautier, Janot and Vandanjon (2013).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from runtime.estimators.linear import LinearOptions, System, standard_deviations
+from runtime.estimators.method import Beginning, Fitted
+from runtime.estimators.wls import weighted
+from runtime.loop.closed_loop import loop_of
+from runtime.loop.fixed_point import Step, iterate, outcome_of
+from runtime.loop.result import Simulation
+from runtime.rows.factor import Array
+from runtime.settings.study import EstimateSettings
+
+
+def fit(start: Beginning) -> Fitted:
+    """The fit; `details`: trail of the passes, contraction. SettingsError where no loop is attached
+    to the observation.
+    """
+    loop, observation = loop_of(start.observation, start.settings.method), start.observation
+
+    def update(runs: Sequence[Simulation], X: Array) -> Step:
+        rows = loop.motion(runs, observation)
+        system = weighted(rows, EstimateSettings("wls"), LinearOptions())
+        solution = system.solve()
+        C = standard_deviations(system, solution)[1]
+        return Step(solution.X, C, solution.residual_norm, system)
+
+    fixed = iterate(loop, start, update)
+    system: System = fixed.step.result
+    system = replace(system, settings=start.settings, iterations=len(fixed.trail))
+    status, message, details = outcome_of(loop, fixed, start.settings.method)
+    return Fitted(system, system.solve(), status=status, message=message, details=details)

@@ -1,0 +1,69 @@
+"""Dry friction of coupled elements: the Coulomb columns of a model and the directions along which
+they act.
+
+Every Coulomb element acts along a row of G: slip s = G qd, force c_plus where s > 0, -c_minus where
+s < 0. Elements may outnumber the joints (the wrist FS5,
+FS6, FSM6 along q5, q6, q5 + q6). What they do at rest: `runtime.loop.stick_slip`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class DryFriction:
+    """Coulomb elements of a model.
+
+    Attributes
+    ----------
+    G : ndarray, shape (m, n)
+        One row per element: its slip is s = G qd.
+    plus, minus : ndarray, shape (m, b), 0 or 1
+        c_plus = plus @ X and c_minus = minus @ X, the largest forces in each direction.
+    smooth : ndarray, shape (b,), 0 or 1
+        0 for the parameters of dry friction.
+    """
+
+    G: Array
+    plus: Array
+    minus: Array
+    smooth: Array
+
+
+def dry_friction(model: GeneratedModel) -> DryFriction:
+    """Coulomb columns of the regressor: of degree zero in qd, zero at rest. They are G' sign(G qd),
+    or one side of it.
+    """
+    n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+    rng = np.random.default_rng(1)
+    q, qd = rng.uniform(0.1, 1.0, (2, n, LIMIT.FRICTION_DRAWS)) * rng.choice(
+        [-1, 1], (2, n, LIMIT.FRICTION_DRAWS)
+    )
+    fast, faster, rest = (
+        np.array(model.regressor(q.T, speed.T, np.zeros((LIMIT.FRICTION_DRAWS, n)))).transpose(
+            1, 0, 2
+        )
+        for speed in (qd, 2 * qd, 0 * qd)
+    )
+    dry = (
+        (fast == faster).all(axis=(0, 1))
+        & (rest == 0).all(axis=(0, 1))
+        & (fast != 0).any(axis=(0, 1))
+    )
+    rows: dict[tuple[float, ...], tuple[Array, Array]] = {}
+    for k in np.flatnonzero(dry):
+        acting = fast[:, (fast[:, :, k] != 0).any(axis=0).argmax(), k]
+        G = acting * np.sign(acting[np.flatnonzero(acting)[0]]) + 0.0  # no -0
+        plus, minus = rows.setdefault(tuple(G), (np.zeros(b), np.zeros(b)))
+        force, slip = G @ fast[:, :, k], G @ qd
+        plus[k], minus[k] = (force[slip > 0] > 0).any(), (force[slip < 0] < 0).any()
+    plus, minus = (np.array([sides[i] for sides in rows.values()]).reshape(-1, b) for i in (0, 1))
+    return DryFriction(np.array(list(rows)).reshape(-1, n), plus, minus, (~dry).astype(float))

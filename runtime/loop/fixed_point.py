@@ -1,0 +1,283 @@
+"""What IV and DIDIM share: parameters and simulation in turn, gains that follow the inertia, steps
+that stay physical.
+
+    X^(k+1) = estimate from the record and the simulation with X^k and gains g(X^k), until it stands
+    still; then again with g = 1
+
+g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop
+cannot be simulated (inertia not positive
+definite, unstable) is refused: the step towards it is halved, at most five times. Stop: max
+|dX_i|/sigma_i < 0.1 and the norm of the residual
+changes by less than 1e-3 of itself, or the change is rounding. A loose loop makes passes of DIDIM
+overshoot: from the third pass on the steps are
+those of Anderson (1965), f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last
+differences, X^(k+1) = X^k + f_k - (dX + dF) gamma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.estimators.estimate import Status
+from runtime.estimators.method import Beginning
+from runtime.limits import LIMIT
+from runtime.loop.closed_loop import ClosedLoop
+from runtime.loop.result import Simulation
+from runtime.progress import at
+from runtime.settings.schema import Count, Positive, Real, Settings
+
+Array = np.ndarray
+
+# the stop of passes with rescaled gains, which only lead to the last ones, over that of the last
+PASS = ("norm", "g", "change")  # of a pass, in `details`
+
+
+class LoopOptions(Settings):
+    """estimate.options of every method that simulates the closed loop.
+
+    Attributes
+    ----------
+    reference : str
+        known, or measured where the reference has to be inferred.
+    around : float, s
+        Time about slow rows that is left out with them (`runtime.loop.closed_loop`).
+    """
+
+    reference: Literal["known", "measured"] = "known"
+    around: Real = 0.0
+
+
+class FixedPointOptions(LoopOptions):
+    """estimate.options of methods iv and didim.
+
+    Attributes
+    ----------
+    start : str or mapping of float
+        X^0: ols, values of the robot file, unit (motor inertia, else inertia or mass of the own
+        link, 1 for every joint; rest 0), or parameters by name, the others 0.
+    gains : str
+        X_ref of g: ols, values, start, or one (no rescaling).
+    passes : int
+        Largest number of passes with rescaled gains, and with g = 1.
+    change : float
+        Largest change of a parameter over its deviation at which the passes end.
+    residual : float
+        Relative change of the residual at which the passes end.
+    """
+
+    start: Literal["ols", "values", "unit"] | Mapping[str, Real] = "ols"
+    gains: Literal["ols", "values", "start", "one"] = "ols"
+    passes: Count = 15
+    change: Positive = 0.1
+    residual: Positive = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One estimate of a pass: X of the columns (c,), their covariance, norm of its residual, and
+    what else the method keeps.
+    """
+
+    X: Array
+    covariance: Array
+    norm: float
+    result: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """Where the iteration ended: the last step, the trail, whether it stood still, ratio of its
+    last two changes.
+    """
+
+    step: Step
+    trail: tuple[dict[str, Any], ...]
+    converged: bool
+    contraction: float
+    message: str = ""
+
+
+def full(names: Sequence[str], X: Array, every: Sequence[str]) -> Array:
+    """All base parameters (b,) from those of the columns `names`; the others are zero."""
+    by_name = dict(zip(names, X, strict=True))
+    return np.array([by_name.get(name, 0.0) for name in every])
+
+
+def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]) -> Array:
+    """X of the columns by ordinary least squares, from the robot file, of unit inertia, or as
+    given.
+    """
+    names = start.observation.names
+    if not isinstance(which, str):
+        if unknown := [name for name in which if name not in names]:
+            raise SettingsError(
+                f"no parameter {', '.join(unknown)}; there are {', '.join(names)}",
+                path=("estimate", "options", "start"),
+            )
+        return np.array([which.get(name, 0.0) for name in names])
+    if which == "ols":
+        return start.solution.X
+    model: Any = loop.model
+    standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
+    if which == "values":
+        values = dict.fromkeys(model.NO_EFFECT, 0.0) | dict(model.VALUES)
+        if missing := [name for name in standard if name not in values]:
+            raise SettingsError(
+                f"{model.NAME} has no value of {', '.join(missing[:6])}; use start and gains: ols",
+                path=("estimate", "options"),
+            )
+        standard.update({name: values[name] for name in standard})
+    else:
+        for j in model.JOINTS:
+            own = next((name for name in (f"Ia{j}", f"ZZ{j}", f"M{j}") if name in standard), None)
+            if own is None:
+                raise SettingsError(
+                    f"joint {j} of {model.NAME} has no inertia of its own; use start: ols",
+                    path=("estimate", "options", "start"),
+                )
+            standard[own] = 1.0
+    X = dict(zip(model.BASE_PARAMETERS, model.base_parameters(standard), strict=True))
+    return np.array([X[name] for name in names])
+
+
+def iterate(
+    loop: ClosedLoop, start: Beginning, update: Callable[[Sequence[Simulation], Array], Step]
+) -> Fixed:
+    """The fixed point of X -> update(simulation with X, X), X of the columns of the rows."""
+    options: FixedPointOptions = start.options
+    names, every = start.observation.names, loop.model.BASE_PARAMETERS
+    X = initial(loop, start, options.start)
+    reference = X if options.gains in ("start", "one") else initial(loop, start, options.gains)
+    J = None if options.gains == "one" else loop.inertia(full(names, reference, every))
+    if J is not None and not np.all(J > 0):
+        raise InputError(
+            f"gains: {options.gains}: these parameters have no positive inertia about joint "
+            f"{int(np.argmin(J)) + 1}; refer the gains to others: "
+            "estimate.options.gains: values, start, or one"
+        )
+    trail: list[dict[str, Any]] = []
+    step: Step | None = None
+    changes: list[float] = []
+    converged, message = False, ""
+    for rescaled in (True, False) if J is not None else (False,):
+        previous: Step | None = None
+        converged = False
+        points: list[Array] = []
+        steps: list[Array] = []
+        for _ in range(options.passes):
+            at(
+                f"pass {len(trail) + 1}"
+                + (f", largest change {trail[-1]['change']:.2g} deviations" if trail else "")
+            )
+            X, g, runs, message = _simulated(
+                loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None
+            )
+            if step is not None and message:
+                return Fixed(step, tuple(trail), False, _contraction(changes), message)
+            step = update(runs, X)
+            sigma = np.sqrt(np.maximum(np.diag(step.covariance), 0.0))
+            size = np.where(sigma > 0, sigma, np.inf)
+            moved = np.abs(step.X - X)
+            change = float(np.max(moved / size, initial=0.0))
+            changes.append(float(np.linalg.norm(moved / np.maximum(np.abs(step.X), 1e-12))))
+            trail.append({"X": X, "next": step.X, "norm": step.norm, "g": g, "change": change})
+            still = (
+                previous is not None
+                and abs(step.norm - previous.norm) <= options.residual * previous.norm
+            )
+            rounding = bool(np.all(moved <= 1e-9 * np.max(np.abs(step.X))))
+            points, steps, previous = (
+                [*points, X][-LIMIT.ANDERSON_MEMORY - 1 :],
+                [*steps, step.X - X][-LIMIT.ANDERSON_MEMORY - 1 :],
+                step,
+            )
+            X = _accelerated(points, steps, size)
+            if (
+                change < options.change * (LIMIT.ROUGH_STOP if rescaled else 1) and still
+            ) or rounding:
+                converged = True
+                break
+    assert step is not None  # options.passes >= 1
+    return Fixed(step, tuple(trail), converged, _contraction(changes))
+
+
+def _simulated(
+    loop: ClosedLoop,
+    names: Sequence[str],
+    every: Sequence[str],
+    X: Array,
+    before: Array | None,
+    J: Array | None,
+) -> tuple[Array, Array, Sequence[Simulation], str]:
+    """X that can be simulated, on the way from the last one that could; g, the runs, and why none
+    could be made.
+    """
+    reason = ""
+    for _ in range(LIMIT.HALVINGS + 1):
+        g = np.ones(len(loop.model.JOINTS))
+        try:
+            if J is not None:
+                g = loop.inertia(full(names, X, every)) / J
+                if not np.all(g > 0):
+                    raise InputError(
+                        f"inertia of negative sign about joint {int(np.argmin(g)) + 1}"
+                    )
+            return X, g, loop.run(full(names, X, every), g), ""
+        except InputError as e:
+            reason = str(e)
+            if before is None:
+                raise InputError(
+                    f"the loop cannot be simulated with the parameters it starts from: {reason}. "
+                    "Those of least squares need not be physical: "
+                    "give estimate.options.start: values (robot file), unit, or parameters by name"
+                ) from None
+            X = (X + before) / 2
+    return (
+        X,
+        g,
+        (),
+        f"The simulation cannot be made, also after {LIMIT.HALVINGS} halved steps: {reason}",
+    )
+
+
+def _accelerated(points: Sequence[Array], steps: Sequence[Array], size: Array) -> Array:
+    """The next X from the last ones and the steps that were found there; distances in units of
+    `size`, shape (c,).
+    """
+    if len(points) < 3:
+        return np.asarray(points[-1] + steps[-1])
+    dX, dF = np.diff(np.array(points), axis=0).T, np.diff(np.array(steps), axis=0).T
+    gamma = np.linalg.lstsq(dF / size[:, None], steps[-1] / size, rcond=1e-6)[0]
+    return np.asarray(points[-1] + steps[-1] - (dX + dF) @ gamma)
+
+
+def _contraction(changes: Sequence[float]) -> float:
+    """Ratio of the last two changes; nan before there are two."""
+    return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
+
+
+def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str, dict[str, Any]]:
+    """Status, message, and what `details` holds of the passes: parameters after each, norm of the
+    residual, gains, change in sigmas.
+    """
+    parts = [part for part in (fixed.message, loop.assumption) if part]
+    if not fixed.converged:
+        parts.insert(0, f"{method.upper()} has not converged after {len(fixed.trail)} passes.")
+        if not fixed.message:
+            parts.append(
+                "Likely causes: a wrong controller, delay or reference; parameters the record "
+                "hardly determines. Raise passes, or start from values."
+            )
+    elif fixed.contraction > LIMIT.SLOW_CONTRACTION:
+        parts.append(
+            f"The passes hardly contract (ratio {fixed.contraction:.2f}): the answer depends on "
+            "where it stopped."
+        )
+    passes = [{"X": own["next"], **{k: own[k] for k in PASS}} for own in fixed.trail]
+    details = {"trail": passes, "contraction": fixed.contraction}
+    return ("ok" if fixed.converged else "not-converged"), " ".join(parts), details

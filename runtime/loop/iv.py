@@ -1,0 +1,155 @@
+"""IDIM-IV: instrumental variables from the simulated closed loop.
+
+    X^(k+1) = (Z'VW)^-1 Z'VY,   Z^k = F_p[W(q_s, qd_s, qdd_s)] with the filters of the record on
+                                q_s,   V = diag(1/s_j^2), s_j of Y - W X^k
+    C = A Z'VZ A', A = (Z'VW)^-1
+
+W is that of the measured positions, whose noise makes least squares biased; Z is free of it, so Z'V
+rho has mean zero. Bias that W and Z share,
+such as what the filters do to sign(qd), stays. The system is solved with the columns of W and Z
+scaled alike.
+
+`details` : trail; smallest correlation between the spaces of Z and W (1: the instruments explain
+W); condition of Z'VW with unit columns; the
+Hausman test on d = X_IV - X_WLS, whose covariance C_d is taken from blocks of residuals as for
+sigma_corrected: largest |d_i|/sigma_di with its name,
+and, where there are blocks enough, d'C_d^-1 d, about chi2(b) where least squares is unbiased.
+
+References: Janot, Vandanjon and Gautier (2014); Hausman (1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError
+from scipy.stats import chi2
+
+from runtime.errors import InputError
+from runtime.estimators.block_covariance import deletions
+from runtime.estimators.method import Beginning, Fitted
+from runtime.estimators.wls import common_scales, floored
+from runtime.limits import LIMIT
+from runtime.loop.closed_loop import loop_of
+from runtime.loop.fixed_point import Step, iterate, outcome_of
+from runtime.loop.result import Simulation
+from runtime.rows.factor import Array
+from runtime.rows.observation import Observation, split_rows
+
+
+def fit(start: Beginning) -> Fitted:
+    """The fit on the rows of the measured positions. SettingsError where no loop is attached to the
+    observation.
+    """
+    loop, observation = loop_of(start.observation, start.settings.method), start.observation
+    raw = start.system.raw
+
+    def update(runs: Sequence[Simulation], X: Array) -> Step:
+        Z = loop.instruments(runs, observation).W
+        s = floored(raw, common_scales(raw, X, len(X)))
+        solution = _solved(observation, Z, s)
+        rest = observation.Y - observation.W @ solution[0]
+        norm = float(np.linalg.norm(rest / np.repeat(s, observation.rows)))
+        return Step(solution[0], solution[1], norm, (Z, s, solution[2]))
+
+    fixed = iterate(loop, start, update)
+    status, message, details = outcome_of(loop, fixed, start.settings.method)
+    X, (Z, s, A) = fixed.step.X, fixed.step.result
+    quality = _quality(observation, Z, s)
+    if quality["cond"] > LIMIT.WEAK_CONDITION or quality["correlation"] < LIMIT.WEAK_CORRELATION:
+        status = "weak-instruments" if status == "ok" else status
+        weak = (
+            f"The instruments do not explain W: condition {quality['cond']:.2g} of Z'VW, smallest "
+            f"correlation {quality['correlation']:.2g}. Likely causes: another time base, "
+            "reference or controller than those of the record; slow rows; parameters without "
+            "excitation."
+        )
+        message = f"{weak} {message}".strip()
+    system = replace(
+        start.system,
+        weighted=raw.weighted(1 / s),
+        scales=tuple(s.tolist()),
+        known_variance=True,
+        iterations=len(fixed.trail),
+    )
+    least = system.solve()
+    rows = np.repeat(1 / s, observation.rows)
+    residual = (observation.Y - observation.W @ X) * rows
+    U = _by_block(observation, Z * rows[:, None], residual, A)
+    U_least = _by_block(observation, observation.W * rows[:, None], residual, least.T @ least.T.T)
+    test = hausman(observation.names, X - least.X, U - U_least)
+    return Fitted(
+        system,
+        replace(least, X=X),
+        fixed.step.covariance,
+        np.linalg.norm(U, axis=0),
+        status,
+        message,
+        {**details, **quality, "hausman": test},
+    )
+
+
+def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
+    """Test of d, shape (b,), against its covariance U'U, U of shape (K, b) from K blocks."""
+    sigma = np.linalg.norm(U, axis=0)
+    z = np.abs(d) / np.where(sigma > 0, sigma, np.inf)
+    worst = int(np.argmax(z))
+    statistics: dict[str, Any] = {"largest": float(z[worst]), "parameter": names[worst]}
+    if len(U) >= 2 * len(d) and np.all(sigma > 0):
+        statistic = float(np.sum(np.linalg.lstsq((U / sigma).T, d / sigma, rcond=None)[0] ** 2))
+        statistics |= {"statistic": statistic, "probability": float(chi2.sf(statistic, len(d)))}
+    return statistics
+
+
+def _solved(observation: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:
+    """X, C and A = (Z'VW)^-1."""
+    rows = np.repeat(1 / s, observation.rows)
+    W, Zw, Y = observation.W * rows[:, None], Z * rows[:, None], observation.Y * rows
+    size = np.linalg.norm(W, axis=0)
+    W, Zw = W / size, Zw / size
+    try:
+        A = np.linalg.inv(Zw.T @ W)
+    except LinAlgError:
+        raise InputError(
+            "the instruments do not explain W: Z'VW is singular; the simulated motion excites less "
+            "than the measured one. Check controller and reference"
+        ) from None
+    X = A @ (Zw.T @ Y)
+    X += A @ (Zw.T @ (Y - W @ X))
+    C = A @ (Zw.T @ Zw) @ A.T
+    return X / size, C / np.outer(size, size), A / np.outer(size, size)
+
+
+def _quality(observation: Observation, Z: Array, s: Array) -> dict[str, float]:
+    """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest
+    of a column with its own instrument.
+    """
+    rows = np.repeat(1 / s, observation.rows)[:, None]
+    W, Zw = observation.W * rows, Z * rows
+    norms = np.linalg.norm(W, axis=0), np.maximum(np.linalg.norm(Zw, axis=0), 1e-300)
+    own = np.abs(np.einsum("ik,ik->k", W / norms[0], Zw / norms[1]))
+    spaces = np.linalg.svd(np.linalg.qr(Zw)[0].T @ np.linalg.qr(W)[0], compute_uv=False)
+    return {
+        "cond": float(np.linalg.cond((Zw / norms[1]).T @ (W / norms[0]))),
+        "correlation": float(spaces[-1]),
+        "column_correlation": float(own.min()),
+    }
+
+
+def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
+    """Change of X = A Z'Y by each block left out (`runtime.estimators.block_covariance`), shape (K,
+    b), times sqrt((K - 1)/K); nan for one block.
+
+    Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).
+    """
+    R = np.asarray(np.linalg.qr(Z, mode="r"))
+    U = deletions(
+        split_rows(np.column_stack([Z, residual]), observation.blocks()),
+        np.zeros(Z.shape[1]),
+        np.linalg.inv(R),
+        A @ R.T,
+    )
+    return U if len(U) > 1 else np.full_like(U, np.nan)

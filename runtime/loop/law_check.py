@@ -1,0 +1,166 @@
+"""Does the stated control law explain the torques of the record? Asked before anything is
+simulated.
+
+    u = P e + Vr qd_r - Vm qd_m + K I + feed-forward
+            from the recorded reference and positions, e = q_r - q, at the rate of the record
+    share     100 (1 - ||tau - tau_law||/||tau||)
+            by joint, decimated like Y; tau_law = sat(u), known torques included in tau
+    factor    of tau_law nearest to tau: 1 where gains and units are those of the record
+    delay     of tau against tau_law with the largest share, s
+
+A law that explains little is not that of the record, whatever the simulation with it gives: gains
+in other units, on the motor side, a delay, another reference.
+
+Between slow records and fast controllers the differences qd_m are those of the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.loop.reference import Reference
+from runtime.records.record import Record
+from runtime.rows.selection import Selection
+from runtime.settings.controller import Controller
+from runtime.signals.filters import decimated
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """The law beside the record, one joint.
+
+    Attributes
+    ----------
+    joint : str
+    share : float, %
+        Of the torque that the law explains; below 0: nothing.
+    factor : float
+        Of the torque of the law, nearest to that of the record.
+    delay : float, s
+        At which the share is largest.
+    best : float, %
+        The share with that factor and delay.
+    """
+
+    joint: str
+    share: float
+    factor: float
+    delay: float
+    best: float
+
+
+def law_fits(
+    law: Any,
+    records: Sequence[Record],
+    references: Sequence[Reference],
+    selections: Sequence[Selection],
+    controller: Controller,
+    joints: Sequence[int],
+) -> tuple[LawFit, ...]:
+    """Each joint of the records; `references` at the rate of the controller."""
+    torques = [
+        law_torque(law, record, reference, controller)
+        for record, reference in zip(records, references, strict=True)
+    ]
+    fits = []
+    for j, label in enumerate(joints):
+        shares: list[tuple[float, float, float]] = []
+        rate = records[0].rate
+        for lag in range(round(LIMIT.LAW_DELAYS * rate) + 1):
+            y, x = [], []
+            for record, tau, selection in zip(records, torques, selections, strict=True):
+                late = np.concatenate([np.full(lag, tau[0, j]), tau[: len(tau) - lag, j]])
+                both = np.column_stack([record.tau[:, j], late])[selection.samples].T
+                kept = decimated(
+                    np.ascontiguousarray(both), selection.factor, selection.signals.decimate
+                )
+                y.append(kept[0][selection.mask[j]])
+                x.append(kept[1][selection.mask[j]])
+            shares.append(_share(np.concatenate(y), np.concatenate(x)))
+        share, factor, _ = shares[0]
+        lag = int(np.argmax([best for _, _, best in shares]))
+        fits.append(
+            LawFit(str(label), share, shares[lag][1] if lag else factor, lag / rate, shares[lag][2])
+        )
+    return tuple(fits)
+
+
+def law_torque(law: Any, record: Record, reference: Reference, controller: Controller) -> Array:
+    """tau_law at the samples of a record, shape (N, n), N m or N.
+
+    The integrator starts where the loop settled before t = 0: at the value that the torques of the
+    first LIMIT.LAW_STEADY seconds ask for; at 0 where the loop did not settle.
+    """
+    N, T = len(record), 1 / record.rate
+    q_r, qd_r, qdd_r = (
+        x[:: controller.record_every][:N] for x in (reference.q, reference.qd, reference.qdd)
+    )
+    e = q_r - record.q
+    qd_m = np.diff(record.q, axis=0, prepend=record.q[:1]) / T
+    fed = record.tau_ff if controller.feedforward == "record" and record.tau_ff is not None else 0.0
+    u = law.P * e + law.Vr * qd_r - law.Vm * qd_m + law.ca * qdd_r + fed
+    steps = T * (law.Ie * e + law.Ir * qd_r - law.Im * qd_m)
+    for j in np.flatnonzero(law.K):
+        first = 0.0
+        if controller.settle:
+            head = slice(max(1, round(LIMIT.LAW_STEADY * record.rate)))
+            before = np.cumsum(steps[head, j]) - steps[head, j]
+            tau = record.tau[head, j]
+            first = float(np.median((tau - u[head, j]) / law.K[j] - before))
+        bound = float(law.antiwindup[j])
+        u[:, j] += law.K[j] * _integral(steps[:, j], first, bound)
+    return np.asarray(np.clip(u, -law.saturation, law.saturation))
+
+
+def _integral(steps: Array, first: float, bound: float) -> Array:
+    """I before each step, shape (N,): I_0 = first, I_(k+1) = clip(I_k + step_k), as in
+    `runtime.loop.controller_tick`.
+    """
+
+    def following(I: float, step: float) -> float:
+        return min(max(I + step, -bound), bound)
+
+    start = following(first, 0.0)
+    return np.fromiter(accumulate(steps[:-1].tolist(), following, initial=start), float, len(steps))
+
+
+def law_text(fits: Sequence[LawFit]) -> str:
+    """What the law explains, joint by joint, in words; with the cause where it explains little."""
+    shares = ", ".join(f"{max(one.share, 0.0):.0f} % of joint {one.joint}" for one in fits)
+    poor = [one for one in fits if one.share < LIMIT.LAW_POOR]
+    if not poor:
+        return f"The stated control law explains {shares} of the torques."
+    hints = ", ".join(
+        (
+            f"joint {one.joint} {max(one.best, 0.0):.0f} % with {one.factor:.3g} times the gains "
+            "and "
+            f"{1000 * one.delay:.0f} ms later"
+        )
+        for one in poor
+    )
+    return (
+        f"The stated control law explains {shares} of the torques: gains, units, side, delay "
+        "or "
+        f"reference are not those of this record (best: {hints})."
+    )
+
+
+def _share(y: Array, x: Array) -> tuple[float, float, float]:
+    """Share of y that x explains, %; the factor of x nearest to y; the share with it."""
+    norm, size = float(np.linalg.norm(y)), float(x @ x)
+    if not norm:
+        return 100.0, 1.0, 100.0
+    factor = float(x @ y) / size if size else 0.0
+    return (
+        100 * (1 - float(np.linalg.norm(y - x)) / norm),
+        factor,
+        100 * (1 - float(np.linalg.norm(y - factor * x)) / norm),
+    )

@@ -1,0 +1,300 @@
+"""References of a controller: q_r, qd_r, qdd_r at its rate, from samples, a motion by coefficients,
+a record, or random points.
+
+reference = Reference.sampled(q_r, rate=1000)
+        # derivatives by central differences
+reference = Reference(rate, q, qd, qdd)
+check_limits(reference, model.LIMITS)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel
+from runtime.records.formats.table import open_table
+from runtime.records.record import Record
+from runtime.settings.controller import Controller, Points
+from runtime.settings.trajectories import motion_from_mapping
+from runtime.signals.filters import derivative
+
+Array = np.ndarray
+
+RAMP = 1 / 3  # of each piece: acceleration, constant velocity, deceleration
+UNITS = {"q": "", "qd": "/s", "qdd": "/s^2"}
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Positions, velocities and accelerations at the instants k/rate.
+
+    Attributes
+    ----------
+    rate : float, Hz
+    q, qd, qdd : ndarray, shape (N, n), rad or m, and s
+    """
+
+    rate: float
+    q: Array
+    qd: Array
+    qdd: Array
+
+    def __post_init__(self) -> None:
+        shapes = {np.shape(x) for x in (self.q, self.qd, self.qdd)}
+        if len(shapes) != 1 or len(np.shape(self.q)) != 2 or len(self.q) < 2:
+            raise InputError(
+                f"reference q, qd, qdd of shapes {np.shape(self.q)}, {np.shape(self.qd)}, "
+                f"{np.shape(self.qdd)}; expected one (N, n)"
+            )
+        if not all(np.isfinite(x).all() for x in (self.q, self.qd, self.qdd)):
+            raise InputError("the reference holds values that are not finite")
+
+    @classmethod
+    def sampled(cls, q: Array, rate: float) -> Reference:
+        """Positions alone, shape (N, n): velocities and accelerations by central differences."""
+        q = np.asarray(q, dtype=float)
+        qd = derivative(q, rate)
+        return cls(rate, q, qd, derivative(qd, rate))
+
+    def at_rate(self, every: int) -> Reference:
+        """The same motion `every` times as fast sampled, N samples become (N - 1) every + 1: q by
+        cubic splines, whose derivatives are qd and qdd.
+        """
+        if every == 1:
+            return self
+        ticks = np.arange((len(self) - 1) * every + 1) / (every * self.rate)
+        spline = CubicSpline(self.t, self.q, axis=0)
+        return Reference(self.rate * every, spline(ticks), spline(ticks, 1), spline(ticks, 2))
+
+    @property
+    def t(self) -> Array:
+        """Instants, s, shape (N,)."""
+        return np.arange(len(self.q)) / self.rate
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def reference_of(
+    controller: Controller,
+    model: GeneratedModel,
+    *,
+    records: Sequence[Record] = (),
+    folder: str | Path | None = None,
+) -> Reference:
+    """The reference that the settings describe, within the limits of the robot unless they are to
+    be ignored.
+
+    Parameters
+    ----------
+    controller : Controller
+    model : GeneratedModel
+    records : sequence of Record
+        Those of the study, for the setting `record`.
+    folder : str or Path, optional
+        Where the file name starts; default: the current folder.
+
+    Raises
+    ------
+    SettingsError
+        No reference, or one that does not fit the robot or the controller.
+    InputError
+        A file that does not hold it, or a value outside the limits, with joint and instant.
+    """
+    settings, rate, n = controller.reference, controller.rate, len(model.JOINTS)
+    if settings.file is not None:
+        reference = read_reference(Path(folder or "") / settings.file, rate, n)
+    elif settings.record is not None:
+        reference = of_record(_named(records, settings.record), controller)
+    elif settings.motion is not None:
+        motion = motion_from_mapping(settings.motion)
+        _check_length(motion.duration, rate, "motion")
+        reference = Reference(rate, *motion.sampled(rate)[1:])
+    elif settings.points is not None:
+        _check_length(settings.points.duration, rate, "points")
+        reference = point_to_point(model, settings.points, rate)
+    else:
+        raise SettingsError(
+            "nothing to follow; give one of file, record, motion, points",
+            path=("controller", "reference"),
+        )
+    if reference.q.shape[1] != n:
+        raise SettingsError(
+            f"reference of {reference.q.shape[1]} joints; {model.NAME} has {n}",
+            path=("controller", "reference"),
+        )
+    if settings.limits == "refuse":
+        check_limits(reference, model.LIMITS, model.JOINTS)
+    return reference
+
+
+def _check_length(duration: float, rate: float, key: str) -> None:
+    if duration * rate > LIMIT.LONGEST_REFERENCE:
+        raise SettingsError(
+            f"{duration:g} s at {rate:g} Hz; at most {LIMIT.LONGEST_REFERENCE:,} ticks",
+            path=("controller", "reference", key),
+        )
+
+
+def read_reference(path: Path, rate: float, n: int) -> Reference:
+    """Columns q1 ... qn and, where the file has them, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
+    table = open_table(path)
+    names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
+    if missing := [name for name in names["q"] if name not in table.names]:
+        raise InputError(
+            f"no column {', '.join(missing)} among {', '.join(table.names)}; expected q1 ... q{n}",
+            file=path.name,
+        )
+    if "t" in table.names:
+        t = table.read([["t"]])[0][:, 0]
+        own = (len(t) - 1) / (t[-1] - t[0])
+        if abs(own / rate - 1) > LIMIT.RATE_TOLERANCE:
+            raise InputError(
+                (
+                    f"time runs at {own:g} Hz; the controller at {rate:g} Hz: resample one, or set "
+                    "controller.rate"
+                ),
+                file=path.name,
+            )
+    plain = Reference.sampled(table.read([names["q"]])[0], rate)
+    if not all(name in table.names for name in (*names["qd"], *names["qdd"])):
+        return plain
+    return Reference(rate, plain.q, *table.read([names["qd"], names["qdd"]]))
+
+
+def _named(records: Sequence[Record], index: int) -> Record:
+    if not 0 <= index < len(records):
+        raise SettingsError(
+            f"record {index}; the study has {len(records)}",
+            path=("controller", "reference", "record"),
+        )
+    return records[index]
+
+
+def of_record(record: Record, controller: Controller) -> Reference:
+    """The recorded reference at the rate of the controller, by cubic splines where the record is
+    slower.
+
+    SettingsError where the record holds none, or its rate is not that of every `record_every`-th
+    tick.
+    """
+    where, every = ("controller", "reference", "record"), controller.record_every
+    if record.q_r is None:
+        raise SettingsError(
+            f"{record.file} holds no reference; name its columns in record.columns.qr", path=where
+        )
+    require_rate(record, controller)
+    return Reference.sampled(record.q_r, controller.rate / every).at_rate(every)
+
+
+def require_rate(record: Record, controller: Controller) -> None:
+    """SettingsError unless the record holds every `record_every`-th tick of the controller, with
+    the setting that would make it so.
+    """
+    rate, every = controller.rate, controller.record_every
+    if abs(record.rate * every / rate - 1) <= LIMIT.RATE_TOLERANCE:
+        return
+    ratio = rate / record.rate
+    told = (
+        f"{record.file} at {record.rate:g} Hz, of a controller at {rate:g} Hz that records "
+        f"every {every}. tick"
+    )
+    if round(ratio) >= 1 and abs(ratio / round(ratio) - 1) <= LIMIT.RATE_TOLERANCE:
+        raise SettingsError(
+            f"{told}; set controller.record_every: {round(ratio)}",
+            path=("controller", "record_every"),
+        )
+    raise SettingsError(
+        (
+            f"{told}; the rate of the controller is no multiple of that of the record: correct one "
+            "of "
+            "them"
+        ),
+        path=("controller", "rate"),
+    )
+
+
+def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[int]) -> None:
+    """Raise InputError with joint, value, limit and instant at the first reference value outside
+    LIMITS of a model.
+    """
+    for quantity, unit in UNITS.items():
+        if quantity not in limits:
+            continue
+        given = np.asarray(limits[quantity], dtype=float)
+        low, high = given.T if quantity == "q" else (-given, given)
+        x = getattr(reference, quantity)
+        slack = 1e-9 * np.maximum(np.abs(low), np.abs(high))
+        outside = (x < low - slack) | (x > high + slack)
+        if outside.any():
+            k, j = np.argwhere(outside)[0]
+            raise InputError(
+                f"the reference leaves the limits of joint {joints[j]} at {k / reference.rate:g} "
+                f"s: {quantity} = {x[k, j]:.4g} rad{unit} or m{unit}, "
+                f"limits {low[j]:.4g} to {high[j]:.4g}; slow it down or move it, or set "
+                "controller.reference.limits to ignore"
+            )
+
+
+def point_to_point(model: GeneratedModel, settings: Points, rate: float) -> Reference:
+    """All joints move together between random points of the middle of their range, as fast as speed
+    and acceleration limits allow.
+
+    It ends with the last piece that the duration has room for.
+    """
+    if missing := [key for key in ("q", "qd", "qdd") if key not in model.LIMITS]:
+        raise SettingsError(
+            f"{model.NAME} has no limits of {', '.join(missing)}; add them to the robot file",
+            path=("controller", "reference", "points"),
+        )
+    rng = np.random.default_rng(settings.seed)
+    low, high = np.array(model.LIMITS["q"], dtype=float).T
+    centre, reach = (low + high) / 2, LIMIT.POINT_REACH * (high - low)
+    speed, acceleration = (
+        LIMIT.POINT_MARGIN * np.array(model.LIMITS[key], dtype=float) for key in ("qd", "qdd")
+    )
+    N = round(settings.duration * rate)
+    t = np.arange(N) / rate
+    q, qd, qdd = (np.zeros((N, len(model.JOINTS))) for _ in range(3))
+    start, begin = 0.0, centre
+    while start < settings.duration:
+        end = centre + reach * rng.uniform(-1, 1, len(centre))
+        way = end - begin
+        # velocity way/(T (1 - RAMP)); a ramp 3 x**2 - 2 x**3 has the largest slope 1.5
+        T = max(
+            np.max(np.abs(way) / speed) / (1 - RAMP),
+            np.sqrt(np.max(np.abs(way) / acceleration) * 1.5 / (RAMP * (1 - RAMP))),
+        )
+        if start and start + T > settings.duration:
+            break
+        piece = (t >= start) & (t < start + T)
+        s, v, a = _unit_piece((t[piece] - start) / T)
+        q[piece], qd[piece], qdd[piece] = (
+            begin + s[:, None] * way,
+            v[:, None] * way / T,
+            a[:, None] * way / T**2,
+        )
+        start, begin = start + T, end
+    moved = t < start
+    return Reference(rate, q[moved], qd[moved], qdd[moved])
+
+
+def _unit_piece(x: Array) -> tuple[Array, Array, Array]:
+    """Position from 0 to 1, velocity and acceleration of one piece at x = t/T from 0 to 1."""
+    top = 1 / (1 - RAMP)
+    up, down = np.clip(x / RAMP, 0, 1), np.clip((1 - x) / RAMP, 0, 1)
+    v = top * np.minimum(up**2 * (3 - 2 * up), down**2 * (3 - 2 * down))
+    a = top * 6 / RAMP * np.where(x < 0.5, up * (1 - up), -down * (1 - down))
+    rise = top * RAMP * (up**3 - up**4 / 2)
+    fall = 1 - top * RAMP * (down**3 - down**4 / 2)
+    steady = top * (x - RAMP / 2)
+    s = np.where(x < RAMP, rise, np.where(x > 1 - RAMP, fall, steady))
+    return s, v, a

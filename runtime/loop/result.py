@@ -1,0 +1,192 @@
+"""What a closed-loop simulation gives: exact states, what a record of it would hold, sensitivities
+to the parameters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, joint_labels, joint_units
+from runtime.records.record import Record
+from runtime.table import Table
+
+Array = np.ndarray
+
+TORQUE = {"rad": "N m", "m": "N"}  # unit of the torque by that of the position
+
+
+class SimulationError(InputError):
+    """A run that cannot be made: inertia not positive definite, loop unstable, motion lost. `time`
+    : s, of the reference, where it shows.
+    """
+
+    def __init__(self, message: str, *, time: float) -> None:
+        self.time = time
+        super().__init__(message)
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation(Result):
+    """A run, at the recorded ticks; arrays of shape (N, n), joint side, SI.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,), s
+    q, qd, qdd, tau : ndarray
+        Exact states, and the torque on the arm without the disturbance.
+    q_measured, tau_measured : ndarray
+        What a record would hold.
+    q_r : ndarray
+        Reference.
+    rate : float, Hz
+        Of the recorded ticks.
+    saturated : ndarray, shape (n,)
+        Share of ticks with the torque at its limit.
+    substeps : int
+        Integration steps per tick.
+    state : ndarray, shape (6n,)
+        Last state of the loop.
+    model : GeneratedModel
+    X : ndarray, shape (b,)
+        Base parameters.
+    ideal : bool
+        Whether the run had no noise and no steps of encoder and converter.
+    name : str
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+    q_measured: Array
+    tau_measured: Array
+    q_r: Array
+    rate: float
+    saturated: Array
+    substeps: int
+    state: Array = field(repr=False)
+    model: GeneratedModel = field(repr=False)
+    X: Array = field(repr=False)
+    ideal: bool = False
+    name: str = "simulation"
+
+    def record(self) -> Record:
+        """What was measured, with its reference."""
+        return Record(
+            self.t, self.q_measured, self.tau_measured, rate=self.rate, name=self.name, q_r=self.q_r
+        )
+
+    def to_csv(self) -> str:
+        """t, q1 ..., tau1 ..., qr1 ...: the measured columns, SI, joint side, as `identify` reads
+        them.
+        """
+        return csv_text(self.t, q=self.q_measured, tau=self.tau_measured, qr=self.q_r)
+
+    @property
+    def units(self) -> tuple[tuple[str, str], ...]:
+        """Units of position and torque, by joint."""
+        return tuple((unit, TORQUE[unit]) for unit in joint_units(self.model))
+
+    @property
+    def at_rest(self) -> Array:
+        """Share of the recorded ticks at which each joint rests, shape (n,)."""
+        return np.asarray((np.abs(self.qd) <= LIMIT.SLIP_REST).mean(axis=0))
+
+    def summary(self) -> dict[str, Any]:
+        """Figures of merit as JSON values: simulation.json."""
+        error = self.q - self.q_r
+        return {
+            "robot": self.model.NAME,
+            "source_sha256": self.model.SOURCE_SHA256,
+            "note": "SIMULATED: nothing was measured",
+            "ideal": self.ideal,
+            "rate": self.rate,
+            "samples": len(self.t),
+            "substeps": self.substeps,
+            "joints": list(self.model.JOINTS),
+            "tracking_error": {
+                "rms": _rms(error).tolist(),
+                "max": np.abs(error).max(axis=0).tolist(),
+            },
+            "torque": {
+                "rms": _rms(self.tau).tolist(),
+                "max": np.abs(self.tau).max(axis=0).tolist(),
+            },
+            "saturated": self.saturated.tolist(),
+            "at_rest": self.at_rest.tolist(),
+            "parameters": dict(zip(self.model.BASE_PARAMETERS, self.X.tolist(), strict=True)),
+        }
+
+    def table(self) -> Table:
+        """Tracking error and torque of each joint."""
+        error, effort = self.q - self.q_r, np.abs(self.tau).max(axis=0)
+        columns = (
+            joint_labels(self.model),
+            _rms(error),
+            np.abs(error).max(axis=0),
+            effort,
+            self.saturated,
+            self.at_rest,
+            self.units,
+        )
+        rows = [
+            (
+                j,
+                f"{rms:.3g}",
+                f"{most:.3g}",
+                f"{tau:.4g}",
+                f"{100 * saturated:.2f} %",
+                f"{100 * rest:.2f} %",
+                ", ".join(units),
+            )
+            for j, rms, most, tau, saturated, rest, units in zip(*columns, strict=True)
+        ]
+        steps = f"{self.substeps} integration step{'s' * (self.substeps > 1)} per tick"
+        caption = f"{len(self.t)} samples at {self.rate:g} Hz, {steps}; nothing was measured"
+        return Table(
+            caption,
+            ("joint", "rms error", "max error", "max torque", "saturated", "at rest", "units"),
+            rows,
+            wide=(6,),
+        )
+
+    def to_table(self) -> str:
+        """Tracking error and torque of each joint, as text."""
+        table = self.table()
+        return f"{table.caption}\n{table.to_text()}"
+
+
+def csv_text(t: Array, **signals: Array) -> str:
+    """CSV with the columns t, then NAME1, NAME2 ... of each signal, shape (N, n), ten digits."""
+    names = ["t", *(f"{name}{j + 1}" for name, x in signals.items() for j in range(x.shape[1]))]
+    rows = np.column_stack([t, *signals.values()])
+    return "\n".join([",".join(names), *(",".join(f"{x:.10g}" for x in row) for row in rows), ""])
+
+
+def _rms(x: Array) -> Array:
+    return np.asarray(np.sqrt((x**2).mean(axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives by the base parameters X at the recorded ticks. The loop is closed: gains,
+    reference and g do not move.
+
+    Attributes
+    ----------
+    q, qd : ndarray, shape (N, n, b)
+        Of the position and its rate. The instants at which slips stop move with X.
+    tau : ndarray, shape (N, n, b)
+        Of the torque.
+    """
+
+    q: Array
+    qd: Array
+    tau: Array

@@ -1,0 +1,142 @@
+"""Does the simulation follow the record? What IV, DIDIM and CLOE stand on, joint by joint.
+
+    position    100 rms(q_s - q)/std(q)
+            of the simulation with the parameters found, g = 1
+    tracking    100 rms(q_s - q)/rms(q_r - q)
+            100 %: no better than to take the reference for the motion; where the reference is known
+    torque      100 ||tau_s - tau||/||tau||           decimated, on the rows of the observation
+
+A simulated motion that is not the measured one makes Z, or the output error, that of another
+experiment: whatever the residual says then, it is not
+about this robot. Limits are conventions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.estimators.estimate import Status
+from runtime.estimators.linear import percent
+from runtime.limits import LIMIT
+from runtime.loop.closed_loop import ClosedLoop
+from runtime.loop.law_check import law_text
+from runtime.loop.result import Simulation
+from runtime.rows.observation import Observation
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """Simulated minus measured, one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    rms : float, rad or m
+        Root mean square of q_s - q.
+    position : float, %
+        The same, of the deviation of q from its mean.
+    tracking : float, %
+        The same, of the deviation of q from the reference; nan where the reference is not known.
+    torque : float, %
+        100 ||tau_s - tau||/||tau||.
+    """
+
+    joint: str
+    rms: float
+    position: float
+    tracking: float
+    torque: float
+
+    @property
+    def apart(self) -> str:
+        """How the simulation misses the record, in words; "" where it follows."""
+        if not self.position <= LIMIT.MOTION_APART:
+            return f"position of joint {self.joint} off by {self.position:.0f} % of its motion"
+        if self.tracking > LIMIT.MOTION_TRACKING and self.position > LIMIT.MOTION_SMALL:
+            return (
+                f"position of joint {self.joint} off by {self.tracking:.0f} % of its tracking error"
+            )
+        return (
+            f"torque of joint {self.joint} off by {self.torque:.0f} %"
+            if self.torque > LIMIT.MOTION_TORQUE
+            else ""
+        )
+
+
+def simulated_motion(
+    loop: ClosedLoop, observation: Observation, X: Array
+) -> tuple[JointMotion, ...]:
+    """Each joint of the simulation with all base parameters X, shape (b,), beside the records;
+    InputError where it cannot be made.
+    """
+    return _compared(loop, observation, loop.run(X))
+
+
+def _compared(
+    loop: ClosedLoop, observation: Observation, runs: Sequence[Simulation]
+) -> tuple[JointMotion, ...]:
+    gaps = [
+        False if part.record.missing is None else part.record.missing.at_joints()
+        for part in loop.parts
+    ]
+    q = [
+        np.where(missing, np.nan, part.record.q)
+        for part, missing in zip(loop.parts, gaps, strict=True)
+    ]
+    every = loop.simulator.controller.record_every
+    error = np.concatenate([run.q[: len(x)] - x for run, x in zip(runs, q, strict=True)])
+    moved = np.concatenate([x - np.nanmean(x, axis=0) for x in q])
+    lag = np.concatenate(
+        [part.reference.q[::every][: len(x)] - x for part, x in zip(loop.parts, q, strict=True)]
+    )
+    tau = loop.outputs(loop.torques(runs), observation)
+    rms, size, tracking = (np.sqrt(np.nanmean(x**2, axis=0)) for x in (error, moved, lag))
+    return tuple(
+        JointMotion(
+            str(label),
+            float(rms[j]),
+            100 * float(rms[j] / size[j]) if size[j] > 0 else float("inf"),
+            100 * float(rms[j] / tracking[j])
+            if tracking[j] > 0 and not loop.assumption
+            else float("nan"),
+            percent(
+                (tau - observation.Y)[observation.joint(j)], observation.Y[observation.joint(j)]
+            ),
+        )
+        for j, label in enumerate(loop.model.JOINTS)
+    )
+
+
+def judged(
+    loop: ClosedLoop, observation: Observation, X: Array
+) -> tuple[Status, str, Mapping[str, Any]]:
+    """Status, message, and `motion` for the details of an Estimate with all base parameters X."""
+    law = law_text(loop.law) if loop.law else ""
+    details: dict[str, Any] = {"law": [vars(one) for one in loop.law]} if loop.law else {}
+    try:
+        motion = simulated_motion(loop, observation, X)
+    except InputError as e:
+        return (
+            "simulation-apart",
+            f"The loop cannot be simulated with these parameters: {e}. {law}".strip(),
+            details,
+        )
+    apart = [text for one in motion if (text := one.apart)]
+    details |= {"motion": [vars(one) for one in motion]}
+    if not apart:
+        return "ok", law, details
+    return (
+        "simulation-apart",
+        f"The simulation does not follow the record: {', '.join(apart)}. The controller, its "
+        "gains, its delay, the reference or the parameters are not those of "
+        f"the record; what was fitted says nothing about this robot. {law}",
+        details,
+    )

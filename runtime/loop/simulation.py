@@ -1,0 +1,468 @@
+"""Closed-loop simulation on the emitted CasADi model.
+
+    run = simulate(model, study)                            # one run, by the section `controller`
+    simulator = Simulator(model, controller)                # many: compiled once
+    run = simulator.run(X, reference, g=g, ideal=True)      # exact states, no noise, no steps
+
+Torque is held between the ticks of the controller; between them Runge-Kutta of order 4 (or CVODES),
+with dry friction that holds at rest and only
+takes energy. Substeps are at most `pole_step` over the fastest pole of the loop. Before a run the
+inertia matrix must be positive definite and
+the sampled loop stable along the reference: what is not raises SimulationError, which says where,
+and what to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from types import ModuleType
+from typing import Any, cast
+
+import casadi as ca
+import numpy as np
+from scipy.signal import butter, lfilter
+
+from runtime.errors import InputError, SettingsError
+from runtime.limits import LIMIT
+from runtime.loop.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
+from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_function
+from runtime.loop.dry_friction import DryFriction, dry_friction
+from runtime.loop.reference import Reference, reference_of
+from runtime.loop.result import Sensitivity, Simulation, SimulationError
+from runtime.loop.sensitivity import tangent_along, tangent_function
+from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
+from runtime.model.generated import GeneratedModel, constants_of
+from runtime.records.provenance import SIMULATED
+from runtime.records.reading import read_records
+from runtime.records.record import Record
+from runtime.settings.controller import Controller
+from runtime.settings.study import Study
+
+Array = np.ndarray
+
+BLOCK, TANGENT_BLOCK = 250, 25  # ticks in one call
+
+
+class Simulator:
+    """The closed loop of one robot and one controller, ready for many runs.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    controller : Controller
+    symbolic : SymbolicModel, optional
+        CasADi model of the same robot; default: the file beside that of `model`.
+    constants : mapping, optional
+        Geometry and gravity that replace those of the robot file.
+    in_c : bool
+        Compile where there is a compiler.
+    """
+
+    def __init__(
+        self,
+        model: GeneratedModel,
+        controller: Controller,
+        *,
+        symbolic: SymbolicModel | None = None,
+        constants: Mapping[str, float] | None = None,
+        in_c: bool = True,
+    ) -> None:
+        constants_of(model, constants or {})
+        self.model, self.controller, self.constants = model, controller, dict(constants or {})
+        self.law: ControlLaw = control_law(controller, model)
+        self.symbolic = symbolic or load_symbolic(casadi_path(model), of=model)
+        self.friction: DryFriction = dry_friction(model)
+        self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
+        self._compiled: dict[tuple[Callable[..., Any], int], Any] = {}
+        self._bias = _rest_functions(self.symbolic, self.constants)
+
+    def run(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float = 1.0,
+        start: Array | None = None,
+        ideal: bool = False,
+        disturbance: Array | None = None,
+        feedforward: Array | None = None,
+        seed: int | None = None,
+        name: str = "simulation",
+    ) -> Simulation:
+        """The arm along the reference.
+
+        Parameters
+        ----------
+        X : ndarray, shape (b,)
+            Base parameters.
+        reference : Reference
+        g : ndarray, shape (n,), or float
+            Factor on everything between position error and torque.
+        start : ndarray, shape (n,), optional, rad or m
+            Joint positions at t = 0, at rest; default: those of the settings, else the first of the
+            reference.
+        ideal : bool
+            No noise, no steps of encoder and converter.
+        disturbance : ndarray, shape (N, n), optional, N m or N
+            Torques on the arm that are not recorded.
+        feedforward : ndarray, shape (N, n), optional, N m or N
+            Torques added to the command, in place of those of the settings.
+        seed : int, optional
+            Of the noise; default: that of the settings.
+        name : str
+            Of the record.
+
+        Raises
+        ------
+        SimulationError
+            An inertia that is not positive definite, a loop that is not stable, or a motion that is
+            lost.
+        """
+        seed = self.controller.seed if seed is None else seed
+        inputs = self._inputs(
+            X, reference, g, start, disturbance, feedforward, None if ideal else seed
+        )
+        states, out = self._iterated(inputs)
+        return self._result(inputs, states, out, reference, ideal=ideal, name=name)
+
+    def sensitivity(
+        self,
+        X: Array,
+        reference: Reference,
+        *,
+        g: Array | float = 1.0,
+        start: Array | None = None,
+        disturbance: Array | None = None,
+        feedforward: Array | None = None,
+    ) -> tuple[Simulation, Sensitivity]:
+        """An ideal run and its derivatives by X, from the tangent system stepped beside it
+        (`runtime.loop.sensitivity`).
+        """
+        inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None)
+        states, out = self._iterated(inputs)
+        run = self._result(inputs, states, out, reference, ideal=True)
+        function = self._ticks(tangent_function, inputs.substeps, TANGENT_BLOCK)
+        before = np.vstack([inputs.x, states[:-1]])
+        return run, tangent_along(
+            function, before, inputs, self.law.flags, TANGENT_BLOCK, self.controller.record_every
+        )
+
+    def _inputs(
+        self,
+        X: Array,
+        reference: Reference,
+        g: Array | float,
+        start: Array | None,
+        disturbance: Array | None,
+        feedforward: Array | None,
+        seed: int | None,
+    ) -> LoopInputs:
+        """seed : None for an ideal run."""
+        n, N = len(self.model.JOINTS), len(reference)
+        X, g = self._parameters(X), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
+        _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
+        substeps = self.substeps(X, reference, g)
+        noise, pushed, torque_noise = (
+            (np.zeros((N, n)),) * 3 if seed is None else self._noise(np.random.default_rng(seed), N)
+        )
+        pushed = pushed if disturbance is None else pushed + np.asarray(disturbance)
+        known = self._feedforward(reference) if feedforward is None else np.asarray(feedforward)
+        signals = np.hstack(
+            [reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed]
+        )
+        settling = round(self.controller.settle * self.controller.rate) if self.law.K.any() else 0
+        still = np.concatenate([reference.q[0], np.zeros(n), known[0], np.zeros(2 * n)])
+        return LoopInputs(
+            x=self._start(reference, start, ideal=seed is None),
+            signals=np.vstack([np.tile(still, (settling, 1)), signals]),
+            settling=settling,
+            X=X,
+            g=g,
+            law=self.law.matrix(g, ideal=seed is None),
+            substeps=substeps,
+            torque_noise=torque_noise,
+        )
+
+    def _result(
+        self, inputs: LoopInputs, states: Array, out: Array, reference: Reference, **said: Any
+    ) -> Simulation:
+        n, every = len(self.model.JOINTS), self.controller.record_every
+        _check_motion(states[inputs.settling :, :n], reference)
+        before = np.vstack([inputs.x, states[:-1]])[inputs.settling :]
+        y, tau, qdd = np.split(out[inputs.settling :], 3, axis=1)
+        qd = before[::every, n : 2 * n]
+        return Simulation(
+            t=reference.t[::every],
+            q=before[::every, :n],
+            qd=np.where(np.abs(qd) <= LIMIT.SLIP_REST, 0.0, qd),
+            qdd=qdd[::every],
+            tau=tau[::every],
+            q_measured=y[::every],
+            tau_measured=(tau + inputs.torque_noise)[::every],
+            q_r=reference.q[::every],
+            rate=self.controller.rate / every,
+            saturated=(np.abs(tau) >= inputs.g * self.law.saturation * (1 - 1e-9)).mean(axis=0),
+            substeps=inputs.substeps,
+            state=states[-1],
+            model=self.model,
+            X=inputs.X,
+            **said,
+        )
+
+    def substeps(self, X: Array, reference: Reference, g: Array) -> int:
+        """Steps per tick. SimulationError where the inertia is not positive definite or the sampled
+        loop is unstable on the reference.
+        """
+        fastest = 0.0
+        for k in np.unique(np.linspace(0, len(reference) - 1, LIMIT.LOOP_POINTS).astype(int)):
+            A, B = (
+                np.atleast_2d(x.full())
+                for x in self._bias(reference.q[k], X * self.friction.smooth)
+            )
+            smallest, time = np.linalg.eigvalsh((A + A.T) / 2)[0], k / reference.rate
+            if not smallest > 0:
+                raise SimulationError(
+                    f"the inertia matrix of these parameters is not positive definite at {time:g} "
+                    f"s of the reference, smallest eigenvalue {smallest:.3g}; "
+                    "take parameters of a physical robot (feasible, CAD), or a smaller step "
+                    "towards these",
+                    time=time,
+                )
+            pole = np.abs(discrete_poles(self.law, A, B, g)).max()
+            if pole > LIMIT.UNSTABLE_POLE:
+                raise SimulationError(
+                    f"the loop of these gains and parameters is unstable at {time:g} s of the "
+                    f"reference: discrete pole of modulus {pole:.4g}, at most 1; "
+                    f"lower kp and {'kd' if self.controller.law.kind == 'pid' else 'kv'}, raise "
+                    "the controller's rate, or scale the gains with the inertia (g)",
+                    time=time,
+                )
+            fastest = max(fastest, continuous_pole(self.law, A, B, g))
+        steps = max(1, ceil(fastest / self.controller.rate / self.controller.pole_step))
+        if steps > LIMIT.MOST_SUBSTEPS:
+            raise SettingsError(
+                (
+                    f"{steps} integration steps per tick, for a pole at {fastest:.3g} 1/s; at most "
+                    f"{LIMIT.MOST_SUBSTEPS}: raise the rate or pole_step, or lower the gains"
+                ),
+                path=("controller", "rate"),
+            )
+        return steps
+
+    def _ticks(self, function_of: Callable[..., Any], substeps: int, block: int) -> Any:
+        """The CasADi function of `block` ticks, each by `tick_function` or `tangent_function`; made
+        once.
+        """
+        key = function_of, substeps
+        if key not in self._compiled:
+            tick = function_of(
+                self.symbolic, self.friction, self.constants, substeps, self.controller.integrator
+            )
+            self._compiled[key] = (compiled(tick) if self._in_c else tick).mapaccum(block)
+        return self._compiled[key]
+
+    def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
+        """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N,
+        3n).
+        """
+        function, x, states, out = (
+            self._ticks(tick_function, inputs.substeps, BLOCK),
+            inputs.x,
+            [],
+            [],
+        )
+        for rows, used in blocks(inputs.signals, BLOCK):
+            after, outputs = function(x, rows.T, inputs.X, inputs.law, self.law.flags)
+            states.append(after.full().T[:used])
+            out.append(outputs.full().T[:used])
+            x = states[-1][-1]
+        return np.vstack(states), np.vstack(out)
+
+    def _start(self, reference: Reference, start: Array | None, *, ideal: bool) -> Array:
+        """State of the loop, (6n,), at rest."""
+        n = len(self.model.JOINTS)
+        given = self.controller.start if start is None else start
+        q = np.asarray(reference.q[0] if given is None else given, dtype=float)
+        if q.shape != (n,) or not np.isfinite(q).all():
+            raise InputError(f"start {q}; expected {n} finite joint positions")
+        y = q if ideal else self.law.shown(q)
+        return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
+
+    def _feedforward(self, reference: Reference) -> Array:
+        """Torque of the reference with the parameters of the robot file, (N, n), where the settings
+        ask for it.
+        """
+        if self.controller.feedforward != "values":
+            return np.zeros_like(reference.q)
+        X = parameters_of(self.model, self.controller)
+        return np.asarray(
+            self.model.inverse_dynamics(
+                reference.q, reference.qd, reference.qdd, X, **self.constants
+            )
+        )
+
+    def _noise(self, rng: np.random.Generator, N: int) -> tuple[Array, Array, Array]:
+        """Encoder noise, torque on the arm, noise of the recorded torque: (N, n) each."""
+        n, torque, rate = len(self.model.JOINTS), self.controller.torque, self.controller.rate
+        encoder, pushed, recorded = rng.standard_normal((3, N, n))
+        size = np.broadcast_to(np.asarray(torque.disturbance, dtype=float), (n,))
+        if size.any():
+            if torque.bandwidth >= rate / 2:
+                raise SettingsError(
+                    f"{torque.bandwidth} Hz; expected less than half the controller's rate",
+                    path=("controller", "torque", "bandwidth"),
+                )
+            pushed = lfilter(*butter(2, torque.bandwidth, fs=rate), pushed, axis=0)
+            pushed = pushed / pushed.std(axis=0)
+        return (
+            self.law.encoder_noise * encoder,
+            size * pushed,
+            np.asarray(torque.noise, dtype=float) * recorded,
+        )
+
+    def _parameters(self, X: Array) -> Array:
+        X = np.asarray(X, dtype=float)
+        b = len(self.model.BASE_PARAMETERS)
+        if X.shape != (b,) or not np.isfinite(X).all():
+            raise InputError(
+                f"X of shape {X.shape}; expected {b} finite base parameters of {self.model.NAME}"
+            )
+        return X
+
+
+def simulate(
+    model: GeneratedModel,
+    study: Study,
+    *,
+    records: Sequence[Record] | None = None,
+    folder: str | Path | None = None,
+    symbolic: str | Path | ModuleType | SymbolicModel | None = None,
+    ideal: bool = False,
+    name: str | None = None,
+) -> Simulation:
+    """The closed loop of study.controller along its reference. Many runs of one loop, other
+    parameters: make a `Simulator`.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        With values of its standard parameters, or with all of them in `values` of the controller.
+    study : Study
+        With a section `controller`.
+    records : sequence of Record, optional
+        Those of the study; default: read from its files, where the reference is that of a record.
+    folder : str or Path, optional
+        Where file names of the study start; default: the current folder.
+    symbolic : str, Path or module, optional
+        CasADi model of the same robot; default: the file beside that of `model`.
+    ideal : bool
+        No noise, no steps of encoder and converter.
+    name : str, optional
+        Of the simulated record; its default says that nothing was measured.
+
+    Raises
+    ------
+    InputError
+        No section `controller`, or a reference outside the limits of the robot.
+    SimulationError
+        An inertia that is not positive definite, or a loop that is not stable.
+    """
+    controller = study.controller
+    if controller is None:
+        raise InputError(
+            "the study has no section `controller`; it says law, rate and reference of the closed "
+            "loop"
+        )
+    folder, index = Path(folder or ""), controller.reference.record
+    if records is None:
+        records = (
+            read_records(study.record, model, folder=folder, missing=study.signals.admits_missing)
+            if index is not None
+            else ()
+        )
+    X = parameters_of(model, controller)
+    reference = reference_of(controller, model, records=records, folder=folder)
+    start = records[index].q[0] if index is not None and controller.start is None else None
+    simulator = Simulator(
+        model, controller, symbolic=None if symbolic is None else load_symbolic(symbolic, of=model)
+    )
+    return simulator.run(
+        X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}"
+    )
+
+
+def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
+    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in
+    their place; 0 for those without effect.
+    """
+    changed = {} if controller is None else controller.values
+    emitted, where = cast(Any, model), ("controller", "values")
+    values = {**dict.fromkeys(emitted.NO_EFFECT, 0.0), **model.VALUES, **changed}
+    if missing := [name for name in emitted.STANDARD_PARAMETERS if name not in values]:
+        message = (
+            f"{model.NAME} has no value of "
+            f"{', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the "
+            "robot file"
+        )
+        if controller is None:
+            raise InputError(
+                f"{message} (0 where one is zero), or a record whose estimate tells the parameters"
+            )
+        raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
+    if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
+        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
+    return np.asarray(emitted.base_parameters(values), dtype=float)
+
+
+def inertia_ratio(
+    model: GeneratedModel, X: Array, X_reference: Array, reference: Reference
+) -> Array:
+    """g_j = J_j(X)/J_j(X_reference), J_j the mean of A_jj over the reference: gains times g keep
+    the bandwidth of the loop. Shape (n,).
+    """
+    J, J_reference = (
+        np.einsum("tjj->j", model.inertia_matrix(reference.q, x)) for x in (X, X_reference)
+    )
+    return np.asarray(J / J_reference)
+
+
+def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:
+    """(q, Xs) -> A and the viscous friction B = dGamma/dqd at rest."""
+    n = len(model.JOINTS)
+    q, qd, X = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("X", len(model.BASE_PARAMETERS))
+    A = model.inertia_matrix(q=q, X=X, **constants)["A"]
+    B = ca.substitute(
+        ca.jacobian(model.bias(q=q, qd=qd, X=X, **constants)["GAM"], qd), qd, ca.DM.zeros(n)
+    )
+    return ca.Function("at_rest", [q, X], [ca.densify(A), ca.densify(B)])
+
+
+def _check_shapes(reference: Reference, rate: float, n: int, N: int, *given: Array | None) -> None:
+    if reference.q.shape[1] != n:
+        raise InputError(f"reference of {reference.q.shape[1]} joints; expected {n}")
+    if abs(reference.rate / rate - 1) > 1e-9:
+        raise InputError(f"reference at {reference.rate:g} Hz; the controller runs at {rate:g} Hz")
+    for x in given:
+        if x is not None and np.shape(x) != (N, n):
+            raise InputError(
+                f"torques of shape {np.shape(x)}; expected {(N, n)}, one row per tick of the "
+                "reference"
+            )
+
+
+def _check_motion(q: Array, reference: Reference) -> None:
+    """SimulationError at the first tick where the motion is not finite or far from all
+    reference.
+    """
+    far = np.abs(reference.q).max() + LIMIT.MOTION_LOST * (1 + np.ptp(reference.q, axis=0))
+    lost = ~(np.abs(q) < far)
+    if lost.any():
+        k, j = np.argwhere(lost)[0]
+        raise SimulationError(
+            f"the motion leaves its reference at {(k + 1) / reference.rate:g} s, position {j + 1} "
+            "first: the loop is unstable there; lower the gains, "
+            "raise the rate, or slow the reference down",
+            time=(k + 1) / reference.rate,
+        )

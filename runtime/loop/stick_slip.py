@@ -1,0 +1,175 @@
+"""Slip and stick of coupled dry friction in a simulation, and the instant at which a slip stops.
+
+Every Coulomb element of the model acts along a row of G: slip s = G qd, force between -c_minus and
+c_plus,
+
+    A qdd = tau - h - G' f,        f = c_plus where s > 0,  -c_minus where s < 0,
+            between them where s = 0,
+
+h without dry friction. At rest the force is the one that keeps ds/dt = 0 while it lies between its
+bounds, else the bound itself: a linear
+complementarity problem, solved by block pivots.
+
+A step ends where a slip changes its sign, and the slip is zero from there on: friction never pushes
+along the motion, so that it takes energy only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from runtime.limits import LIMIT
+from runtime.loop.dry_friction import DryFriction
+from runtime.model.casadi import SymbolicModel
+
+SX = Any  # casadi.SX
+
+
+def friction_function(
+    model: SymbolicModel, friction: DryFriction, constants: dict[str, float]
+) -> Any:
+    """(q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
+    Y = A^-1 G'. Xs : X without dry friction.
+    """
+    n, m = len(model.JOINTS), len(friction.G)
+    q, qd, tau, X = (
+        ca.SX.sym("q", n),
+        ca.SX.sym("qd", n),
+        ca.SX.sym("tau", n),
+        ca.SX.sym("X", len(model.BASE_PARAMETERS)),
+    )
+    plus, minus = ca.SX.sym("plus", m), ca.SX.sym("minus", m)
+    G = ca.DM(friction.G)
+    A = model.inertia_matrix(q=q, X=X, **constants)["A"]
+    h = model.bias(q=q, qd=qd, X=X, **constants)["GAM"]
+    solved = solve(A, ca.horzcat(tau - h, G.T))
+    Y = solved[:, 1:]
+    slip = G @ qd
+    moving = ca.sign(slip) * (ca.fabs(slip) > LIMIT.SLIP_REST)
+    f_moving = kinetic(moving, plus, minus)
+    f, mode = _at_rest(G @ Y, G @ (solved[:, 0] - Y @ f_moving), moving, plus, minus)
+    f = f + f_moving
+    names = ["q", "qd", "tau", "X", "plus", "minus"]
+    return ca.Function(
+        "friction",
+        [q, qd, tau, X, plus, minus],
+        [f, moving + mode, solved[:, 0] - Y @ f, Y],
+        names,
+        ["f", "direction", "qdd", "Y"],
+    )
+
+
+def kinetic(direction: SX, plus: SX, minus: SX) -> SX:
+    """Forces (m,) of elements that slide in a direction; 0 for direction 0."""
+    return (direction > 0) * plus - (direction < 0) * minus
+
+
+def _at_rest(D: SX, free: SX, moving: SX, plus: SX, minus: SX) -> tuple[SX, SX]:
+    """Forces (m,) of the elements at rest and the direction in which each starts, 0 if none: ds/dt
+    = free - D f.
+    """
+    m = D.shape[0]
+    resting = moving == 0
+    mode = ca.SX.zeros(m)
+    f = ca.SX.zeros(m)
+    for last in [False] * LIMIT.STICK_PIVOTS + [True]:
+        held = resting * (mode == 0)
+        bound = resting * kinetic(mode, plus, minus)
+        f = held * solve(_masked(D, held), held * (free - D @ bound)) + bound
+        if last:
+            break
+        leaving = held * ((f > plus) - (f < -minus))
+        rate, slack = free - D @ f, LIMIT.STICK_SLACK * ca.diag(D) * (plus + minus)
+        mode = leaving + mode * (mode * rate >= -slack)
+    return resting * ca.fmin(ca.fmax(f, -ca.fmax(minus, 0)), ca.fmax(plus, 0)), mode
+
+
+def _masked(D: SX, rows: SX) -> SX:
+    """D on the rows and columns marked 1, the identity elsewhere; a little more on the diagonal,
+    since rows of G may depend on each other.
+    """
+    return (
+        ca.diag(rows) @ D @ ca.diag(rows)
+        + ca.diag(1 - rows)
+        + LIMIT.STICK_EQUAL * ca.diag(ca.diag(D))
+    )
+
+
+def rest_function(friction: DryFriction, columns: int = 1) -> Any:
+    """(qd, Y, at_rest) -> qd with the slips marked 1 at zero: the nearest velocity in the metric of
+    A, so that kinetic energy only falls.
+
+    Of a displacement in place of qd: elements that rest over the step do not creep. qd : (n,
+    columns).
+    """
+    m, n = friction.G.shape
+    qd, Y, rows = ca.SX.sym("qd", n, columns), ca.SX.sym("Y", n, m), ca.SX.sym("rows", m)
+    G = ca.DM(friction.G)
+    impulse = solve(_masked(G @ Y, rows), ca.diag(rows) @ G @ qd)
+    return ca.Function(
+        "rest", [qd, Y, rows], [qd - Y @ ca.diag(rows) @ impulse], ["qd", "Y", "rows"], ["qd1"]
+    )
+
+
+def event_function(friction: DryFriction) -> Any:
+    """The part of a step until the first slip changes its sign.
+
+    (q, qd, qdd, q1, qd1, h, direction, whole) -> q, qd at the end of the part, what is left of h,
+    slips that are zero at that end. The slip is taken as quadratic over the
+    step; `whole` = 1 keeps the whole step whatever changes its sign.
+    """
+    m, n = friction.G.shape
+    q, qd, qdd, q1, qd1 = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd", "q1", "qd1"))
+    h, direction, whole = ca.SX.sym("h"), ca.SX.sym("direction", m), ca.SX.sym("whole")
+    G = ca.DM(friction.G)
+    c, b, end = (
+        direction * (G @ x) for x in (qd, qdd * h, qd1)
+    )  # direction*slip = c + b x + a x**2, x from 0 to 1
+    crossing = end < -LIMIT.SLIP_REST
+    x = ca.vertcat(*(ca.if_else(crossing[k], _root(c[k], b[k], end[k]), 1) for k in range(m)))
+    first = ca.if_else(whole, 1, ca.mmin(x)) if m else ca.SX(1)
+    bend = qd1 - qd - qdd * h
+    cubic = q + h * (qd * first + qdd * h * first**2 / 2 + bend * first**3 / 3)
+    at_end = q + h * (qd + qdd * h / 2 + bend / 3)
+    qx = cubic + (q1 - at_end) * first**4
+    qdx = qd + qdd * h * first + bend * first**2
+    stopped = crossing * ca.logic_or(whole, x <= first * (1 + LIMIT.STICK_EQUAL))
+    at_rest = ca.logic_or(direction == 0, stopped)
+    names = ["q", "qd", "qdd", "q1", "qd1", "h", "direction", "whole"]
+    inputs = [q, qd, qdd, q1, qd1, h, direction, whole]
+    return ca.Function(
+        "event",
+        inputs,
+        [qx, qdx, h * (1 - first), at_rest],
+        names,
+        ["qx", "qdx", "left", "at_rest"],
+    )
+
+
+def _root(c: SX, b: SX, end: SX) -> SX:
+    """Where c + b x + a x**2 first falls through zero in [0, 1]; c >= 0 at 0, `end` < 0 at 1."""
+    a = end - b - c
+    root = ca.sqrt(ca.fmax(b**2 - 4 * a * c, 0))
+    rising = (b + root) / ca.fmax(-2 * a, 1e-300)
+    falling = 2 * c / ca.fmax(root - b, 1e-300)
+    return ca.fmin(ca.fmax(ca.if_else(b > 0, rising, falling), 0), 1)
+
+
+def solve(A: SX, B: SX) -> SX:
+    """A^-1 B with A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+    n = A.shape[0]
+    L, d = ca.SX.eye(n), [A[j, j] for j in range(n)]
+    rows = [B[j, :] for j in range(n)]
+    for j in range(n):
+        for k in range(j):
+            d[j] -= L[j, k] ** 2 * d[k]
+            rows[j] -= L[j, k] * rows[k]
+        for i in range(j + 1, n):
+            L[i, j] = (A[i, j] - sum(L[i, k] * L[j, k] * d[k] for k in range(j))) / d[j]
+    rows = [rows[j] / d[j] for j in range(n)]
+    for j in range(n - 1, -1, -1):
+        for i in range(j + 1, n):
+            rows[j] -= L[i, j] * rows[i]
+    return ca.vertcat(*rows) if n else B

@@ -1,0 +1,196 @@
+"""The triangular factor of [W Y], from which every linear estimate is read.
+
+    [W Y] = Q R,    R = [[R_11, r_12], [0, r_22]]
+
+    X = R_11^-1 r_12          eq. (7)          ||Y - W X|| = |r_22|
+    (W'W)^-1 = R_11^-1 R_11^-T                 cond(W) = cond(R_11)
+
+Q is never formed. Rows are joint-major and the torque of joint j depends on few parameters, so each
+joint is factored on its own nonzero
+columns C_j and the small factors are stacked and factored once more (structured TSQR):
+
+    R_j = R factor of [W_j[:, C_j] Y_j],    R = R factor of the stacked R_j,
+                                            ||Y_j - W_j X|| = ||R_j [X[C_j]; -1]||
+
+Weights of a joint multiply R_j, removing a parameter deletes a column of R and of the R_j, and
+parts of a record combine by stacking
+their R_j: none of them passes over W again.
+
+References: Golub and Van Loan, Matrix Computations, sections 5.2 and 6.5; Demmel, Grigori, Hoemmen
+and Langou (2012) for TSQR.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+Array = np.ndarray
+
+
+def triangularise(A: Array) -> Array:
+    """R factor of A, shape (m, n) -> (n, n), upper triangular with A'A = R'R; rows of zeros are
+    added when m < n.
+    """
+    m, n = A.shape
+    R = np.zeros((n, n))
+    if m:
+        R[: min(m, n)] = np.linalg.qr(A, mode="r")
+    return R
+
+
+@dataclass(frozen=True)
+class JointFactor:
+    """What the rows of one joint say: `R` has the Gram matrix of [W_j[:, columns] Y_j].
+
+    columns : ndarray of int, shape (c,), positions in the names of the Factor.
+    R : ndarray, shape (k, c + 1), k <= c + 1 after factoring; not triangular once columns were
+    deleted.
+    rows : number of rows of this joint.
+    """
+
+    columns: Array
+    R: Array
+    rows: int
+
+    def spread(self, b: int) -> Array:
+        """R with a column for each of b parameters and for Y, shape (k, b + 1)."""
+        block = np.zeros((len(self.R), b + 1))
+        block[:, [*self.columns, b]] = self.R
+        return block
+
+    def residual_norm(self, X: Array) -> float:
+        """||Y_j - W_j X|| for X, shape (b,)."""
+        return float(np.linalg.norm(self.R[:, :-1] @ X[self.columns] - self.R[:, -1]))
+
+    @property
+    def measured_norm(self) -> float:
+        """||Y_j||."""
+        return float(np.linalg.norm(self.R[:, -1]))
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Triangular factor of [W Y] and the factors of its joints.
+
+    names : the b parameters, in column order.
+    R : ndarray, shape (b + 1, b + 1), upper triangular.
+    joints : one JointFactor per joint.
+    """
+
+    names: tuple[str, ...]
+    R: Array
+    joints: tuple[JointFactor, ...]
+
+    @classmethod
+    def of(cls, names: Sequence[str], joints: Sequence[JointFactor]) -> Factor:
+        """The factor of the stacked factors of all joints."""
+        b = len(names)
+        R = (
+            triangularise(np.vstack([joint.spread(b) for joint in joints]))
+            if joints
+            else np.zeros((b + 1, b + 1))
+        )
+        return cls(tuple(names), R, tuple(joints))
+
+    @property
+    def rows(self) -> int:
+        """Number of rows r of W."""
+        return sum(joint.rows for joint in self.joints)
+
+    @property
+    def R11(self) -> Array:
+        """R factor of W, shape (b, b)."""
+        return self.R[:-1, :-1]
+
+    @property
+    def r12(self) -> Array:
+        """Q'Y on the range of W, shape (b,)."""
+        return self.R[:-1, -1]
+
+    @property
+    def r22(self) -> float:
+        """Norm of the part of Y that no X explains."""
+        return float(abs(self.R[-1, -1]))
+
+    def weighted(self, weights: Sequence[float] | Array) -> Factor:
+        """The factor after multiplying the rows of joint j by weights[j]."""
+        return Factor.of(
+            self.names,
+            [replace(joint, R=joint.R * w) for joint, w in zip(self.joints, weights, strict=True)],
+        )
+
+    def select(self, names: Sequence[str]) -> Factor:
+        """The factor of the columns `names` (in that order) and Y, from the small factors alone."""
+        unknown = [name for name in names if name not in self.names]
+        if unknown:
+            raise ValueError(
+                f"no columns {', '.join(unknown)}; the factor has {', '.join(self.names)}"
+            )
+        kept = [self.names.index(name) for name in names]
+        R = triangularise(self.R[:, [*kept, len(self.names)]])
+        return Factor(tuple(names), R, tuple(selected(joint, kept) for joint in self.joints))
+
+    def drop(self, name: str) -> Factor:
+        """The factor without one parameter, by down-dating: deleting column k leaves R triangular
+        above row k.
+
+        Only the trailing block, an upper Hessenberg matrix of order b - k, is made triangular
+        again.
+        """
+        k = self.names.index(name)
+        b = len(self.names)
+        kept = [i for i in range(b) if i != k]
+        R = np.zeros((b, b))
+        R[:k] = np.delete(self.R[:k], k, axis=1)
+        R[k:, k:] = triangularise(self.R[k:, k + 1 :])
+        return Factor(
+            tuple(self.names[i] for i in kept),
+            R,
+            tuple(selected(joint, kept) for joint in self.joints),
+        )
+
+
+def selected(joint: JointFactor, kept: Sequence[int]) -> JointFactor:
+    """The columns at the positions `kept` of the Factor, numbered in that order."""
+    place = {int(column): position for position, column in enumerate(joint.columns)}
+    places = [(new, place[old]) for new, old in enumerate(kept) if old in place]
+    columns = np.array([new for new, _ in places], dtype=np.intp)
+    return replace(
+        joint,
+        columns=columns,
+        R=joint.R[:, [*(position for _, position in places), joint.R.shape[1] - 1]],
+    )
+
+
+def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Factor:
+    """Triangular factor of [W Y], joint by joint.
+
+    Parameters
+    ----------
+    W : ndarray, shape (r, b), rows joint-major, every row of joint 1 first.
+    Y : ndarray, shape (r,), torques in N m (N for prismatic joints).
+    rows : number of rows of each joint; their sum is r.
+    names : the b parameters, in column order.
+    """
+    r, b = W.shape
+    if Y.shape != (r,) or sum(rows) != r or len(names) != b:
+        raise ValueError(
+            f"W has shape {W.shape}; got Y of shape {Y.shape}, {sum(rows)} rows over the joints "
+            f"and {len(names)} names"
+        )
+    if not (np.isfinite(W).all() and np.isfinite(Y).all()):
+        raise ValueError(
+            "W or Y holds values that are not finite; leave those samples out of the record"
+        )
+    joints = []
+    start = 0
+    for count in rows:
+        W_j, Y_j = W[start : start + count], Y[start : start + count]
+        columns = np.flatnonzero(W_j.any(axis=0))
+        R_j = np.asarray(np.linalg.qr(np.column_stack([W_j[:, columns], Y_j]), mode="r"))
+        joints.append(JointFactor(columns, R_j, count))
+        start += count
+    return Factor.of(names, joints)

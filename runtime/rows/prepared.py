@@ -1,0 +1,240 @@
+"""One record as a study reads it: filtered, selected and decimated once, for whoever asks.
+
+    own = prepared(model, record, study)
+    own.states                                q, qd, qdd, by the reader of the study
+    own.selection                             window, decimated instants, rows left out
+    own.torque                                Y before rows are left out, shape (n, K)
+    own.observation(model)                    Y = W X + rho
+
+A study that perturbs the positions (CESTAC) takes `selection` and `torque` of the measured record
+and repeats `observed_states` and `observation_from_states` with perturbed positions: Y and the
+choice of rows stay those of the record, so that a row is never kept or dropped because of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, TypeAlias, overload
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel, check_states, drives_of
+from runtime.records.missing import COUNTS, require_positions
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.rows.observation import Observation, column_numbers
+from runtime.rows.regressor import decimated_columns
+from runtime.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.settings.study import Rows, Signals, Study, to_mapping
+from runtime.signals.filters import States, decimated, filtered_states, median_filtered
+from runtime.signals.states import observed_states
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A record, and what the settings of a study make of it; each is made when first asked for.
+
+    Attributes
+    ----------
+    record : Record
+        Joint side, SI.
+    study : Study
+        Signals and rows.
+    drives : Drives or None
+        Motor side: those by which the record was read, or those of the robot.
+    keep : ndarray of bool, shape (N,) or (N, n), or None
+        Samples (and joints) that may be used; None: all.
+    """
+
+    record: Record
+    study: Study
+    drives: Drives | None = None
+    keep: Array | None = None
+
+    @cached_property
+    def filtered(self) -> States:
+        """q, qd, qdd of the positions as they are, shape (N, n) each; straight lines over gaps."""
+        return filtered_states(self.record.q, self.record.rate, self.study.signals)
+
+    @cached_property
+    def states(self) -> States:
+        """q, qd, qdd by the reader of the study, shape (N, n) each."""
+        record, signals = self.record, self.study.signals
+        if signals.reader == "lowpass":
+            require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
+            return self.filtered
+        return observed_states(
+            record.q,
+            record.rate,
+            signals,
+            self.drives,
+            missing=record.missing,
+            name=record.name,
+        )
+
+    @cached_property
+    def selection(self) -> Selection:
+        """Window, decimated instants, and the rows left out by trim, low speed and `keep`."""
+        signals, rows = self.study.signals, self.study.rows
+        return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
+
+    @cached_property
+    def torque(self) -> Array:
+        """Y before rows are left out, shape (n, K), N m or N."""
+        return decimated_torque(self.record.torque, self.selection)
+
+    def certain(
+        self, model: GeneratedModel, constants: Mapping[str, float] | None = None
+    ) -> Selection:
+        """The selection without rows of unknown state or of uncertain direction of friction."""
+        return certain(model, self.states, self.selection, constants)
+
+    def observation(
+        self,
+        model: GeneratedModel,
+        columns: Sequence[str] | None = None,
+        constants: Mapping[str, float] | None = None,
+    ) -> Observation:
+        """Y = W X + rho of the rows that are used."""
+        return observation_from_states(
+            model,
+            self.states,
+            self.torque,
+            self.selection,
+            files=self.record.files,
+            columns=columns,
+            constants=constants,
+        )
+
+    def by(self, study: Study) -> Prepared:
+        """The same record by another study; what both make alike is shared."""
+        other = replace(self, study=study)
+        if study.signals != self.study.signals:
+            return other
+        if study.rows == self.study.rows:
+            return self
+        shared = ("states", "filtered") if study.signals.reader == "lowpass" else ("states",)
+        vars(other).update({name: getattr(self, name) for name in shared})
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: nothing of what was made."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+Source: TypeAlias = Record | Prepared | Stream
+
+
+def prepared(model: GeneratedModel, record: Record | Prepared, study: Study) -> Prepared:
+    """The record as `study` reads it; one that was prepared shares what was made of it."""
+    if isinstance(record, Prepared):
+        return record.by(study)
+    return Prepared(record, study, record.origin.drives or drives_of(model))
+
+
+def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
+    """Drives of all records; InputError where these were read with different couplings. Without
+    records those of the model.
+    """
+    coupled = {own.drives.coupling for own in records if own.drives is not None}
+    if len(coupled) > 1:
+        raise InputError(f"records read with coupling {', '.join(sorted(coupled))}; expected one")
+    return records[0].drives if records else drives_of(model)
+
+
+@overload
+def record_of(record: Record | Prepared) -> Record: ...
+@overload
+def record_of(record: Source) -> Record | Stream: ...
+def record_of(record: Source) -> Record | Stream:
+    """The record itself."""
+    return record.record if isinstance(record, Prepared) else record
+
+
+def decimated_torque(tau: Array, selection: Selection) -> Array:
+    """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
+    filter, window, decimation.
+    """
+    windowed = median_filtered(tau, selection.signals.median)[selection.samples]
+    return decimated(np.ascontiguousarray(windowed.T), selection.factor, selection.signals.decimate)
+
+
+def observation_from_states(
+    model: GeneratedModel,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+    columns: Sequence[str] | None = None,
+    constants: Mapping[str, float] | None = None,
+) -> Observation:
+    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated
+    before.
+
+    Where errors of the velocities are known, rows in which missing positions leave the state
+    unknown ("missing") or the direction of dry friction is
+    uncertain ("direction") are left out as well.
+    columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
+    """
+    check_states(model, states.q, states.qd, states.qdd)
+    n, K = selection.mask.shape
+    if torque.shape != (n, K) or len(model.JOINTS) != n:
+        raise InputError(
+            f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected "
+            f"{(n, K)} and {n} joints"
+        )
+    names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
+    numbers = column_numbers(names, model.BASE_PARAMETERS)
+    window = states[selection.samples]
+    store = decimated_columns(
+        model, window, selection.factor, selection.signals.decimate, constants or {}, numbers
+    )
+    selection = certain(model, states, selection, constants)
+    mask = selection.mask.ravel()
+    if not mask.any():
+        raise InputError(nothing_left(selection.dropped, K), file=", ".join(files or ()) or None)
+    return Observation(
+        W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
+        Y=torque.ravel()[mask],
+        rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
+        names=names,
+        t=np.tile(selection.t, n)[mask],
+        record=np.zeros(int(mask.sum()), dtype=int),
+        rate=selection.rate,
+        dropped=selection.dropped,
+        settings=settings_of(selection.signals, selection.rows, selection.factor),
+        files=dict(files or {}),
+        findings=states.findings,
+    )
+
+
+def certain(
+    model: GeneratedModel,
+    states: States,
+    selection: Selection,
+    constants: Mapping[str, float] | None = None,
+) -> Selection:
+    """The selection without rows in which missing positions leave the state unknown ("missing") or
+    the direction of dry friction is uncertain
+    ("direction"); the same where errors of the velocities are not known."""
+    if states.errors is None:
+        return selection
+    known = selection.mask & states.errors[selection.samples][selection.kept].known
+    mask = known & certain_rows(model, states[selection.samples][selection.kept], constants)
+    dropped = dict(selection.dropped)
+    for reason, before, after in (("missing", selection.mask, known), ("direction", known, mask)):
+        left_out = before.sum(axis=1) - after.sum(axis=1) + np.array(dropped.get(reason, 0))
+        dropped[reason] = tuple(left_out.tolist())
+    return replace(selection, mask=mask, dropped=dropped)
+
+
+def settings_of(signals: Signals, rows: Rows, factor: int) -> dict[str, Any]:
+    """Signals and rows, complete, with the factor that "auto" became."""
+    return {"signals": to_mapping(signals), "rows": to_mapping(rows), "factor": factor}

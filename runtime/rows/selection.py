@@ -1,0 +1,258 @@
+"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their
+place and speed.
+
+The choice is made once, on the measured record, and shared by every run of a study, so that a row
+is never kept or dropped because of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.model.generated import GeneratedModel
+from runtime.records.record import Record
+from runtime.rows.sign_errors import switches
+from runtime.settings.study import Rows, Signals
+from runtime.signals.filters import States, decimation_factor, kept_samples
+
+Array = np.ndarray
+
+LEAVES_OUT = {
+    "trim": "rows.trim",
+    "low_speed": "rows.low_speed",
+    "mask": "the choice of samples",
+    "missing": "positions that are missing",
+    "direction": "an uncertain direction of dry friction",
+}
+
+
+UNCERTAIN = 0.5
+"""Deviations of a speed below which its sign is not used: wrong in 31 % of the cases or more.
+Chosen on simulated records (docs/theory/counts.md).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Which samples are evaluated and which decimated rows are kept; shared by every run of a
+    study.
+
+    samples : the window, in raw samples.
+    kept : shape (K,), kept instants, from the start of the window.
+    mask : bool (n, K), rows used.
+    """
+
+    samples: slice
+    kept: Array
+    mask: Array
+    factor: int
+    t: Array
+    rate: float
+    signals: Signals
+    rows: Rows
+    dropped: Mapping[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Instants:
+    """Which samples of a record, or of a piece of it, are kept.
+
+    Attributes
+    ----------
+    start, stop : int
+        Raw samples of the window, [start, stop).
+    factor, first, kept : int
+        Decimation keeps one sample in `factor` from `first` on, counted from `start`, `kept` in
+        all.
+    used : (int, int)
+        Numbers of the instants whose rows may be used: without those of rows.trim and, in a piece,
+        those of its neighbours.
+    number : int
+        Number of the first kept instant in the whole record.
+    """
+
+    start: int
+    stop: int
+    factor: int
+    first: int
+    kept: int
+    used: tuple[int, int]
+    number: int = 0
+
+    def sample(self, number: int) -> int:
+        """The kept sample of an instant."""
+        return self.start + self.first + (number - self.number) * self.factor
+
+    def part(self, begin: int, end: int, used: tuple[int, int]) -> Instants:
+        """The kept instants of the samples [begin, end), of which `used` are used."""
+        start, stop = max(self.start, begin), min(self.stop, end)
+        ahead = start - self.start
+        first = (self.first - ahead) % self.factor
+        kept = len(range(first, stop - start, self.factor))
+        number = self.number + (ahead + first - self.first) // self.factor
+        return Instants(start, stop, self.factor, first, kept, used, number)
+
+
+def window_of(
+    times: Iterable[Array], window: tuple[float | None, float | None], file: str
+) -> tuple[int, int]:
+    """Samples [start, stop) with t0 <= t <= t1, s, of all times; None leaves an end open."""
+    t0, t1 = window
+    start = stop = 0
+    first = last = np.nan
+    for t in times:
+        start += 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
+        stop += len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
+        first, last = (float(t[0]) if np.isnan(first) else first), float(t[-1])
+    if stop <= start:
+        raise InputError(
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{first:g}, {last:g}] s",
+            file=file,
+        )
+    return start, stop
+
+
+def instants_of(
+    times: Iterable[Array], rate: float, signals: Signals, rows: Rows, file: str
+) -> Instants:
+    """Window and decimation of a record of consecutive times, s, at a rate, Hz."""
+    start, stop = window_of(times, rows.window, file)
+    factor = decimation_factor(signals, rate)
+    kept = kept_samples(
+        stop - start, factor, signals.decimate.phase if signals.decimate else "first"
+    )
+    K = len(kept)
+    if 2 * rows.trim >= K:
+        raise InputError(
+            f"{K} rows per joint after decimation by {factor}, of which rows.trim leaves "
+            f"out {2 * rows.trim}; "
+            "use a longer record or window, or a smaller rows.trim",
+            file=file,
+        )
+    return Instants(start, stop, factor, int(kept[0]), K, (rows.trim, K - rows.trim))
+
+
+def select_rows(
+    record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
+) -> Selection:
+    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape
+    (N, n), are the filtered velocities.
+    """
+    at = instants_of([record.t], record.rate, signals, rows, record.file)
+    kept = np.arange(at.first, at.stop - at.start, at.factor)
+    instants = kept + at.start
+    mask = np.ones((record.n, len(kept)), dtype=bool)
+    dropped = {}
+    for reason, usable in (
+        ("trim", (np.arange(at.kept) >= at.used[0]) & (np.arange(at.kept) < at.used[1])),
+        (
+            "low_speed",
+            np.abs(qd[instants].T)
+            >= per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None],
+        ),
+        ("mask", True if keep is None else _keep(keep, record)[instants].T),
+    ):
+        before = mask.sum(axis=1)
+        mask &= usable
+        dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
+    if not mask.any():
+        raise InputError(nothing_left(dropped, len(kept)), file=record.file)
+    return Selection(
+        slice(at.start, at.stop),
+        kept,
+        mask,
+        at.factor,
+        record.t[instants],
+        record.rate / at.factor,
+        signals,
+        rows,
+        dropped,
+    )
+
+
+def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
+    """Why none of the K rows of every joint is used, in words. dropped : rows left out by reason
+    and joint.
+    """
+    left_out = ", ".join(
+        f"{LEAVES_OUT.get(reason, reason)} leaves out {max(counts)}"
+        for reason, counts in dropped.items()
+        if any(counts)
+    )
+    return (
+        f"none of its {K} rows per joint is used: {left_out}; choose these settings anew, or "
+        "leave this record out"
+    )
+
+
+def unused_joints(
+    rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[int]
+) -> str:
+    """The joints of which no row is used, and what leaves most of them out, a sentence; "" where
+    every joint has rows.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Rows used, by joint.
+    dropped : mapping of str to sequence of int
+        Rows left out, by reason and joint.
+    joints : sequence of int
+        Their numbers.
+    """
+    bare = [j for j, count in enumerate(rows) if not count]
+    if not bare or not dropped:
+        return ""
+    reason = max(dropped, key=lambda name: sum(dropped[name][j] for j in bare))
+    return (
+        f"No row of joint {', '.join(str(joints[j]) for j in bare)} is used: "
+        f"{LEAVES_OUT.get(reason, reason)} leaves them out."
+    )
+
+
+def _keep(keep: Array, record: Record) -> Array:
+    keep = keep[:, None] if keep.ndim == 1 else keep
+    if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
+        raise InputError(
+            (
+                f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or "
+                f"{(len(record), record.n)}"
+            ),
+            file=record.file,
+        )
+    return keep
+
+
+def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+    """A setting that is one number or one per joint, shape (n,)."""
+    values = np.atleast_1d(np.asarray(value, dtype=float))
+    if values.shape not in {(1,), (n,)}:
+        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
+    return np.broadcast_to(values, (n,))
+
+
+def certain_rows(
+    model: GeneratedModel,
+    states: States,
+    constants: Mapping[str, float] | None = None,
+    *,
+    deviations: float = UNCERTAIN,
+) -> Array:
+    """Rows of every joint in which the state and each direction of dry friction are known, bool,
+    shape (n, K), of states (K, n) with known errors.
+
+    A row of joint j is uncertain where |s| is below `deviations` of s, s = G qd the speed of a
+    column that switches and acts on j.
+    """
+    certain = np.ones(states.q.T.shape, dtype=bool)
+    if states.errors is not None:
+        certain &= states.errors.known
+        for switch in switches(model, model.BASE_PARAMETERS, constants, passive="left out"):
+            certain[list(switch.joints)] &= np.abs(
+                states.qd @ switch.G
+            ) >= deviations * states.errors.along(switch.G)
+    return certain

@@ -1,0 +1,1 @@
+"""Positions read as counts of encoders: lattice, spline, sites, lines, reading."""

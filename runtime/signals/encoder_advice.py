@@ -1,0 +1,78 @@
+"""Whether reading counts would help a record whose positions are taken as they are: one sentence
+for identify and report.
+
+Positions taken as they are carry an error of variance step^2/12. Through the filters of the study
+it becomes an error of qdd of variance v; the
+columns of W are attenuated by about v over the mean square of qdd. Above HELPS that is a bias worth
+another reader.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.errors import InputError, SettingsError
+from runtime.model.drives import Drives
+from runtime.records.record import Record
+from runtime.settings.study import Signals
+from runtime.signals.counts.lattice import Lattice, lattice
+from runtime.signals.filters import States
+from runtime.signals.noise_gain import bandwidth
+from runtime.signals.states import encoder_position, encoder_root
+
+Array = np.ndarray
+
+HELPS = 0.01
+"""Share of the filtered acceleration that may be an error of the steps."""
+LOOKED_AT = 2**16
+"""Samples from the start of a record that are looked at."""
+
+
+def encoder_sentences(
+    record: Record, states: States, signals: Signals, drives: Drives | None
+) -> tuple[str, ...]:
+    """Positions being taken as they are, one sentence where reading counts would help.
+
+    states : of the record, through the filters.   drives : motor side; None where there is none.
+    """
+    motion = np.mean(states.qdd[:LOOKED_AT] ** 2, axis=0)
+    advice = _advice(record.q[:LOOKED_AT], record.rate, signals, motion, drives)
+    return (f"{record.name}: {advice}",) if advice else ()
+
+
+def _advice(q: Array, rate: float, signals: Signals, motion: Array, motors: Drives | None) -> str:
+    for side, drives in (("joint", None), ("motor", motors)):
+        if side == "motor" and drives is None:
+            continue
+        try:
+            found = lattice(encoder_position(q, drives))
+            share = _attenuation(rate, signals, motion, found, drives)
+        except (InputError, SettingsError):
+            continue
+        if not any("as if rounded" in text for text in found.findings):
+            if share.max() < HELPS:
+                return ""
+            return (
+                f"positions change in steps of {_range(found.step)} ({side} side), which make "
+                f"{100 * share.max():.0f} % of the "
+                f"mean square of an acceleration; signals: {{reader: counts, side: {side}}} reads "
+                "them as counts."
+            )
+    return ""
+
+
+def _range(steps: Array) -> str:
+    least, most = f"{steps.min():.3g}", f"{steps.max():.3g}"
+    return least if least == most else f"{least} to {most}"
+
+
+def _attenuation(
+    rate: float, signals: Signals, motion: Array, found: Lattice, drives: Drives | None
+) -> Array:
+    """Variance of the error of qdd over its mean square, `motion`, by joint, shape (n,)."""
+    n = len(motion)
+    gain = bandwidth(replace(signals, median=1), rate).before[2, 2]
+    error = gain * (encoder_root(drives, n) * found.step) ** 2 @ np.full(n, 1 / 12)
+    return np.asarray(np.where(motion > 0, error / np.where(motion > 0, motion, 1.0), 0.0))

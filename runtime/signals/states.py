@@ -1,0 +1,137 @@
+"""Joint states of measured positions, by the reader that the study names.
+
+lowpass    positions as they are, filtered and differentiated (`runtime.signals.filters`)
+counts
+    positions as counts of encoders (`runtime.signals.counts.reading`), whose posterior mean is then
+    filtered alike; errors of the
+           velocities are known
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.errors import SettingsError
+from runtime.model.drives import Drives
+from runtime.records.missing import COUNTS, Missing, require_positions
+from runtime.records.record import Record
+from runtime.settings.study import Signals
+from runtime.signals.counts.lattice import unwrapped_counts
+from runtime.signals.counts.reading import Reading, read_counts
+from runtime.signals.filters import SpeedErrors, States, filtered_states
+
+Array = np.ndarray
+
+
+def observed_states(
+    q: Array,
+    rate: float,
+    signals: Signals,
+    drives: Drives | None = None,
+    *,
+    missing: Missing | None = None,
+    name: str = "record",
+) -> States:
+    """q, qd, qdd of measured joint positions by the reader of the study.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n), rad or m
+        Joint side.
+    rate : float, Hz
+        Sampling rate.
+    signals : Signals
+        Reader and filters.
+    drives : Drives, optional
+        Motor side, where signals.side asks for it.
+    missing : Missing, optional
+        Samples of q that hold no position.
+    name : str
+        What errors call the record.
+
+    Raises
+    ------
+    InputError
+        Positions are missing that the reader needs, or are no counts
+        (`runtime.signals.counts.reading.read_counts`).
+    """
+    if signals.reader == "lowpass":
+        require_positions(missing, "reader: lowpass", name, COUNTS)
+        return filtered_states(q, rate, signals)
+    drives = encoder_drives(signals.side, drives)
+    position = encoder_position(q, drives, None if missing is None else missing.at_encoders(drives))
+    reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
+    return replace(
+        joint_states(reading, rate, signals, drives), findings=sentences(reading.findings, name)
+    )
+
+
+def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
+    """The record as reader counts takes it: counts that start anew after a turn of the counter go
+    on; another reader leaves it as it is. drives : as of `observed_states`.
+    """
+    if signals.reader != "counts":
+        return record
+    drives = encoder_drives(signals.side, drives)
+    position = encoder_position(record.q, drives)
+    known, counts, unwrapping = unwrapped_counts(position, signals.step, name=record.name)
+    if not unwrapping.wraps:
+        return record
+    x = known.position(counts)
+    return replace(record, q=x if drives is None else drives.joint_position(x))
+
+
+def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:
+    """Findings of one record as sentences that name it."""
+    return tuple(f"{name}: {text}." for text in findings)
+
+
+def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives | None) -> States:
+    """States of a reading, joint side, through the filters of the study; drives : None for encoders
+    on the joint side.
+    """
+    q = reading.q if drives is None else drives.joint_position(reading.q)
+    states = filtered_states(q, rate, replace(signals, median=1))
+    return replace(
+        states,
+        errors=SpeedErrors(
+            np.where(reading.unknown, np.inf, reading.s_qd), encoder_root(drives, q.shape[1])
+        ),
+    )
+
+
+def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
+    """The drives between the joints and encoders on that side; None where these are at the joints.
+
+    section : of the study, which names the side.
+    """
+    if side == "joint":
+        return None
+    if drives is None:
+        raise SettingsError(
+            "motor, but the robot has no drives; use side: joint or give drives in the robot file",
+            path=(section, "side"),
+        )
+    return drives
+
+
+def encoder_position(q: Array, drives: Drives | None, missing: Array | None = None) -> Array:
+    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing,
+    bool of that shape or (N, 0).
+    """
+    x = q if drives is None else drives.motor_position(q)
+    return x if missing is None or not missing.any() else np.where(missing, np.nan, x)
+
+
+def encoder_root(drives: Drives | None, n: int) -> Array:
+    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the
+    motor side.
+    """
+    if drives is None:
+        return np.eye(n)
+    return np.asarray(
+        drives.joint_position(np.eye(n)).T - drives.joint_position(np.zeros((1, n))).T
+    )

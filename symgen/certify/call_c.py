@@ -1,0 +1,36 @@
+"""Functions of a compiled C file, called in a process of its own, which a wrong index may end.
+
+`python call_c.py` reads {"library": path, "calls": [[name, arguments, size]], "tables": [[name,
+count]]} as JSON and prints the results: [status, numbers] of every call, where the argument null is
+the result, then the numbers of every table of int32.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+from typing import Any
+
+
+def main() -> None:
+    job = json.load(sys.stdin)
+    library = ctypes.CDLL(job["library"])
+    results: list[Any] = []
+    for name, arguments, size in job["calls"]:
+        result = (ctypes.c_double * size)()
+        status = getattr(library, name)(*(_argument(a, result) for a in arguments))
+        results.append([status, list(result)])
+    for name, count in job["tables"]:
+        results.append(list((ctypes.c_int32 * count).in_dll(library, name)))
+    json.dump(results, sys.stdout)
+
+
+def _argument(a: Any, result: Any) -> Any:
+    if a is None:
+        return result
+    return ctypes.c_int64(a) if isinstance(a, int) else (ctypes.c_double * len(a))(*a)
+
+
+if __name__ == "__main__":
+    main()

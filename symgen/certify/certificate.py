@@ -1,0 +1,438 @@
+"""The certificate of regrouping formulas: two independent routes, one exact, one numeric.
+
+Exact, over F_p at fresh random lengths and states, for two or more primes:
+
+    D_chi = sum_k coefficient_k,chi D_base,k   for every standard parameter chi,
+            rank_p(D_base) = number of base parameters.
+
+The primes are drawn anew, so that no coefficient is checked over the prime that gave it. The rank
+over F_p is never above the generic rank, so
+equality proves that no further relation exists. A false identity is a nonzero rational function of
+the geometry and of each state; with
+its degree bounded by d (`degree`: every angle counts 2 per multiple, numerator and denominator
+together) it vanishes at a random geometry, or at
+every state of one, with probability at most 2 d/p (Schwartz 1980, Zippel 1979). Draws are repeated
+until (2 d/p)**draws is below SURE. Numbers are
+not random: a false identity among them is a fixed nonzero number, which only its own few prime
+factors divide.
+
+General loops: the same identities at random points of the closed mechanism (`regroup.closed_draw`).
+
+Numeric, in floats at the lengths of the robot file: the standard regressor W of a dynamics by
+energies (`derive.lagrange`), which shares
+no code with the recursions, has the rank of the base parameters (SVD), and W chi = W_base X for
+random chi and X of the formulas.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symgen.certify.texts import TOLERANCE, TextCheck
+from symgen.certify.witness import base_values
+from symgen.derive.angles import units_of
+from symgen.derive.exact import Array, Draw, primes_for
+from symgen.derive.loops import close
+from symgen.description.expression import Call, Expression, Number, quarter_turns
+from symgen.description.robot import REVOLUTE, Frame, Robot
+from symgen.regroup.closed_draw import closed_draw
+from symgen.regroup.finite_field import rref
+from symgen.regroup.numbers import numbered
+from symgen.regroup.regrouping import EXACT, Regrouping
+from symgen.regroup.residues import sample, states_for
+
+if TYPE_CHECKING:
+    from symgen.derive.lagrange import Sample
+
+Sampler = Callable[[Draw, tuple[str, ...]], Array]
+ROUNDED = 1e-7  # of the largest entry: columns by coefficients that are numbers
+ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for rounding
+AT_VALUES = "say --at-values for the regrouping that does"
+SURE, MOST_DRAWS = (
+    1e-12,
+    8,
+)  # largest probability that a false identity passes, and draws over F_p at most
+FEW_STATES = 3  # of each draw for the identities: one would do
+FAR_APART = 1e6  # lengths of one robot: squares of their ratio come near rounding
+SEEN = 1e3  # gap of singular values that rounding does not make
+# gap of singular values at the rank of a geometry that is special; less where it is a hair off one
+CLEAR = 1e9
+# relative to the largest entry: rounding of some thousand operations and of the closed loops
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Results of the checks of a regrouping, and of the module emitted from it.
+
+    Attributes
+    ----------
+    name, method : str
+        Robot, and how the formulas were derived.
+    count, rank : int
+        Number of base parameters, and exact rank of their columns (the smallest over the primes).
+    primes : tuple of int
+        Primes of the exact checks; empty where coefficients are numbers.
+    identities : int
+        Number of column identities checked: one per standard parameter.
+    failures : tuple of str
+        Exact checks that do not hold, one sentence each.
+    numeric_rank : int
+        Rank by SVD of the independent regressor.
+    numeric_gap : float
+        Its smallest singular value that counts over the largest that does not.
+    torque_error : float
+        Largest difference of torques by base and by standard parameters on the independent
+        regressor, of the largest torque.
+    texts : mapping
+        What ran of each text, by file; empty where none was given.
+    rank_in_floats : bool
+        Whether `rank` is that of the independent regressor: loops of which F_p gives no points of
+        one geometry.
+    error_probability : float
+        Bound on the probability that a false identity passes the exact checks; 1 where coefficients
+        are numbers, which are checked in floats.
+    """
+
+    name: str
+    method: str
+    count: int
+    rank: int
+    primes: tuple[int, ...]
+    identities: int
+    failures: tuple[str, ...]
+    numeric_rank: int
+    numeric_gap: float
+    torque_error: float
+    texts: Mapping[str, TextCheck] = field(default_factory=dict)
+    rank_in_floats: bool = False
+    error_probability: float = 0.0
+
+    @property
+    def numeric_valid(self) -> bool:
+        """Whether the numeric rank and the torques agree with the formulas."""
+        return self.numeric_rank == self.count and self.torque_error < TOLERANCE
+
+    @property
+    def valid(self) -> bool:
+        """Whether every check holds: the verdict of `symgen check`."""
+        return (
+            not self.failures and self.numeric_valid and all(t.valid for t in self.texts.values())
+        )
+
+    @property
+    def formulas(self) -> str:
+        """How far the formulas are proved."""
+        if not self.primes:
+            return "checked in floats"
+        return (
+            f"exact modulo {' and '.join(map(str, self.primes))}, a false one passes with "
+            f"probability below {self.error_probability:.0e}"
+        )
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Error of every function and table of every text, as of `TextCheck.errors`."""
+        return {
+            f"{name} of {file}": error
+            for file, text in self.texts.items()
+            for name, error in text.errors.items()
+        }
+
+    @property
+    def checks(self) -> list[tuple[bool, str]]:
+        """Every check: whether it holds, and what it is."""
+        where = "in floats" if self.rank_in_floats or not self.primes else "modulo the primes"
+        columns = any(text.startswith("column") for text in self.failures)
+        checks = [
+            (self.rank == self.count, f"rank of the base columns {where}: {self.rank}"),
+            (
+                not columns,
+                f"{self.identities} column identities at fresh lengths and states {self.formulas}",
+            ),
+            (
+                self.numeric_rank == self.count,
+                f"rank of the CasADi regressor by SVD: {self.numeric_rank} "
+                f"(gap {self.numeric_gap:.1e})",
+            ),
+            (
+                self.torque_error < TOLERANCE,
+                "torques of the base parameters against CasADi: "
+                f"{self.torque_error:.1e} of the largest",
+            ),
+        ]
+        checks += [(True, f"{file} {t.sentence}") for file, t in self.texts.items() if t.not_run]
+        return checks + [
+            (error < TOLERANCE, f"{what} against CasADi: {error:.1e} of the largest")
+            for what, error in self.errors.items()
+        ]
+
+    def mapping(self) -> dict[str, Any]:
+        """The certificate as plain values for JSON; null stands for a number that is not finite."""
+        values = {"valid": self.valid, "numeric_valid": self.numeric_valid, **asdict(self)}
+        return dict(_plain(values))
+
+    def __str__(self) -> str:
+        """A line per check, marked `ok` or FALSE, then the verdict."""
+        head = f"{self.name}: {self.count} base parameters of {self.identities}, {self.method}"
+        lines = [f"{'ok   ' if holds else 'FALSE'} {text}" for holds, text in self.checks]
+        verdict = f"certificate {'valid' if self.valid else 'FALSE'}"
+        return "\n".join([head, *lines, *self.failures, verdict])
+
+
+def _plain(value: Any) -> Any:
+    """The same with null in the place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {key: _plain(x) for key, x in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def certify_formulas(
+    regrouping: Regrouping, *, seed: int = 101, sampler: Sampler = sample
+) -> Certificate:
+    """The certificate of the formulas of `regrouping`; `certify.modules.certify` adds the emitted
+    module.
+
+    Parameters
+    ----------
+    regrouping : Regrouping
+        Base parameters with their formulas.
+    seed : int
+        Of the random lengths and states over F_p.
+    sampler : callable
+        Gives the standard regressor over F_p at the states of a draw.
+
+    Raises
+    ------
+    DescriptionError
+        The loops close in too few random states.
+    """
+    robot = regrouping.robot
+    witness = independent(robot)
+    acting = [c for c, name in enumerate(robot.parameters) if name not in regrouping.no_effect]
+    base = [robot.parameters.index(own) for own in regrouping.own]
+    bound = 2 * degree(regrouping) / 2**30
+    draws = 2
+    while bound**draws > SURE and draws < MOST_DRAWS:
+        draws += 1
+    primes = primes_for(robot, draws, seed)
+    exact_ranks, wrong = zip(
+        *(_modulo(regrouping, seed + k, p, sampler) for k, p in enumerate(primes)), strict=True
+    )
+    ranks = [r for r in exact_ranks if r is not None]
+    exact_rank = min(ranks) if len(ranks) == draws else numeric_rank(witness.W[:, base])[0]
+    rank, gap = numeric_rank(witness.W[:, acting], proved=exact_rank)
+    failures = (
+        []
+        if exact_rank == len(regrouping)
+        else [f"rank is {exact_rank}, not {len(regrouping)}: the base columns are dependent"]
+    )
+    if regrouping.method != EXACT:
+        failures += [
+            f"column of {name} is not what the formulas say (in floats)"
+            for name in _false_in_floats(regrouping, witness.W, base)
+        ]
+        primes = ()
+    else:
+        failures += [
+            f"column of {name} is not what the formulas say (modulo {p})"
+            for p, names in zip(primes, wrong, strict=True)
+            for name in names
+        ]
+    failures += [
+        f"{text}; the formulas do not hold there, {AT_VALUES}"
+        for text in vanishing_denominators(regrouping)
+    ]
+    if rank < len(regrouping) == exact_rank:
+        values = ", ".join(f"{name} = {value:g}" for name, value in robot.constants.items())
+        failures.append(
+            (
+                f"the constants of the file ({values}) are special: the rank is {rank} there, "
+                f"{len(regrouping)} elsewhere; {AT_VALUES}"
+            )
+            if gap > CLEAR
+            else f"the file is a hair off a special geometry: {len(regrouping) - rank} of its base "
+            "parameters act by less than 1e-9 of the others, "
+            "which no record can tell; round the numbers that are meant round, angles and axes "
+            "first"
+        )
+    sizes = sorted(
+        x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants)))
+    )
+    if sizes and rank > exact_rank == len(regrouping) and sizes[-1] > FAR_APART * sizes[0]:
+        failures.append(
+            f"lengths between {sizes[0]:.3g} and {sizes[-1]:.3g} m lie too far apart for checks in "
+            "double precision; give them in one order of size"
+        )
+    chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
+    tau = witness.W @ chi
+    error = float(
+        np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi, robot.constants)).max()
+        / np.abs(tau).max()
+    )
+    return Certificate(
+        robot.name,
+        regrouping.method,
+        len(regrouping),
+        exact_rank,
+        primes,
+        len(robot.parameters),
+        tuple(failures),
+        numeric_rank=rank,
+        numeric_gap=gap,
+        torque_error=error,
+        rank_in_floats=len(ranks) < draws,
+        error_probability=bound**draws if primes else 1.0,
+    )
+
+
+def vanishing_denominators(regrouping: Regrouping) -> list[str]:
+    """Denominators of coefficients that are zero at the constants of the robot file, a sentence
+    each.
+    """
+    values, texts = regrouping.robot.constants, []
+    for b in regrouping.base:
+        below = {
+            a
+            for c in b.combination.values()
+            for m in c.terms
+            for a, n in m
+            if n < 0 or (isinstance(a, Call) and a.function == "inv")
+        }
+        for a in sorted(below, key=str):
+            base = (
+                a.argument
+                if isinstance(a, Call) and a.function == "inv"
+                else Expression({((a, 1),): Fraction(1)})
+            )
+            if abs(base.value(values)) < ZERO_BELOW:
+                at = ", ".join(f"{name} = {values[name]:g}" for name in sorted(base.symbols))
+                texts.append(f"{b.name} = {b.formula} divides by {base}, which is zero at {at}")
+    return texts
+
+
+def degree(regrouping: Regrouping) -> int:
+    """A bound on the degree of the column identities in all random variables: half-angle tangents,
+    lengths, rates, directions.
+
+    An entry of the regressor passes each frame of a path at most three times: outwards in products
+    of two velocities, and back.
+    """
+    robot, closure, units = regrouping.robot, close(regrouping.robot), units_of(regrouping.robot)
+
+    def angle(e: Expression) -> int:
+        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(e)[1]))
+
+    def constant(e: Expression) -> int:
+        return max((sum(abs(n) * atom(a) for a, n in m) for m in e.terms), default=0)
+
+    def atom(a: str | Number | Call) -> int:
+        if not isinstance(a, Call):
+            return 1
+        return angle(a.argument) if a.function in ("cos", "sin") else constant(a.argument)
+
+    def frame(f: Frame) -> int:
+        turn = (
+            2 * sum(abs(n) for _, n in closure.turn(f.j)[0]) + angle(closure.offset[f.j])
+            if f.sigma == REVOLUTE
+            else 1
+        )
+        return (
+            turn
+            + sum(map(angle, (f.gamma, f.alpha, f.theta0)))
+            + max(map(constant, (f.b, f.d, f.r0)))
+        )
+
+    path = max(
+        (sum(frame(robot.frame(i)) for i in robot.path(f.j)) for f in robot.frames), default=0
+    )
+    rows = [
+        g
+        for e in robot.elements
+        for table in (e.along, e.form)
+        for row in table.values()
+        for g in row.values()
+    ]
+    coefficients = max(
+        (constant(c) for b in regrouping.base for c in b.combination.values()), default=0
+    )
+    return 3 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
+
+
+def _modulo(
+    regrouping: Regrouping, seed: int, p: int, sampler: Sampler
+) -> tuple[int | None, list[str]]:
+    """Rank of the base columns over F_p (None where no points of one geometry are found), and the
+    columns that are not what the formulas say.
+    """
+    robot = regrouping.robot
+    names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
+    if close(robot).tied:
+        robot = numbered(robot)
+        try:
+            draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p)
+            fixed = closed_draw(robot, seed, len(own) // len(robot.joints) + 10, p=p)
+        except ArithmeticError:
+            return None, list(names) if regrouping.method == EXACT else []
+        few = np.moveaxis(sample(draw, names), 0, 1)
+        rank = len(rref(sample(fixed, regrouping.own)[0], p, reduced=False)[0])
+    else:
+        draw = Draw(robot, seed, states_for(robot, names), p=p)
+        W = sampler(draw, names)
+        rank = len(rref(W[:, own], p, reduced=False)[0])
+        few = W.reshape(len(robot.joints), -1, len(names))[:, :FEW_STATES]
+    predicted = np.zeros_like(few)
+    for k, b in enumerate(regrouping.base):
+        for name, coefficient in b.combination.items():
+            residue = draw.residues(draw.constant(coefficient))
+            column = names.index(name)
+            predicted[..., column] = (predicted[..., column] + few[..., own[k]] * residue) % p
+    wrong = np.flatnonzero((predicted != few).any(axis=(0, 1)))
+    return rank, [names[c] for c in wrong]
+
+
+def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[str]:
+    """Columns of the independent regressor that the formulas miss by more than ROUNDED of the
+    largest entry.
+    """
+    robot = regrouping.robot
+    K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
+    off = np.abs(W[:, base] @ K - W).max(axis=0) > ROUNDED * np.abs(W).max()
+    return [robot.parameters[c] for c in np.flatnonzero(off)]
+
+
+@lru_cache(maxsize=4)
+def independent(robot: Robot) -> Sample:
+    """The regressor by energies at random states of `robot`, kept for further certificates of the
+    robot.
+    """
+    from symgen.derive.lagrange import (
+        in_one_mode,
+        sampled,
+    )  # CasADi, loaded late
+
+    return sampled(in_one_mode(robot), 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
+
+
+def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:
+    """Rank of a float matrix by SVD after scaling its columns, and the gap s_rank / s_(rank+1).
+
+    Where the rank is `proved`, singular values below the tolerance count as far as a gap of SEEN
+    stands behind them.
+    """
+    norms = np.linalg.norm(W, axis=0)
+    acts = (
+        norms > 1e-12 * np.median(norms[norms > 0]) if norms.any() else norms > 0
+    )  # below: rounding of a column without effect
+    s = np.linalg.svd(W[:, acts] / norms[acts], compute_uv=False)
+    rank = int(np.sum(s > tolerance * s[0]))
+    if rank < proved < s.size and s[proved - 1] > SEEN * s[proved]:
+        rank = proved
+    gap = float(s[rank - 1] / max(s[rank], np.finfo(float).tiny)) if rank < s.size else float("inf")
+    return rank, gap

@@ -1,0 +1,77 @@
+"""What a certificate claims, as plain values that a program of others can verify.
+
+`docs/examples/check_certificate.py` does so from the frame table, with nothing of ours.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from symgen.certify.certificate import Certificate, degree
+from symgen.derive.loops import close
+from symgen.description.robot import Element, Robot
+from symgen.regroup.regrouping import Regrouping
+from symgen.version import VERSION
+
+ENTRIES_OF_FRAMES = ("gamma", "b", "alpha", "d", "theta", "r")
+
+
+def claim(regrouping: Regrouping, certificate: Certificate) -> dict[str, Any]:
+    """The claim: robot, relations, rank, primes, formulas, what ran of each text with its hash.
+
+    Expressions are texts in the grammar of robot files. The identities are those of the columns of
+    all standard parameters, D_chi = sum_k coefficient_k,chi D_own,k, at random points over F_p.
+    """
+    robot, closure = regrouping.robot, close(regrouping.robot)
+    return {
+        "symgen": VERSION,
+        "robot": robot.name,
+        "source_sha256": robot.sha256,
+        "frames": [
+            {"j": f.j, "ant": f.ant, "sigma": f.sigma, "link": f.j in robot.links}
+            | {key: str(getattr(f, key)) for key in ENTRIES_OF_FRAMES}
+            for f in robot.frames
+        ],
+        "gravity": [str(e) for e in robot.gravity],
+        "constants": dict(robot.constants),
+        "joints": robot.joints,
+        "passive": {
+            str(j): str(closure.formula(j)) for j in robot.passive if j not in closure.tied
+        },
+        "tied": closure.tied,
+        "loops": [(loop.cut, loop.twin) for loop in robot.loops],
+        "elements": [_element(robot, e) for e in robot.elements],
+        "standard_parameters": robot.parameters,
+        "base_parameters": [
+            {
+                "name": b.name,
+                "own": b.own,
+                "coefficients": {name: str(c) for name, c in b.combination.items()},
+            }
+            for b in regrouping.base
+        ],
+        "no_effect": regrouping.no_effect,
+        "degree": degree(regrouping),
+        **certificate.mapping(),
+    }
+
+
+def _element(robot: Robot, e: Element) -> dict[str, Any]:
+    """Rows and forms by key, and the sign of each row's first coefficient for the actuated joints
+    in the robot file, which directions of motion go by.
+    """
+    closure = close(robot)
+    active = {j: closure.in_independent(row) for j, row in e.along.items()}
+    return {
+        "family": e.family,
+        "kind": e.kind,
+        "when": e.when,
+        "along": {str(j): {str(i): str(c) for i, c in row.items()} for j, row in e.along.items()},
+        "form": {
+            str(j): {f"{i},{k}": str(c) for (i, k), c in form.items()} for j, form in e.form.items()
+        },
+        "signs": {
+            str(j): -1 if row and row[0][1].value(robot.constants) < 0 else 1
+            for j, row in active.items()
+        },
+    }

@@ -1,0 +1,139 @@
+"""Certified texts as files of a cache, and as Python modules.
+
+A file lies in a cache by content: its folder is called after the SHA-256 of the text below the
+header of its certificate, so that an entry never gets old; one whose text is another is written
+anew, whole, under another name first. A folder called after the whole text says that it is
+certified. Where the cache cannot be written, a folder that lives as long as this process serves.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib.util
+import os
+import shutil
+import sys
+from functools import lru_cache
+from hashlib import sha256
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from tempfile import NamedTemporaryFile, mkdtemp
+from types import ModuleType
+
+from symgen.errors import SymgenError
+
+HEAD = "Certificate"
+END = "sha256 of what follows: "
+
+
+def cache_folder() -> Path:
+    """Folder of the emitted modules: SYMGEN_CACHE/modules, or that of the platform for files that
+    can be made again.
+    """
+    if given := os.environ.get("SYMGEN_CACHE"):
+        return Path(given) / "modules"
+    if sys.platform == "win32":
+        return (
+            Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+            / "symgen"
+            / "modules"
+        )
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "symgen" / "modules"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symgen" / "modules"
+
+
+def cached_path(file: str, text: str) -> Path | None:
+    """Path of the cache entry of a file that holds the certified `text`; None where there is none,
+    or another text.
+    """
+    path = _entry(text)
+    try:
+        return path / file if path and below((path / file).read_text("utf-8")) == text else None
+    except (OSError, UnicodeError):
+        return None
+
+
+def stored_path(file: str, text: str) -> Path:
+    """Path of a file that holds `text`, in the cache, by what stands below its header and by the
+    whole, or, where that cannot be written, in a folder of this process.
+
+    Raises SymgenError where no file can be written at all.
+    """
+    folder, whole = _entry(below(text)), _entry(text)
+    if folder is not None and whole is not None:
+        try:
+            whole.mkdir(parents=True, exist_ok=True, mode=0o700)
+            return _write(folder / file, text)
+        except OSError:  # no right to write, full
+            pass
+    try:
+        return _write(_folder_of_this_process() / _key(text) / file, text)
+    except OSError as e:
+        raise SymgenError(
+            f"{file}: neither the cache folder nor a temporary file can be written: "
+            f"{e.strerror or e}; set SYMGEN_CACHE or TMPDIR"
+        ) from e
+
+
+def below(text: str) -> str:
+    """A text without the header of its certificate."""
+    head, end, rest = text.partition(END)
+    return rest.partition("\n")[2] if end and head.startswith((f"# {HEAD}", f"// {HEAD}")) else text
+
+
+def imported(path: Path) -> ModuleType:
+    """The module of an emitted file, called generated_ROBOT."""
+    name = f"generated_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path, loader=_TextLoader(name, str(path)))
+    if spec is None or spec.loader is None:
+        raise SymgenError(f"{path} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class _TextLoader(SourceFileLoader):
+    """Loader of the text alone: bytecode of an earlier text that lies beside is neither read nor
+    written.
+    """
+
+    def path_stats(self, path: str | bytes) -> dict[str, float]:
+        raise OSError(f"{path!r} has no bytecode")
+
+
+def _key(text: str) -> str:
+    return sha256(text.encode("utf-8")).hexdigest()[:32]
+
+
+def _entry(text: str) -> Path | None:
+    """Folder of a text in the cache; None without a home folder, or where anyone may write."""
+    try:
+        folder = cache_folder().absolute()
+        if os.name == "posix" and folder.is_dir() and folder.stat().st_mode & 0o002:
+            return None
+    except (OSError, RuntimeError):
+        return None
+    return folder / _key(text)
+
+
+def _write(path: Path, text: str) -> Path:
+    """Write the file whole, or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with NamedTemporaryFile(
+        "w", encoding="utf-8", newline="\n", dir=path.parent, prefix=f".{path.stem}-", delete=False
+    ) as file:
+        file.write(text)
+    try:
+        Path(file.name).replace(path)
+    except OSError:
+        Path(file.name).unlink(missing_ok=True)
+        raise
+    return path
+
+
+@lru_cache(maxsize=1)
+def _folder_of_this_process() -> Path:
+    folder = mkdtemp(prefix="symgen-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)

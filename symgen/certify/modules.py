@@ -1,0 +1,148 @@
+"""Texts that are certified before they leave, and modules that are imported from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+from symgen.certify.certificate import Certificate, certify_formulas
+from symgen.certify.importing import cached_path, imported, stored_path
+from symgen.certify.texts import headed, text_check
+from symgen.certify.witness import Witness
+from symgen.derive.time_limit import limited
+from symgen.description.files import load_robot
+from symgen.description.robot import Robot
+from symgen.emit.generate import generate_files
+from symgen.emit.targets import TARGETS
+from symgen.errors import CertificateError, SymgenError
+from symgen.regroup.regrouping import Regrouping, regroup
+
+PYTHON = tuple(name for name, target in TARGETS.items() if target.file.endswith(".py"))
+
+
+def certify(regrouping: Regrouping, files: Mapping[str, str] | None = None) -> Certificate:
+    """The certificate of the formulas of `regrouping` and of texts made from it: the verdict of
+    `symgen check`.
+
+    Parameters
+    ----------
+    regrouping : Regrouping
+        Base parameters with their formulas.
+    files : mapping, optional
+        Texts by the file names of their targets. Default: the NumPy module.
+
+    Raises
+    ------
+    DescriptionError
+        The loops close in too few random states.
+    """
+    robot = regrouping.robot
+    target = {t.file.format(robot.name): name for name, t in TARGETS.items()}
+    with limited(f"the certificate of {robot.name}"):
+        certificate = certify_formulas(regrouping)
+    files = generate_files(robot, regrouping=regrouping) if files is None else files
+    witness = Witness(regrouping)
+    texts = {file: text_check(file, text, target[file], witness) for file, text in files.items()}
+    return replace(certificate, texts=texts)
+
+
+def certified_files(
+    robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None
+) -> dict[str, str]:
+    """{file name: text} of every target as `generate_files`, below what their certificate says;
+    they then lie in the cache of texts that runtime runs.
+
+    Raises CertificateError, in one sentence, where the certificate does not hold.
+    """
+    regrouping = regroup(robot)
+    return _certified(
+        regrouping,
+        generate_files(robot, targets=targets, command=command, regrouping=regrouping),
+    )
+
+
+def _certified(regrouping: Regrouping, files: Mapping[str, str]) -> dict[str, str]:
+    certificate = certify(regrouping, files)
+    require_valid(certificate)
+    texts = {
+        file: headed(text, certificate.texts[file], certificate.formulas)
+        for file, text in files.items()
+    }
+    for file, text in texts.items():  # runtime runs what lies in the cache
+        stored_path(file, text)
+    return texts
+
+
+def require_valid(certificate: Certificate) -> None:
+    """Raise CertificateError unless the certificate holds."""
+    if not certificate.valid:
+        wrong = [text for holds, text in certificate.checks if not holds]
+        reasons = [t for t in certificate.failures if not t.startswith(("column", "rank"))]
+        raise CertificateError(
+            f"{certificate.name}: the certificate does not hold ({[*reasons, *wrong][0]}); nothing "
+            "leaves; `symgen check` prints every check",
+            certificate,
+        )
+
+
+def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
+    """The module of a robot: derived, regrouped, emitted, certified, imported from a cache by
+    content.
+
+    Parameters
+    ----------
+    robot : str, Path or Robot
+        Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
+    target : str
+        numpy, casadi or xp (arrays of any package).
+
+    Returns
+    -------
+    module
+        What `import` of the emitted file gives; other processes can load the file `__file__` as
+        long as this one lives.
+
+    Raises
+    ------
+    DescriptionError
+        The file cannot be read or describes no robot.
+    CertificateError
+        The certificate does not hold.
+    SymgenError
+        The robot has no module of this target.
+    """
+    robot = robot if isinstance(robot, Robot) else load_robot(robot)
+    if target not in PYTHON:
+        raise SymgenError(
+            f"target {target!r}; Python imports {', '.join(PYTHON)}; `symgen generate --target c` "
+            "writes C"
+        )
+    files = generate_files(robot, targets=(target,))
+    if not files:
+        raise SymgenError(
+            f"{robot.name}: no {target} module, since its loops are closed by iteration; the NumPy "
+            "module serves"
+        )
+    ((file, text),) = files.items()
+    path = _cached(regroup(robot), file, text)
+    module = imported(path)
+    if target == "numpy":  # runtime asks for it where it simulates
+        vars(module)["casadi_file"] = lambda: str(model(robot, target="casadi").__file__)
+    return module
+
+
+def c_file(robot: str | Path | Robot) -> Path:
+    """The C file of a robot, certified, in the cache by content; an empty one of a robot whose
+    loops are closed by iteration, which has none.
+    """
+    robot = robot if isinstance(robot, Robot) else load_robot(robot)
+    for file, text in generate_files(robot, targets=("c",)).items():
+        return _cached(regroup(robot), file, text)
+    return stored_path(f"{robot.name}.c", "")
+
+
+def _cached(regrouping: Regrouping, file: str, text: str) -> Path:
+    """Path of a text in the cache: what lies there has been certified."""
+    return cached_path(file, text) or stored_path(file, _certified(regrouping, {file: text})[file])

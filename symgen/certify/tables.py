@@ -1,0 +1,170 @@
+"""Tables of a module, compared with the robot file, the regrouping and the witness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from symgen.certify.printed import definitions, equations, evaluated
+from symgen.certify.witness import Witness
+from symgen.derive.columns import element_names, inertial_names
+from symgen.derive.exact import Array
+from symgen.derive.loops import close
+from symgen.description.robot import KINDS, PRISMATIC, Element, Robot
+from symgen.errors import CertificateError
+from symgen.regroup.regrouping import Regrouping
+
+EVALUATED_TWICE = 1e-9  # of the largest: formulas and rows evaluated twice
+UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
+
+
+def table_errors(module: ModuleType, witness: Witness) -> dict[str, float]:
+    """Zero for every table of a module that is right, infinity for one that is not.
+
+    HEADER stands for the formulas of its header, DEFAULTS for the constants of its functions.
+    """
+    names = [n for n in vars(module) if n.isupper() and not n.startswith("_")]
+    errors = {}
+    for name in [*names, "HEADER", "DEFAULTS"]:
+        try:
+            right = _right(module, name, witness)
+        except Exception:  # a table may hold anything
+            right = False
+        errors[name] = 0.0 if right else float("inf")
+    return errors
+
+
+def _right(module: ModuleType, name: str, witness: Witness) -> bool:
+    constants, value = witness.robot.constants, getattr(module, name, None)
+    match name:
+        case "FORMULAS":
+            own = {*value} <= {*witness.regrouping.names}  # type: ignore[misc]
+            return own and formulas_hold(value.items(), witness)  # type: ignore[union-attr]
+        case "HEADER":
+            lines = (module.__doc__ or "").partition("Base parameters")[2].splitlines()
+            names = witness.regrouping.names
+            return formulas_hold([d for d in definitions(lines) if d[0] in names], witness)
+        case "DEFAULTS":
+            defaults = [d for f in vars(module).values() for d in _defaults(f)]
+            return all(constants[c] == x for c, x in defaults if c in constants)
+        case "ELEMENTS":
+            drawn = module.elements(**witness.constants)
+            return _same_elements(value, constants, witness) and _same_elements(
+                drawn, witness.constants, witness
+            )
+        case "ENTRIES" | "SIGNALS":  # the functions read the entries
+            signals = module.signals(witness.q, witness.qd, witness.qdd, **witness.constants)
+            D = np.zeros_like(witness.own)
+            for k, j, s, c in module.ENTRIES:
+                D[:, j, k] = c * signals[s]
+            return len(signals) == module.SIGNALS and bool(
+                np.allclose(D, witness.own, atol=EVALUATED_TWICE * np.abs(D).max())
+            )
+        case "STRUCTURE":
+            marked = np.asarray(value)
+            closed, free = (
+                (np.abs(D).max(axis=0) > EVALUATED_TWICE * np.abs(D).max()).T
+                for D in (witness.own, _free_columns(witness))
+            )
+            return marked.shape == closed.shape and np.array_equal(
+                marked | closed,
+                marked & free,  # closed <= marked <= free
+            )
+    right = _expected(witness)[name]
+    return bool(value == right and (not isinstance(right, Mapping) or [*value] == [*right]))
+
+
+def _free_columns(witness: Witness) -> Array:
+    """The columns (N, n, b) where passive joints of general loops move as they like: a text marks
+    what is zero on the closed mechanism alone, since it solves for their rates.
+    """
+    robot = witness.robot
+    if not close(robot).tied:
+        return witness.own
+    rng, passive = np.random.default_rng(9), np.isin(robot.moving, robot.passive)
+    G = witness.G + passive[:, None] * rng.standard_normal(witness.G.shape)
+    D = np.swapaxes(G, 1, 2) @ witness.model.regressor(*rng.standard_normal((3, *witness.x.shape)))
+    return np.asarray(D[:, :, [robot.parameters.index(name) for name in witness.regrouping.own]])
+
+
+def _defaults(function: Any) -> list[tuple[str, float]]:
+    """(name, value) of the arguments of a function that have one."""
+    if hasattr(function, "default_in"):  # of CasADi
+        return [(function.name_in(k), function.default_in(k)) for k in range(function.n_in())]
+    return [*(getattr(function, "__kwdefaults__", None) or {}).items()]
+
+
+def _expected(witness: Witness) -> dict[str, Any]:
+    robot, regrouping = witness.robot, witness.regrouping
+    d = robot.drives
+    return {
+        "SCHEMA": 1,
+        "NAME": robot.name,
+        "SOURCE_SHA256": robot.sha256,
+        "JOINTS": robot.joints,
+        "PASSIVE": robot.passive,
+        "LINKS": robot.links,
+        "LABELS": robot.labels,
+        "CONSTANTS": robot.constants,
+        "BASE_PARAMETERS": regrouping.names,
+        "STANDARD_PARAMETERS": robot.parameters,
+        "UNITS": {b.name: unit(robot, b.own) for b in regrouping.base},
+        "NO_EFFECT": regrouping.no_effect,
+        "DRIVES": d
+        and {"ratio": d.ratio, "offset": d.offset, "torque_constant": d.torque_constant},
+        "LIMITS": robot.limits,
+        "VALUES": robot.values,
+    }
+
+
+def unit(robot: Robot, name: str) -> str:
+    """Unit of a standard parameter."""
+    inertial = inertial_names(robot)
+    if name in inertial:
+        return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
+    e, j = element_names(robot)[name]
+    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
+
+
+def formulas_hold(formulas: Any, witness: Witness) -> bool:
+    """Whether texts give what the base parameters are that they are called after."""
+    chi = dict(zip(witness.robot.parameters, witness.chi, strict=True))
+    X = dict(zip(witness.regrouping.names, witness.X, strict=True))
+    size = EVALUATED_TWICE * np.abs(witness.X).max(initial=1e-300)
+    found = evaluated(formulas, {**chi, **witness.constants})
+    return all(abs(found[name] - X[name]) < size for name in found if name in X)
+
+
+def _same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
+    """Whether every element has its kind, its direction of motion, its row or its form."""
+    expected = element_names(witness.robot)
+    if list(table) != [name for name in witness.robot.parameters if name in expected]:
+        return False
+    for name, (e, j) in expected.items():
+        kind, when, row = table[name]
+        right = {i: c.value(constants) for i, c in _row(e, j).items()}
+        if (kind, when) != (e.kind, e.when or "both") or {*row} != {*right}:
+            return False
+        if any(abs(row[i] - c) > EVALUATED_TWICE * abs(c) for i, c in right.items()):
+            return False
+    return True
+
+
+def _row(e: Element, j: int) -> dict[Any, Any]:
+    """Row {joint: G}, or form {(i, j): B}, i <= j, of an element's key."""
+    if j in e.along:
+        return dict(e.along[j])
+    return {place: c for place, c in e.form[j].items() if place[0] <= place[1]}
+
+
+def certified_formulas(regrouping: Regrouping, text: str) -> str:
+    """Printed formulas of base parameters. Raises CertificateError where one of them is false."""
+    formulas = [(name, e) for name, e in equations(text) if name.isidentifier()]
+    if not formulas_hold(formulas, Witness(regrouping)):
+        raise CertificateError(
+            f"{regrouping.robot.name}: a formula as printed is false; nothing is printed", text
+        )
+    return text

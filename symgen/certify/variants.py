@@ -1,0 +1,90 @@
+"""One module in which the whole table of frames is free: what a robot would be with another angle,
+length or gravity, without another derivation.
+
+    free = symgen.variants("arm.yaml")
+    free.regressor(q, qd, qdd, free_alpha4=pi/2)       frame 4 turned the other way
+    free.observation_matrix(q, qd, qdd, free_gx=9.81, free_gz=0.0)
+
+Its columns are all standard parameters: which of them regroup depends on the geometry, and is left
+to the numbers. `runtime.identify` takes it
+as `variants` and tries with it whether another table explains a record better. A robot with closed
+loops keeps its table, which the loops
+have to close; gravity alone is free there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from symgen.certify.importing import cached_path, imported, stored_path
+from symgen.certify.texts import headed, text_check
+from symgen.certify.witness import Witness, ungrouped
+from symgen.description.expression import Expression
+from symgen.description.files import load_robot
+from symgen.description.robot import PRISMATIC, REVOLUTE, Frame, Robot
+from symgen.emit.generate import generate_files
+from symgen.errors import CertificateError
+
+FREE = "free_"
+"""What the names of the freed entries start with: free_alpha4, free_d3, free_gx."""
+
+
+def variants(robot: str | Path | Robot) -> ModuleType:
+    """The emitted module of a robot with its table of frames and its gravity as constants, columns
+    all standard parameters.
+
+    Parameters
+    ----------
+    robot : str, Path or Robot
+        As for `symgen.model`.
+
+    Returns
+    -------
+    module
+        Constants free_alpha1, free_d1, free_theta1, free_r1 ... (gamma and b where a frame has
+        them), free_gx, free_gy, free_gz, beside those of the
+        robot file; their defaults are its entries.
+    """
+    robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
+    regrouping = ungrouped(robot)
+    ((file, text),) = generate_files(robot, regrouping=regrouping).items()
+    path = cached_path(file, text)
+    if path is None:
+        check = text_check(file, text, "numpy", Witness(regrouping))
+        if check.wrong:
+            raise CertificateError(f"{robot.name}: {', '.join(check.wrong)} of variants", check)
+        path = stored_path(file, headed(text, check, "of standard parameters"))
+    return imported(path)
+
+
+def freed(robot: Robot) -> Robot:
+    """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of
+    its gravity.
+    """
+    constants = dict(robot.constants)
+
+    def symbol(name: str, entry: Expression) -> Expression:
+        constants[f"{FREE}{name}"] = float(entry.value(robot.constants))
+        return Expression.symbol(f"{FREE}{name}")
+
+    def free(f: Frame) -> Frame:
+        entries: dict[str, Any] = {
+            key: symbol(f"{key}{f.j}", getattr(f, key)) for key in ("gamma", "b") if getattr(f, key)
+        }
+        entries |= {"alpha": symbol(f"alpha{f.j}", f.alpha), "d": symbol(f"d{f.j}", f.d)}
+        q = Expression.symbol(f.q)
+        theta, r = symbol(f"theta{f.j}", f.theta0), symbol(f"r{f.j}", f.r0)
+        entries |= {
+            "theta": q + theta if f.sigma == REVOLUTE else theta,
+            "r": q + r if f.sigma == PRISMATIC else r,
+        }
+        return replace(f, **entries)
+
+    frames = robot.frames if robot.loops else tuple(map(free, robot.frames))
+    gx, gy, gz = (
+        symbol(f"g{axis}", entry) for axis, entry in zip("xyz", robot.gravity, strict=True)
+    )
+    return replace(robot, frames=frames, gravity=(gx, gy, gz), constants=constants)

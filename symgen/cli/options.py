@@ -1,0 +1,118 @@
+"""Arguments and options of the verbs, those that several have or whose help is long."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+Text = str | None
+
+
+def folder(files: str) -> Any:
+    """The option -o of a verb that writes these files."""
+    return typer.Option("-o", "--output", help=f"Folder for {files}.")
+
+
+RobotFile = Annotated[
+    str, typer.Argument(help="Packaged robot or robot file (.yaml, .par, .urdf, .xml, .mjcf).")
+]
+RobotOrModule = Annotated[
+    str,
+    typer.Argument(
+        help="Packaged robot, robot file (.yaml, .par, .urdf) or generated module (.py)."
+    ),
+]
+Records = Annotated[
+    list[str],
+    typer.Argument(
+        help="Dataset, study file (.yaml) or measured file (t,q1..,tau1..; SI, joint side). "
+        "Further measured files like the first: records of their own."
+    ),
+]
+AtValues = Annotated[
+    bool,
+    typer.Option(
+        "--at-values",
+        help="Every constant as its number: base parameters and formulas that hold for these "
+        "values, where the generic ones do not.",
+    ),
+]
+Exact = Annotated[
+    bool,
+    typer.Option(
+        "--exact",
+        help="Angles of a URDF or .par file as written. Default: those within 1e-4 rad of a "
+        "multiple of pi/12 are taken as that.",
+    ),
+]
+Trust = Annotated[
+    bool,
+    typer.Option("--trust", help="Run a module (.py) that was not emitted here: it is code."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Columns = Annotated[Text, typer.Option(help="essential, all, or names separated by commas.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of what is drawn at random.")]
+Workers = Annotated[
+    int,
+    typer.Option(min=0, help="Processes, this one among them. The results do not depend on it."),
+]
+Scheduler = Annotated[
+    Text,
+    typer.Option(
+        help="Address of a Dask scheduler whose workers do the work, such as tcp://10.0.0.1:8786."
+    ),
+]
+Target = Annotated[str, typer.Option(help="numpy, or c: compiled, where there is a compiler.")]
+Side = Annotated[Text, typer.Option(help="joint or motor: where positions are rounded.")]
+Rounding = Annotated[
+    Text,
+    typer.Option(
+        help="two-point, uniform, gaussian, quantise; or phase: counts of a real encoder, of "
+        "random phase."
+    ),
+]
+Uneven = Annotated[
+    float | None,
+    typer.Option(help="Deviation of the lines of --rounding phase, in steps, such as 0.1."),
+]
+Method = Annotated[
+    Text,
+    typer.Option(
+        help="Estimator in place of the study's: ols, wls, irls, tls, iv, didim, cloe, feasible."
+    ),
+]
+Reader = Annotated[
+    Text,
+    typer.Option(
+        help="lowpass: positions as they are; counts: as counts of an encoder (with --rounding "
+        "phase)."
+    ),
+]
+Place = Annotated[
+    Text,
+    typer.Option(
+        help="record: recorded positions are rounded; loop: the encoder of the study's closed "
+        "loop, in every run."
+    ),
+]
+Advise = Annotated[
+    bool,
+    typer.Option(
+        "--advise",
+        help="Predict the coarsest steps that keep the change below 1 % and 5 %, and confirm them "
+        "by --runs runs each.",
+    ),
+]
+Lock = Annotated[
+    list[str] | None,
+    typer.Option(help="Of a URDF or MJCF: hold a joint, elbow=pi/2 (rad or m); repeat."),
+]
+Chain = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        metavar="BASE TIP",
+        help="Of a URDF or MJCF: the joints between two links alone; others are held at zero.",
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

@@ -1,0 +1,141 @@
+"""Configurations of a mechanism in floats: closing the loops, rates of passive joints, mobility.
+
+The free joints are those that no relation of the file gives, q = N q_free + c for all that move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from symgen.derive.closure import open_tree
+from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.loop_residual import Array, coincidence, differences, loop_ends, newton
+from symgen.description.expression import ZERO, Expression
+from symgen.description.parts import row_of
+from symgen.description.robot import Loop, Robot
+from symgen.errors import DescriptionError
+
+Relations = Mapping[int, tuple[Mapping[int, Expression], Expression]]  # {joint: (row, constant)}
+STEPS, TOLERANCE = 60, 1e-11
+DESCENTS = 8  # to the closest approach of loops that do not close
+# singular values below, relative to the largest and to 1, are no constraint: differences are good
+# to 1e-9
+INDEPENDENT_MOTIONS = 1e-7
+
+
+def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], Expression]]:
+    """{j: (row, constant)} of the constraints of the file, in the joints that have none."""
+    free = [i for i in robot.moving if i not in robot.constraints]
+    relations = {}
+    for j, e in robot.constraints.items():
+        for _ in robot.constraints:
+            e = e.substitute({f"q{i}": robot.constraints[i] for i in robot.constraints})
+        if any(f"q{i}" in e.symbols for i in robot.constraints):
+            raise DescriptionError(
+                f"constraint on q{j} refers to itself: q{j} = {robot.constraints[j]}",
+                path=("constraints", f"q{j}"),
+            )
+        constant = e.substitute({f"q{i}": ZERO for i in free})
+        try:
+            relations[j] = (row_of(e - constant, tuple(free)), constant)
+        except ValueError as error:
+            raise DescriptionError(
+                f"constraint q{j}: {error}", path=("constraints", f"q{j}")
+            ) from error
+    return relations
+
+
+class Assembly:
+    """Configurations q (..., free joints), in the order of `free`.
+
+    Parameters
+    ----------
+    robot : Robot
+        The mechanism.
+    relations : mapping
+        {joint: (row, constant)} in the free joints.
+    constants : mapping
+        In place of those of the robot file.
+    """
+
+    def __init__(
+        self, robot: Robot, relations: Relations, constants: Mapping[str, float] | None = None
+    ) -> None:
+        self.robot, self.relations = robot, relations
+        self.constants = {**robot.constants, **(constants or {})}
+        self.free = tuple(j for j in robot.moving if j not in relations)
+        self.active = [k for k, j in enumerate(self.free) if j in robot.joints]
+        self.passive = [k for k, j in enumerate(self.free) if j not in robot.joints]
+        self.tree = open_tree(robot)
+        self.N, self.c = np.zeros((len(robot.moving), len(self.free))), np.zeros(len(robot.moving))
+        for k, j in enumerate(robot.moving):
+            row, constant = relations.get(j, ({j: Expression.number(1)}, ZERO))
+            self.c[k] = constant.value(self.constants)
+            for i, g in row.items():
+                self.N[k, self.free.index(i)] = g.value(self.constants)
+        lengths = [abs(e.value(self.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)]
+        self.scale = np.array([1 / max([*lengths, 1e-3])] * 3 + [1.0] * 9)
+
+    @property
+    def unknown(self) -> tuple[int, ...]:
+        """Free joints without an actuator."""
+        return tuple(self.free[k] for k in self.passive)
+
+    def configuration(self, q: Array) -> dict[int, float]:
+        """All moving joints of one configuration."""
+        return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))
+
+    def residual(self, q: Array) -> Array:
+        """(..., loops, 12): differences of cut and twin frames, positions per longest link."""
+        joints = dict(
+            zip(self.robot.moving, np.moveaxis(q @ self.N.T + self.c, -1, 0), strict=True)
+        )
+        algebra = FloatAlgebra(self.robot, joints, constants=self.constants)
+        rows = coincidence(loop_ends(self.robot, algebra, self.tree))
+        shape = (len(self.robot.loops), 12, *q.shape[:-1])
+        r = np.array([np.broadcast_to(x, shape[2:]) for x in rows], dtype=float).reshape(shape)
+        return np.asarray(np.moveaxis(r, (0, 1), (-2, -1)) * self.scale)
+
+    def rows(self, q: Array) -> Array:
+        """The residual of all loops, (..., equations)."""
+        return self.residual(q).reshape(*q.shape[:-1], 12 * len(self.robot.loops))
+
+    def gap(self, q: Array) -> float:
+        """Largest entry of the residual."""
+        return float(np.abs(self.rows(q)).max(initial=0.0))
+
+    def widest(self, q: Array) -> tuple[Loop, float]:
+        """The loop that is open widest, and its largest entry of the residual."""
+        gaps = np.abs(self.residual(q)).max(axis=-1)
+        return self.robot.loops[int(gaps.argmax())], float(gaps.max())
+
+    def closest(self) -> Array:
+        """The configuration nearest to a closed one over several descents in all joints."""
+        rng = np.random.default_rng(4)
+        starts = rng.uniform(-np.pi, np.pi, (DESCENTS, len(self.free)))
+        ends = [newton(self.rows, q, steps=STEPS, tolerance=0.0, rcond=1e-6) for q in starts]
+        return min(ends, key=self.gap)
+
+    def solve(self, q: Array) -> Array | None:
+        """Newton for the passive joints from `q`; None where the loops do not close."""
+        closed = newton(self.rows, q, self.passive, steps=STEPS, tolerance=TOLERANCE)
+        return closed if self.gap(closed) < 10 * TOLERANCE else None
+
+    def rates(self, q: Array) -> Array:
+        """G (passive, active): rates of the passive joints per rate of the active ones."""
+        J = differences(self.rows, q)[1]
+        return np.asarray(
+            -np.linalg.lstsq(J[:, self.passive], J[:, self.active], rcond=INDEPENDENT_MOTIONS)[0]
+        )
+
+    def mobility(self, q: Array) -> tuple[int, int]:
+        """(freedoms of the mechanism, freedoms left with the actuators held)."""
+        J = differences(self.rows, q)[1]
+        return len(self.free) - _rank(J), len(self.passive) - _rank(J[:, self.passive])
+
+
+def _rank(J: Array) -> int:
+    s = np.linalg.svd(J, compute_uv=False)
+    return int(np.sum(s > INDEPENDENT_MOTIONS * s.max(initial=1.0)))

@@ -1,0 +1,105 @@
+"""The derivation of a robot: every recursion once, in standard parameters, as nodes of one graph.
+
+    Gamma(q, qd, qdd, g, chi)        torques of the actuated joints, linear in chi
+    D_k(q, qd, qdd, g)               their columns, Gamma = sum_k D_k chi_k
+    A_0j, P_0j                       poses of the frames
+    r(q), dr/dq, Jd qd               closure equations of general loops
+
+Regrouping, emission, symbols and pages read it. A model is one of these values with inputs
+replaced (`derive.rewrite`), and the table of models (`derive.models`) says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from symgen.derive.closure import Closure
+from symgen.derive.columns import columns, element_names
+from symgen.derive.elements import element_column
+from symgen.derive.geometry import Geometry
+from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.kinematics import frame_poses
+from symgen.derive.loops import close
+from symgen.derive.newton_euler import Motion, joint_torques
+from symgen.derive.regressor import Axes
+from symgen.derive.scalar import Matrix, Scalar, Vector, add, mul
+from symgen.description.robot import Robot
+
+ABSORBED = ("YY", "MZ", "M")
+"""Inertial parameters that base parameters take in: derived last, so they name no shared step."""
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """What `derive` found. Later models may add nodes to its graph, and change none.
+
+    Attributes
+    ----------
+    robot : Robot
+        The robot.
+    closure : Closure
+        Its moving joints in the independent ones.
+    algebra : GraphAlgebra
+        The graph, its angles, its headings.
+    geometry : Geometry
+        Rotations and positions of the frames.
+    motion : Motion
+        Velocities and accelerations of the links.
+    axes : Axes
+        Axes of the joints, and velocities per unit rate, in the frames of later links.
+    chi : mapping
+        Scalar of each standard parameter.
+    torque : mapping
+        Gamma by actuated joint, N m or N.
+    columns : mapping
+        {standard parameter: {actuated joint: D}}.
+    poses : mapping
+        {frame: (A_0j, P_0j)}.
+    """
+
+    robot: Robot
+    closure: Closure
+    algebra: GraphAlgebra
+    geometry: Geometry
+    motion: Motion
+    axes: Axes
+    chi: Mapping[str, Scalar]
+    torque: Mapping[int, Scalar]
+    columns: Mapping[str, Mapping[int, Scalar]]
+    poses: Mapping[int, tuple[Matrix, Vector]]
+
+    def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
+        """G' Gamma of the moving joints: by actuated joint, all of them."""
+        projected = self.closure.project(self.algebra, torque)
+        return {i: projected.get(i, 0) for i in self.robot.joints}
+
+
+@lru_cache(maxsize=8)
+def derive(robot: Robot) -> Derivation:
+    """The derivation of `robot`, made once. Raises DescriptionError where its loops cannot
+    close.
+    """
+    return derived(robot, close(robot))
+
+
+def derived(robot: Robot, closure: Closure) -> Derivation:
+    """The derivation with the joints of `closure` as the independent ones."""
+    algebra = GraphAlgebra(robot)
+    geometry = Geometry(robot, algebra, closure)
+    motion = Motion(geometry)
+    chi = {name: algebra.parameter(name) for name in robot.parameters}
+    torque = joint_torques(motion, chi)
+    algebra.section("Friction, actuators")
+    for name, (e, key) in element_names(robot).items():
+        for i, x in element_column(motion, e, key).items():
+            torque[i] = add(torque[i], mul(chi[name], x))
+    actuated = closure.project(algebra, torque)
+    last = [name for name in robot.parameters if name.rstrip("0123456789") in ABSORBED]
+    axes = Axes(motion)
+    D = columns(motion, [*(name for name in robot.parameters if name not in last), *last], axes)
+    poses = frame_poses(geometry)
+    algebra.graph.seal()
+    joints = {i: actuated.get(i, 0) for i in robot.joints}
+    return Derivation(robot, closure, algebra, geometry, motion, axes, chi, joints, D, poses)

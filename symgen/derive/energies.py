@@ -1,0 +1,191 @@
+"""What the recursions of `derive` do not give by themselves: velocities of links, energies, and
+C(q, qd) by recursion.
+
+Energies of link j, with its velocities v_j of the origin and w_j in its frame, gravity g and its
+origin P_0j in frame 0:
+
+    E_j = 1/2 (w_j' J_j w_j + M_j v_j' v_j) + MS_j . (v_j x w_j) ,
+            U_j = -g . (M_j P_0j + A_0j MS_j)
+
+Both are linear in the parameters. Elements add E = 1/2 c sd**2 (inertia), U = 1/2 c s**2
+(stiffness), U = c s (offset).
+
+C by recursion. Per unit rate of joint k, a point r of link j has the velocity v_k + z_k x r. Its
+rate of change in space is
+
+    a_k + U_k r ,     U_k = skew(zd_k) + skew(z_k) skew(w_j) ,
+
+and C_ik is the torque at joint i that moves the links with these accelerations: C_ik = sum over
+mass points of dx/dq_i . d/dt(dx/dq_k), whose part per
+qd_l is the Christoffel symbol sum dx/dq_i . d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C',
+and Ad - 2C is skew symmetric.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from symgen.derive.columns import element_names
+from symgen.derive.derivation import Derivation
+from symgen.derive.frames import Frames
+from symgen.derive.newton_euler import LinkMotion, Motion, joint_torques
+from symgen.derive.scalar import (
+    E3,
+    ZERO3,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    mul,
+    scale,
+    sub,
+    vadd,
+)
+from symgen.description.expression import Expression
+from symgen.description.robot import INERTIAL, PRISMATIC, Element, parameter
+
+HALF = Expression.number(Fraction(1, 2))
+
+
+def origin_velocities(motion: Motion) -> dict[int, Vector]:
+    """{j: velocity of O_j, in frame j}: v_j = jRi (v_i + w_i x P_ij) + qd_j e3 (prismatic)."""
+    v: dict[int, Vector] = {0: ZERO3}
+    for f in motion.robot.frames:
+        x, y, z = motion.geometry.rotation[f.j].down(
+            vadd(v[f.ant], cross(motion.link[f.ant].w, motion.geometry.P[f.j]))
+        )
+        v[f.j] = motion.vector(
+            "VO", (x, y, add(z, motion.qd(f.j)) if f.sigma == PRISMATIC else z), f.j
+        )
+    return v
+
+
+def kinetic_energy(d: Derivation) -> Scalar:
+    """E of all links and of the inertias on the joints."""
+    motion = d.motion
+    v, half = origin_velocities(motion), d.algebra.constant(HALF)
+    total: Scalar = 0
+    for j in d.robot.links:
+        w, K = motion.link[j].w, {p: d.chi[parameter(p, j)] for p in INERTIAL}
+        XX, XY, XZ, YY, YZ, ZZ = (K[p] for p in INERTIAL[:6])
+        Jw = apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), w)
+        total = add(total, mul(half, add(dot(w, Jw), mul(K["M"], dot(v[j], v[j])))))
+        total = add(total, dot((K["MX"], K["MY"], K["MZ"]), cross(v[j], w)))
+    for name, (e, j) in element_names(d.robot).items():
+        if e.kind == "inertia":
+            rates = {i: motion.qd(i) for i in d.robot.moving}
+            total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, rates))))
+    return total
+
+
+def potential_energy(d: Derivation) -> Scalar:
+    """U of gravity, springs and constant torques; zero where the origin of frame 0 is, springs at q
+    = 0.
+    """
+    frames, half = Frames(d.geometry), d.algebra.constant(HALF)
+    x, y, z = (d.algebra.gravity(axis) for axis in range(3))
+    total: Scalar = 0
+    for j in d.robot.links:
+        height = dot((x, y, z), frames.position(j, 0, 0))
+        total = add(total, mul(d.chi[parameter("M", j)], height))
+        first = [d.chi[parameter(p, j)] for p in ("MX", "MY", "MZ")]
+        total = add(total, dot(frames.rotated((x, y, z), 0, j), first))
+    positions = {i: d.geometry.position(i) for i in d.robot.moving}
+    for name, (e, j) in element_names(d.robot).items():
+        if e.kind == "stiffness":
+            total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, positions))))
+        elif e.kind == "offset":
+            total = add(total, mul(d.chi[name], _along(d, e.along[j], positions)))
+    return total
+
+
+def _along(d: Derivation, row: Mapping[int, Expression], x: Mapping[int, Scalar]) -> Scalar:
+    """G x."""
+    total: Scalar = 0
+    for i, g in row.items():
+        total = add(total, mul(d.algebra.constant(g), x[i]))
+    return total
+
+
+def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
+    """(G x)**2, or x' B x."""
+    if j in e.along:
+        s = _along(d, e.along[j], x)
+        return mul(s, s)
+    total: Scalar = 0
+    for (i, m), b in e.form[j].items():
+        total = add(total, mul(d.algebra.constant(b), mul(x[i], x[m])))
+    return total
+
+
+class UnitRate(Motion):
+    """The accelerations a_k + U_k r of all links, by which the torques of `joint_torques` are
+    column k of C.
+
+    Parameters
+    ----------
+    motion : Motion
+        The links with their velocities.
+    k : int
+        Independent joint with unit rate.
+    """
+
+    def __init__(self, motion: Motion, k: int) -> None:
+        self.geometry, self.robot, self.algebra, self.named, self.tag = (
+            motion.geometry,
+            motion.robot,
+            motion.algebra,
+            motion.named,
+            (k,),
+        )
+        half = self.algebra.constant(HALF)
+        z: dict[int, Vector] = {0: ZERO3}
+        zd: dict[int, Vector] = {0: ZERO3}
+        self.link: dict[int, LinkMotion] = {0: _link(ZERO3, ZERO3, ZERO3, ZERO3, half)}
+        for f in self.robot.frames:
+            j, w = f.j, motion.link[f.j].w
+            self.algebra.section(f"Link {j}, unit rate of joint {k}")
+            m, turn = self.geometry.carrier[j].m, dict(self.geometry.carrier[j].turn)
+            axis_rate = (w[1], -w[0], 0)  # w x e3
+            n = self.algebra.constant(Expression.number(turn.get(k, 0)))
+            z[j] = self.vector("Z", vadd(self.geometry.from_carrier(j, z[m]), scale(n, E3)), j)
+            zd[j] = self.vector(
+                "ZP", vadd(self.geometry.from_carrier(j, zd[m]), scale(n, axis_rate)), j
+            )
+            a = self.geometry.rotation[j].down(
+                vadd(self.link[f.ant].a, apply(self.link[f.ant].U, self.geometry.P[j]))
+            )
+            if f.sigma == PRISMATIC:
+                n = self.algebra.constant(self.geometry.closure.row[j].get(k, Expression()))
+                a = vadd(vadd(a, scale(n, axis_rate)), cross(z[j], scale(motion.qd(j), E3)))
+            self.link[j] = _link(z[j], zd[j], w, self.vector("VP", a, j), half)
+
+
+def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMotion:
+    """U_k by its antisymmetric part (in the place of wd), its symmetric part (of w w') and the
+    differences of its diagonal.
+    """
+    across = dot(z, w)
+    skew = ((0, -zd[2], zd[1]), (zd[2], 0, -zd[0]), (-zd[1], zd[0], 0))
+    rows = []
+    for k in range(3):
+        x, y, t = (add(skew[k][m], mul(w[k], z[m])) for m in range(3))
+        rows.append(tuple(sub(e, across) if m == k else e for m, e in enumerate((x, y, t))))
+    U: Matrix = (rows[0], rows[1], rows[2])
+    turning = scale(half, (sub(U[2][1], U[1][2]), sub(U[0][2], U[2][0]), sub(U[1][0], U[0][1])))
+    DV = tuple(tuple(mul(half, add(U[k][m], U[m][k])) for m in range(3)) for k in range(3))
+    DW = (sub(U[1][1], U[2][2]), sub(U[2][2], U[0][0]), sub(U[0][0], U[1][1]))
+    return LinkMotion(w, turning, DV, DW, U, a)  # type: ignore[arg-type]
+
+
+def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:
+    """{(i, k): C_ik} of the actuated joints."""
+    return {
+        (i, k): c
+        for k in d.robot.joints
+        for i, c in d.actuated(joint_torques(UnitRate(d.motion, k), d.chi)).items()
+    }

@@ -1,0 +1,109 @@
+"""Vectors between any two frames of a robot, over the scalars of its geometry.
+
+A vector goes from carrier to carrier (see `derive.geometry`), and between frames with parallel z
+axes by one rotation about them: the sums and
+differences of angles that a product of rotations has are there from the start.
+"""
+
+from __future__ import annotations
+
+from symgen.derive.geometry import Geometry, Rotation
+from symgen.derive.scalar import E3, ZERO3, Algebra, Matrix, Turn, Vector, cross, sub, vadd
+from symgen.description.expression import Expression
+from symgen.description.robot import REVOLUTE
+
+Group = tuple[
+    int, Expression, Expression
+]  # carrier, and alpha and gamma of the first frame on it: frames with one z axis direction
+
+
+class Frames:
+    """Positions and directions in the frames of `geometry`."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self.geometry, self.robot = geometry, geometry.robot
+
+    def rotated(self, v: Vector, j: int, i: int) -> Vector:
+        """Components in frame i of a vector with components v in frame j."""
+        down: list[int] = []
+        carrier, at, to = self.geometry.carrier, j, i
+        while not self._parallel(at, to):
+            if self._depth(at) >= self._depth(to):
+                v, at = carrier[at].rotation.up(v), carrier[at].m
+            else:
+                down.append(to)
+                to = carrier[to].m
+        if at != to:
+            v = self._about_z(at, to).up(v)
+        for f in reversed(down):
+            v = self.geometry.from_carrier(f, v)
+        return v
+
+    def position(self, j: int, i: int, seen_from: int) -> Vector:
+        """From the origin of frame i to that of frame j, in components of frame `seen_from`."""
+        to, start = self.robot.path(j), self.robot.path(i)
+        total = ZERO3
+        for f in to:
+            if f not in start:
+                total = vadd(
+                    total, self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
+                )
+        for f in start:
+            if f not in to:
+                x, y, z = self.rotated(self.geometry.P[f], self.robot.frame(f).ant, seen_from)
+                total = (sub(total[0], x), sub(total[1], y), sub(total[2], z))
+        return total
+
+    def pose(self, j: int, i: int) -> tuple[Matrix, Vector]:
+        """(A_ij, P_ij): orientation and origin of frame j in frame i."""
+        x, y, z = (self.rotated(e, j, i) for e in ((1, 0, 0), (0, 1, 0), E3))
+        return ((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), self.position(j, i, i)
+
+    def columns(self, j: int, i: int) -> dict[int, tuple[Vector, Vector]]:
+        """{k: (velocity of O_j, angular velocity)} per unit rate of each moving joint k before
+        frame j, in frame i.
+        """
+        result: dict[int, tuple[Vector, Vector]] = {}
+        for k in self.robot.path(j):
+            if k in self.robot.moving:
+                z = self.rotated(E3, k, i)
+                turns = self.robot.frame(k).sigma == REVOLUTE
+                result[k] = (cross(z, self.position(j, k, i)), z) if turns else (z, ZERO3)
+        return result
+
+    def _depth(self, j: int) -> int:
+        """Carriers between frame j and the base."""
+        depth = 0
+        while j:
+            j, depth = self.geometry.carrier[j].m, depth + 1
+        return depth
+
+    def _parallel(self, j: int, i: int) -> bool:
+        return j == i or (bool(j) and bool(i) and self._group(j) == self._group(i))
+
+    def _group(self, j: int) -> Group:
+        m, f = self.geometry.carrier[j].m, self.robot.frame(j)
+        while f.ant != m:
+            f = self.robot.frame(f.ant)
+        return (m, f.alpha, f.gamma if f.alpha else Expression())
+
+    def _about_z(self, j: int, i: int) -> Rotation:
+        """The rotation from frame i to frame j, both with the same z axis direction."""
+        return Rotation(None, *self.geometry.algebra.cos_sin(*self._between(j, i)))
+
+    def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
+        """The angle of frame j less that of frame i."""
+        (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
+        total = dict(turn)
+        for k, n in other:
+            total[k] = total.get(k, 0) - n
+        return tuple((k, n) for k, n in sorted(total.items()) if n), offset - other_offset
+
+    def register_angles(self, algebra: Algebra) -> None:
+        """Make the angle of every frame against every other one about the same direction an angle
+        of `algebra`.
+        """
+        for f in self.robot.frames:
+            for g in self.robot.frames:
+                if f.j < g.j and self._parallel(f.j, g.j):
+                    algebra.cos_sin(*self._between(g.j, f.j))

@@ -1,0 +1,306 @@
+"""The models of a robot: the one table that targets, symbols, certificate and pages iterate over.
+
+A new model is one entry here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from symgen.derive.columns import element_names
+from symgen.derive.derivation import Derivation
+from symgen.derive.energies import coriolis, kinetic_energy, origin_velocities, potential_energy
+from symgen.derive.frames import Frames
+from symgen.derive.graph import Symbol
+from symgen.derive.loop_equations import LoopSystem, loop_system
+from symgen.derive.model import Case, Entry, Model, Place, Request, equations
+from symgen.derive.names import Names
+from symgen.derive.rewrite import Input
+from symgen.derive.scalar import Vector
+from symgen.description.expression import ONE, ZERO
+from symgen.description.robot import KINDS
+from symgen.errors import SymgenError
+
+DISSIPATIVE = ("viscous", "coulomb")
+HOMOGENEOUS = (0, 0, 0, 1)  # last row of a pose
+
+
+def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]:
+    """Zero rates: of `kinds` qd or qdd; of a tied joint too, unless it accelerates by itself."""
+    independent = d.closure.independent if tied else d.robot.joints
+    letter = {"qd": "QP", "qdd": "QDP"}
+    return {Symbol(kind, f"{letter[kind]}{i}"): ZERO for kind in kinds for i in independent}
+
+
+def _without(d: Derivation, *kinds: str) -> dict[Symbol, Input]:
+    """Zero parameters: of elements of these kinds; "link" stands for the inertial ones."""
+    elements = {name: e.kind for name, (e, _) in element_names(d.robot).items()}
+    return {
+        Symbol("parameter", name): ZERO
+        for name in d.robot.parameters
+        if elements.get(name, "link") in kinds
+    }
+
+
+def _weightless(d: Derivation) -> dict[Symbol, Input]:
+    return {Symbol("gravity", str(k)): ZERO for k in range(3)}
+
+
+# --- torques ---
+
+
+def _torques(d: Derivation, heading: str = "Torques", column: tuple[int, ...] = ()) -> list[Entry]:
+    return [Entry((row, *column), x, heading) for row, x in enumerate(d.torque.values())]
+
+
+def _inverse_dynamics(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case(_torques(d))
+
+
+def _bias(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case(_torques(d), _still(d, "qdd", tied=False))
+
+
+def _gravity(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case(_torques(d), _still(d, "qd", "qdd"))
+
+
+def _friction(d: Derivation, r: Request) -> Iterator[Case]:
+    others = _without(d, "link", *(kind for kind in KINDS if kind not in DISSIPATIVE))
+    yield Case(_torques(d), others | _still(d, "qdd"))
+
+
+def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
+    """Column i: Gamma from rest, without gravity, for qdd_i = 1; tied joints accelerate by G."""
+    named, common = Names(len(d.robot.frames)), _still(d, "qd", "qdd") | _weightless(d)
+    common |= _without(d, *(kind for kind in KINDS if kind != "inertia"))
+    for column, i in enumerate(d.robot.joints):
+        unit: dict[Symbol, Input] = {Symbol("qdd", f"QDP{i}"): ONE}
+        for u in d.closure.tied:
+            unit[Symbol("qdd", f"QDP{u}")] = Symbol("rate", named("G", u, i))
+        yield Case(_torques(d, "Inertia matrix", (column,)), common | unit, f"{named.separator}{i}")
+
+
+def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
+    row = {j: k for k, j in enumerate(d.robot.joints)}
+    yield Case([Entry((row[i], row[k]), x) for (i, k), x in coriolis(d).items()])
+
+
+def _regressor(d: Derivation, r: Request) -> Iterator[Case]:
+    entries = [
+        Entry((row, column), d.columns[own][j], f"Joint {j}", f"DG{j}{own}")
+        for row, j in enumerate(d.robot.joints)
+        for column, own in enumerate(r.parameters)
+        if j in d.columns[own]
+    ]
+    yield Case(entries)
+
+
+def _kinetic_energy(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case([Entry((), kinetic_energy(d))])
+
+
+def _potential_energy(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case([Entry((), potential_energy(d))])
+
+
+# --- kinematics ---
+
+
+def _pose_entries(first: Place, A: Sequence[Vector], P: Vector) -> list[Entry]:
+    rows = (*((*A[k], P[k]) for k in range(3)), HOMOGENEOUS)
+    return [
+        Entry((*first, k, m), x, "Poses") for k, row in enumerate(rows) for m, x in enumerate(row)
+    ]
+
+
+def _frame_poses(d: Derivation, r: Request) -> Iterator[Case]:
+    yield Case([e for j, (A, P) in d.poses.items() for e in _pose_entries((j - 1,), A, P)])
+
+
+def _pose(d: Derivation, r: Request) -> Iterator[Case]:
+    in_base = r.of and not r.frame
+    yield Case(
+        _pose_entries((), *(d.poses[r.of] if in_base else Frames(d.geometry).pose(r.of, r.frame)))
+    )
+
+
+def _jacobian(d: Derivation, r: Request) -> Iterator[Case]:
+    columns = Frames(d.geometry).columns(r.of, r.frame)
+    for k in range(6):
+        row = d.actuated({j: (*v, *w)[k] for j, (v, w) in columns.items()})
+        yield Case([Entry((k, column), x) for column, x in enumerate(row.values())])
+
+
+def _carried_jacobian(d: Derivation, r: Request) -> Iterator[Case]:
+    """The same by recursion: axes Z and velocities V carried outward to frame `of`, then turned
+    into `frame`.
+    """
+    frames, axes = Frames(d.geometry), d.axes
+    columns = {
+        k: [frames.rotated(x[k, j], j, r.frame) for x in (axes.v, axes.z)]
+        for k, j in axes.z
+        if j == r.of
+    }
+    for k in range(6):
+        row = d.actuated({j: (*v, *w)[k] for j, (v, w) in columns.items()})
+        yield Case([Entry((k, column), x) for column, x in enumerate(row.values())])
+
+
+def _twist(d: Derivation, r: Request, linear: Vector, angular: Vector) -> list[Entry]:
+    frames = Frames(d.geometry)
+    both = (*frames.rotated(linear, r.of, r.frame), *frames.rotated(angular, r.of, r.frame))
+    return [Entry((k,), x) for k, x in enumerate(both)]
+
+
+def _velocity(d: Derivation, r: Request) -> Iterator[Case]:
+    v, w = origin_velocities(d.motion)[r.of], d.motion.link[r.of].w
+    yield Case(_twist(d, r, v, w))
+
+
+def _acceleration(d: Derivation, r: Request) -> Iterator[Case]:
+    link = d.motion.link[r.of]
+    yield Case(_twist(d, r, link.a, link.wd), _weightless(d))
+
+
+def _jacobian_rate(d: Derivation, r: Request) -> Iterator[Case]:
+    for case in _acceleration(d, r):
+        yield Case(case.entries, {**case.inputs, **_still(d, "qdd", tied=False)})
+
+
+# --- loops ---
+
+
+def _closure(d: Derivation, r: Request) -> Iterator[Case]:
+    if not d.closure.tied:
+        why = "its passive joints are functions of the others; passive=symbols keeps them"
+        raise SymgenError(
+            f"{d.robot.name} has no closure equations to solve: "
+            f"{why if d.robot.passive else 'it has no passive joints'}"
+        )
+    residuals = LoopSystem(d.robot, d.closure, equations(d)).residual(d.algebra)
+    yield Case([Entry((k,), x) for k, x in enumerate(residuals)])
+
+
+def _linearised(d: Derivation, r: Request) -> Iterator[Case]:
+    system, title = loop_system(d.robot), "Residuals and their derivatives by the joints"
+    rows = zip(system.residual(d.algebra), system.jacobian(d.algebra), strict=True)
+    yield Case(
+        [
+            Entry((k, column), x, title)
+            for k, (residual, derivatives) in enumerate(rows)
+            for column, x in enumerate((residual, *derivatives))
+        ]
+    )
+
+
+def _curvature(d: Derivation, r: Request) -> Iterator[Case]:
+    system = loop_system(d.robot)
+    values = (*system.curvature(d.algebra), *system.alignment(d.algebra))
+    title = "Second derivatives at constant rates"
+    yield Case([Entry((k,), x, title) for k, x in enumerate(values)])
+
+
+TORQUE, INERTIA, TWIST_UNIT = "N*m | N", "kg*m**2 | kg*m | kg", "m/s, rad/s"
+MODELS = {
+    model.name: model
+    for model in (
+        Model(
+            "regressor", "D", ("q", "qd", "qdd"), ("joints", "parameters"), "Gamma by X",
+            "D of Gamma = D X", _regressor, result="D", by_columns=True,
+        ),
+        Model(
+            "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("joints",), TORQUE,
+            "joint torques Gamma = A qdd + C qd + Q + friction", _inverse_dynamics, result="GAM",
+        ),
+        Model(
+            "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
+            "A(q), actuators included: column i is Gamma for a unit acceleration of joint i from "
+            "rest",
+            _inertia_matrix, result="A", symmetric=True,
+        ),
+        Model(
+            "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,
+            "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset", _bias,
+            result="GAM",
+        ),
+        Model(
+            "gravity", "Q", ("q", "X"), ("joints",), TORQUE,
+            "Gamma at rest without friction: gravity, offset and springs "
+            "(a base parameter may mix them)", _gravity, result="GAM",
+        ),
+        Model(
+            "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("joints",), "rad/s**2 | m/s**2",
+            "qdd = A(q)**-1 (tau - bias)", None, result="qdd",
+        ),
+        Model(
+            "frame_poses", "T", ("q",), ("frames", "pose", "pose"), "1, m",
+            "Homogeneous transform of every frame j in frame 0, at index j - 1", _frame_poses,
+            result="T", symbolic=False,
+        ),
+        Model(
+            "pose", "T", ("q",), ("pose", "pose"), "1, m",
+            "homogeneous transform: axes and origin of frame `of` in frame `frame`", _pose,
+            of_frames=True,
+        ),
+        Model(
+            "jacobian", "J", ("q",), ("twist", "joints"), "m/s, rad/s by rad/s | m/s",
+            "velocity of the origin of frame `of`, then its angular velocity, per joint rate, "
+            "in frame `frame`", _jacobian, result="J", steps=_carried_jacobian, of_frames=True,
+        ),
+        Model(
+            "determinant", "det J", ("q",), (), "m**3 for six hinges",
+            "determinant of the Jacobian, where it is square", None, of_frames=True,
+        ),
+        Model(
+            "jacobian_rate", "JPQP", ("q", "qd"), ("twist",), "m/s**2, rad/s**2",
+            "Jd qd: acceleration of the origin of frame `of` and its angular acceleration at "
+            "qdd = 0, in frame `frame`", _jacobian_rate, of_frames=True,
+        ),
+        Model(
+            "velocity", "V", ("q", "qd"), ("twist",), TWIST_UNIT,
+            "velocity of the origin of frame `of`, then its angular velocity, in frame `frame`",
+            _velocity, of_frames=True,
+        ),
+        Model(
+            "acceleration", "VP", ("q", "qd", "qdd"), ("twist",), "m/s**2, rad/s**2",
+            "acceleration of the origin of frame `of`, then its angular acceleration, "
+            "in frame `frame`", _acceleration, of_frames=True,
+        ),
+        Model(
+            "coriolis", "C", ("q", "qd", "X"), ("joints", "joints"), "N*m*s/rad | N*s/m",
+            "C(q, qd) of Coriolis and centrifugal torques C qd, with Christoffel symbols: "
+            "Ad - 2C is skew symmetric", _coriolis,
+        ),
+        Model(
+            "friction", "F", ("q", "qd", "X"), ("joints",), TORQUE,
+            "viscous and Coulomb friction", _friction,
+        ),
+        Model(
+            "kinetic_energy", "E", ("q", "qd", "X"), (), "J",
+            "kinetic energy, actuators included", _kinetic_energy,
+        ),
+        Model(
+            "potential_energy", "U", ("q", "X"), (), "J",
+            "potential energy of gravity, springs and offset: dU/dq = Q", _potential_energy,
+        ),
+        Model(
+            "base_parameters", "X", ("standard",), ("parameters",), "see UNITS",
+            "what each parameter is made of", None,
+        ),
+        Model(
+            "closure", "r", ("q",), ("equations",), "m | rad",
+            "residuals of the loops, zero where they close", _closure,
+        ),
+        Model(
+            "linearised_closure", "R", ("q",), ("equations", "residual, derivatives"), "m | rad",
+            "Closure residuals, then their derivatives by the joints", _linearised,
+            result="R", symbolic=False, of_loops=True,
+        ),
+        Model(
+            "curvature", "B", ("q", "qd"), ("curvatures, traces",), "m/s**2 | rad/s**2",
+            "Second derivatives of the residuals at constant rates, then traces of A_cut' A_twin",
+            _curvature, result="B", symbolic=False, of_loops=True,
+        ),
+    )
+}  # fmt: skip

@@ -1,0 +1,259 @@
+"""One model out of the derivation: its graph with inputs replaced, and no value written twice.
+
+Every model is the recursion with some inputs set: bias is Gamma at qdd = 0, a column of the inertia
+matrix Gamma of a unit acceleration at qd = 0 without gravity, base parameters stand in the place of
+the standard parameters they are called after and all others are 0. What becomes zero goes.
+
+Hash-consing finds what is written alike; a few nodes are equal but written differently, and some
+differences of equal products vanish identically. Both show at random states of a random geometry
+over F_p, which never rounds: nodes with the same value are merged, up to sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from symgen.derive.exact import Array, Draw, Fp, power
+from symgen.derive.graph import (
+    ADD,
+    CONST,
+    COS,
+    INV,
+    POS,
+    SIGN,
+    SIN,
+    SQRT,
+    Node,
+    Scalar,
+    Symbol,
+    reachable,
+)
+from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.names import families_of
+from symgen.description.expression import Expression
+
+SAMPLES = 3
+RECURSIVE = {"W", "WP", "DV", "DW", "U", "VSP", "VP"}
+"""Families whose line is their definition in the recursion, or absent."""
+
+Input = Expression | Symbol | Callable[[GraphAlgebra], Scalar | int]
+Inputs = Mapping[Symbol, Input]
+
+
+class Rewrite:
+    """A graph of its own, `algebra`, to which values of the derivation `source` are copied.
+
+    Parameters
+    ----------
+    source : GraphAlgebra
+        The algebra of the derivation.
+    inputs : mapping
+        Symbol, constant expression, or value over the new algebra in the place of an input; others
+        stay as they are.
+    """
+
+    def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
+        self.source, self.inputs, self.algebra = source, inputs, GraphAlgebra(source.robot)
+        self.algebra.labels |= source.labels  # one name, one angle, here as there
+        graph = self.graph = self.algebra.graph
+        self._calls = {
+            COS: graph.cos,
+            SIN: graph.sin,
+            SIGN: graph.sign,
+            POS: graph.positive_part,
+            SQRT: graph.sqrt,
+            INV: graph.inverse,
+        }
+        self.draw = Draw(source.robot, 7, SAMPLES)
+        self._rng = np.random.default_rng(5)
+        self._drawn: dict[object, Array] = {}  # of symbols that are no states, and of directions
+        self._value: dict[int, Array] = {}  # of the nodes of self.graph, over F_p
+        self._first: dict[tuple[int, ...], Scalar] = {}  # by value
+        self._image: dict[int, Scalar | int] = {}
+        self._replaced: set[int] = set()  # nodes of the source that depend on inputs of one case
+
+    def copied(
+        self, outputs: Sequence[Scalar | int], inputs: Inputs | None = None, tag: str = ""
+    ) -> list[Scalar | int]:
+        """`outputs` in the new graph, where `inputs` go before those of all cases.
+
+        Names of steps that depend on them end in `tag`.
+        """
+        self._case, self._tag = inputs or {}, tag
+        for index in self._replaced:
+            del self._image[index]
+        self._replaced = set()
+        headings = list(self.source.sections)
+        for node in reachable(outputs):
+            while headings and headings[0][0] <= node.index:
+                self.algebra.section(headings.pop(0)[1])
+            if node.value in self._case or any(
+                x.node.index in self._replaced for x in node.operands
+            ):
+                self._replaced.add(node.index)
+            if node.index not in self._image:
+                self._image[node.index] = self._rebuilt(node)
+        return [self._of_source(o) for o in outputs]
+
+    def _of_source(self, s: Scalar | int) -> Scalar | int:
+        if not isinstance(s, Scalar):
+            return s
+        image = self._image[s.node.index]
+        return image if s.sign > 0 else -image
+
+    def _rebuilt(self, node: Node) -> Scalar | int:
+        before = len(self.graph.nodes)
+        image = self._made(node, [self._of_source(x) for x in node.operands])
+        if isinstance(image, Scalar):
+            image = self._merged(image)
+        if isinstance(image, Scalar):
+            self._name(node, image, merged=image.node.index < before)
+        return image
+
+    def _name(self, node: Node, image: Scalar, *, merged: bool) -> None:
+        """Carry the name of a step over.
+
+        U = DV - WP is a product of WP = DV - product: its name would turn the recursion around.
+        """
+        signed = image if node.name_sign > 0 else -image
+        tag = self._tag if node.index in self._replaced else ""
+        if node.name is not None:
+            if not (merged and RECURSIVE & {*families_of([node.name])}):
+                self.graph.name(signed, node.name + tag)
+        elif node.hint is not None:
+            self.graph.hint(signed, node.hint + tag)
+
+    def _made(self, node: Node, x: list[Scalar | int]) -> Scalar | int:
+        graph = self.graph
+        match node.op:
+            case "sym":
+                return self._symbol(node.value)
+            case "const":
+                return graph.lift(node.value)
+            case "add":
+                return self._sum(*x)
+            case "mul":
+                return x[0] * x[1]
+            case "cos" | "sin" if self._is_given(node):
+                turn, offset = self.source.angles[node.index]
+                given = {j: self.inputs.get(Symbol("q", f"q{j}")) for j, _ in turn}
+                for j, n in turn:
+                    if isinstance(value := given[j], Expression):
+                        offset = offset + value * n
+                turn = tuple((j, n) for j, n in turn if given[j] is None)
+                turned: Scalar | int = self.algebra.cos_sin(turn, offset)[node.op == "sin"]
+                return turned
+            case "sign" | "pos" if type(x[0]) is int and x[0] == 0:
+                return 0
+        operand = graph.lift(x[0])
+        image = self._calls[node.op](operand)
+        if node.op in (COS, SIN):
+            turn, offset = self.source.angles[node.index]
+            if operand.sign < 0:
+                turn, offset = tuple((j, -n) for j, n in turn), -offset
+            self.algebra.angles.setdefault(image.node.index, (turn, offset))
+        elif node.op == SQRT:
+            self.algebra.roots.setdefault(image.node.index, self.source.roots[node.index])
+        return image
+
+    def _sum(self, a: Scalar | int, b: Scalar | int) -> Scalar | int:
+        """a + b, where x + (z - x) is z."""
+        for x, y in ((a, b), (b, a)):
+            if isinstance(x, Scalar) and isinstance(y, Scalar) and y.node.op == ADD:
+                for o, z in (y.node.operands, y.node.operands[::-1]):
+                    if o.node is x.node and o.sign * y.sign != x.sign:
+                        return z if y.sign > 0 else -z
+        return a + b
+
+    def _is_given(self, node: Node) -> bool:
+        """Whether the angle of a cosine or sine holds a joint position that is replaced."""
+        turn, _ = self.source.angles[node.index]
+        return any(Symbol("q", f"q{j}") in self.inputs for j, _ in turn)
+
+    def _symbol(self, symbol: Symbol) -> Scalar | int:
+        value = self._case.get(symbol, self.inputs.get(symbol, symbol))
+        if isinstance(value, Expression):
+            given: Scalar | int = self.algebra.constant(value)
+            return given
+        if not isinstance(value, Symbol):
+            return value(self.algebra)
+        fixed = value.kind in ("constant", "pi", "parameter", "gravity")
+        return self.graph.symbol(value, fixed=fixed)
+
+    # --- values over F_p ---
+
+    def _merged(self, image: Scalar) -> Scalar | int:
+        """`image`, or an equal node that was there before."""
+        if image.node.index in self._value:
+            return image
+        value = self._value_of(image.node)
+        value = (value if len(value) == SAMPLES else np.repeat(value, SAMPLES)) % self.draw.p
+        p, residues = self.draw.p, value.tolist()
+        if residues[0] in (0, 1, p - 1) and len({*residues}) == 1 and image.node.op != CONST:
+            return image.sign * (residues[0] if residues[0] < 2 else -1)
+        sign = -1 if residues[0] > p // 2 else 1
+        first = self._first.setdefault(
+            tuple(sign * x % p for x in residues), self.graph.scalar(image.node.index, sign)
+        )
+        if first.node is image.node:
+            self._value[image.node.index] = value
+            return image
+        return first if sign * image.sign > 0 else -first
+
+    def _value_of(self, node: Node) -> Array:
+        if node.index not in self._value:
+            self._value[node.index] = self._evaluated(node)
+        return self._value[node.index]
+
+    def _operand(self, s: Scalar) -> Array:
+        value = self._value_of(s.node)
+        return value if s.sign > 0 else -value % self.draw.p
+
+    def _evaluated(self, node: Node) -> Array:
+        p = self.draw.p
+        match node.op:
+            case "sym":
+                return self._drawn_symbol(node.value)
+            case "const":
+                return np.array([node.value.numerator * pow(node.value.denominator, -1, p) % p])
+            case "add":
+                a, b = map(self._operand, node.operands)
+                return np.asarray((a + b) % p)
+            case "mul":
+                a, b = map(self._operand, node.operands)
+                return np.asarray(a * b % p)
+            case "cos" | "sin":
+                point = self.draw.cos_sin(*self.algebra.angles[node.index])[node.op == "sin"]
+                return point.x if isinstance(point, Fp) else np.array([point % p])
+            case "sqrt":
+                return np.asarray(self.draw.constant(self.algebra.roots[node.index]).x)
+            case "inv":
+                return power(self._operand(node.operands[0]), p - 2, p)
+        return self._directed(node)
+
+    def _directed(self, node: Node) -> Array:
+        """sign(x) = 2b - 1, max(x, 0) = b x, max(sign(x), 0) = b, with b of the node x."""
+        p = self.draw.p
+        (x,) = node.operands
+        of_sign = x.node.op == SIGN
+        b = self._random(x.node.operands[0].node.index if of_sign else x.node.index)
+        if node.op == SIGN:
+            return (2 * b - 1) % p
+        step = b if x.sign > 0 else (1 - b) % p
+        return step if of_sign else step * self._operand(x) % p
+
+    def _drawn_symbol(self, symbol: Symbol) -> Array:
+        state = {"q": self.draw.q, "qd": self.draw.qd, "qdd": self.draw.qdd}.get(symbol.kind)
+        if state:
+            return np.asarray(state(int(symbol.name.lstrip("qQDP"))).x)
+        if symbol.kind == "constant":
+            return np.asarray(self.draw.constant(Expression.symbol(symbol.name)).x)
+        return self._random(symbol)
+
+    def _random(self, key: object) -> Array:
+        """A residue for each state, the same whenever it is asked for."""
+        if key not in self._drawn:
+            self._drawn[key] = self._rng.integers(1, self.draw.p, SAMPLES)
+        return self._drawn[key]

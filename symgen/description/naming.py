@@ -1,0 +1,177 @@
+"""Names of a robot, its constants, families and parameters, and the texts beside them in emitted
+files: every guard of a name is here.
+"""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from symgen.description.fields import Path, dotted
+from symgen.description.parts import INERTIAL, Element
+from symgen.errors import DescriptionError
+
+IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}\Z")
+STATES = re.compile(r"(q|QP|QDP|GAM)\d+(_\d+)?\Z")
+"""Positions, velocities, accelerations and torques of the joints."""
+LAYOUT = frozenset(
+    [
+        "q",
+        "qd",
+        "qdd",
+        "tau",
+        "X",
+        "standard",
+        "out",
+        "frame",
+        "np",
+        "ca",
+        "xp",
+        "pi",
+        "self",
+        "GAM",
+        "STANDARD_PARAMETERS",
+        "array_namespace",
+        "inertia_matrix",
+        "bias",
+        "frame_poses",
+        "Store",
+        "asked",
+        "block",
+        "filled",
+        "given",
+        "inertia",
+        "origin",
+        "poses",
+        "rates",
+        "rest",
+        "result",
+        "results",
+        "rows",
+        "shape",
+        "state",
+        "states",
+        "store",
+        "zero",
+    ]
+)
+"""Arguments, functions and local words of the layouts of all targets, in functions of constants."""
+MARKS = (
+    "\\",
+    '"""',
+    "*/",
+    "/*",
+    "??/",
+)  # which end a docstring or comment of Python or C, or LaTeX
+LONGEST_LABEL = 60
+DEVICES = {
+    *["CON", "PRN", "AUX", "NUL"],
+    *(f"{port}{k}" for port in ("COM", "LPT") for k in range(10)),
+}
+
+
+def check_identifier(name: str, path: Path) -> None:
+    """Refuse what is no name in emitted code."""
+    if not IDENTIFIER.match(name) or keyword.iskeyword(name):
+        what = "is a word of Python; choose another"
+        if not keyword.iskeyword(name):
+            what = "is no identifier; use a letter followed by letters, digits or _ (at most 40)"
+        raise DescriptionError(f"{dotted(path[:-1] or path)}: {name!r} {what}", path=path)
+
+
+def check_names(robot: Any) -> None:
+    """Robot, families, constants and parameters have names of their own, which no emitted text
+    gives another meaning; texts end no docstring or comment.
+    """
+    check_identifier(robot.name, ("name",))
+    if robot.name.upper() in DEVICES:
+        raise DescriptionError(
+            f"{robot.name!r} names a device on Windows, where no file can be called so; choose "
+            "another",
+            path=("name",),
+        )
+    for key, text in (("title", robot.title), ("source", robot.source), ("file", robot.file)):
+        long = not text.isprintable() or len(text) > 1000
+        if long or text.endswith('"') or any(mark in text for mark in MARKS):
+            raise DescriptionError(
+                f"{key} {text[:60]!r}: expected one line of printable text, at most 1000 "
+                "characters, without \\, triple or final quotes, /*, */ or ??/",
+                path=(key,),
+            )
+    _check_labels(robot.labels, len(robot.frames))
+    check_families(robot.elements)
+    taken = {*robot.parameters, *(f"{name}R" for name in robot.parameters)}
+    for name in robot.constants:
+        check_identifier(name, ("constants", name))
+        if what := "a parameter" if name in taken else _of_others(name):
+            raise DescriptionError(
+                f"constant {name!r} is the name of {what}; choose another, such as {name}c",
+                path=("constants", name),
+            )
+    if double := sorted({n for n in robot.parameters if robot.parameters.count(n) > 1}):
+        raise DescriptionError(
+            f"parameters {double} would be named twice; rename an element family",
+            path=("elements",),
+        )
+
+
+def check_families(elements: Sequence[Element]) -> None:
+    """Families of elements have names of their own, and so have their parameters."""
+    families = [e.family for e in elements]
+    for e in elements:
+        family, path = e.family, ("elements", e.family)
+        check_identifier(family, path)
+        taken = family in INERTIAL or families.count(family) > 1
+        if taken or family[-1].isdigit() or family.endswith("_"):
+            raise DescriptionError(
+                f"element {family!r}: give each family a name of its own, not an inertial "
+                "parameter's, that does not end in a digit or _",
+                path=path,
+            )
+        for name in (f"{family}{j}" for j in e.keys):
+            if what := _of_others(name):
+                raise DescriptionError(
+                    f"element {family!r}: its parameter {name} would be called as {what}; "
+                    f"choose another family, such as K{family}",
+                    path=path,
+                )
+
+
+def _of_others(name: str) -> str:
+    """What of ours, of the grammar or of Python is called so in every text; empty if nothing."""
+    if STATES.match(name):
+        return "a joint position, rate or torque"
+    if name in LAYOUT:
+        return "an argument, a function or an array of the emitted functions"
+    return "a builtin of Python" if hasattr(builtins, name) else ""
+
+
+def _check_labels(labels: Mapping[int, str], frames: int) -> None:
+    """Labels name frames that exist, each by another name."""
+    used: dict[str, int] = {}
+    for j, text in labels.items():
+        message = ""
+        if not 0 < j <= frames:
+            message = f"labels: frame {j} does not exist; frames are 1 to {frames}"
+        elif not is_label(text):
+            message = (
+                f"labels.{j}: found {text[:LONGEST_LABEL]!r}; expected 1 to {LONGEST_LABEL} "
+                "printable characters without \\, quotes, /* or */"
+            )
+        elif text in used:
+            message = f"labels.{j}: {text!r} names frame {used[text]} already; names differ"
+        if message:
+            raise DescriptionError(message, path=("labels", j))
+        used[text] = j
+
+
+def is_label(text: str) -> bool:
+    """Whether `text` may name a joint."""
+    return (
+        0 < len(text) <= LONGEST_LABEL
+        and text.isprintable()
+        and not any(mark in text for mark in (*MARKS, '"', "'"))
+    )

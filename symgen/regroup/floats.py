@@ -1,0 +1,136 @@
+"""Base columns and coefficients in floats, for the constants of the robot file.
+
+For coefficients that are not recognised over F_p, and for general loops of which F_p gives no
+points
+of one geometry: columns depend on those before them at random states, which Newton closes near the
+start of the loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symgen.derive.closure import Closure
+from symgen.derive.columns import sampled_columns
+from symgen.derive.exact import Array
+from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.geometry import Geometry
+from symgen.derive.loop_equations import LoopSystem, loop_system
+from symgen.derive.loops import close
+from symgen.derive.newton_euler import Motion
+from symgen.description.expression import Expression
+from symgen.description.robot import PRISMATIC, Robot
+from symgen.errors import SymgenError
+from symgen.regroup.residues import states_for
+
+INDEPENDENT = 1e-7  # of a unit column: what the columns before it leave of an independent one
+NEGLIGIBLE = 1e-6  # of a coefficient between unit columns
+SPREAD, MOST_STATES = 0.4, 4000  # rad about the start, and of half the longest length for slides
+Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coefficient}}
+
+
+def float_relations(robot: Robot, names: Sequence[str]) -> tuple[tuple[str, ...], Relations]:
+    """Base columns among `names`, in order of preference, and the others as their sums."""
+    pivots, K = float_base(float_regressor(robot, names))
+    base = tuple(names[c] for c in pivots)
+    return base, {
+        name: {base[k]: _number(K[k, c]) for k in np.flatnonzero(K[:, c])}
+        for c, name in enumerate(names)
+        if c not in pivots
+    }
+
+
+def numeric_coefficients(robot: Robot, name: str, support: Sequence[str]) -> list[Expression]:
+    """beta of D_name = sum_k beta_k D_support,k as numbers, by least squares."""
+    W = float_regressor(robot, (*support, name))
+    size = np.linalg.norm(W[:, :-1], axis=0)
+    beta = np.linalg.lstsq(W[:, :-1] / size, W[:, -1], rcond=None)[0] / size
+    return [_number(x) for x in beta]
+
+
+def _number(x: float) -> Expression:
+    return Expression.number(repr(float(x)))
+
+
+def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
+    """Columns `names` at enough random states for their rank, (joints * states, columns)."""
+    closure, rng = close(robot), np.random.default_rng(41)
+    if not closure.tied:
+        count = states_for(robot, names)
+        states = rng.uniform(-1, 1, (3, len(robot.moving), count))
+        q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in states)
+        D = _columns(closure, FloatAlgebra(robot, q, qd, qdd), names, count)
+        return D.reshape(-1, len(names))
+    system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
+    blocks: list[Array] = []
+    closed = tried = 0
+    while closed < count:
+        tried += count
+        if tried > MOST_STATES + 10 * count:
+            raise SymgenError(
+                f"robot {robot.name}: the loops close in {closed} of {tried} states near the "
+                "start; give each loop a `start` that closes it"
+            )
+        blocks.append(_columns_near_start(system, names, count, rng))
+        closed += blocks[-1].shape[1]
+    return np.concatenate(blocks, axis=1)[:, :count].reshape(-1, len(names))
+
+
+def _columns(closure: Closure, algebra: FloatAlgebra, names: Sequence[str], count: int) -> Array:
+    return sampled_columns(Motion(Geometry(closure.robot, algebra, closure)), names, count)
+
+
+def _columns_near_start(
+    system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
+) -> Array:
+    """Columns `names` at those of `count` random states that close, (joints, states, columns)."""
+    robot, closure, n = system.robot, system.closure, len(system.robot.joints)
+    lengths = [abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)]
+    size = max(lengths) or 1.0
+    slides = np.array([robot.frame(j).sigma == PRISMATIC for j in robot.joints])
+    away = SPREAD * np.where(slides, size / 2, 1.0) * rng.uniform(-1, 1, (n, count)).T
+    q = np.tile(system.start, (count, 1))
+    for share in (0.25, 0.5, 0.75, 1.0):
+        q[:, :n] = system.start[:n] + share * away
+        q = system.closed(q, steps=8, tolerance=1e-14 * size)
+    r, J = system.residual_floats(q), system.jacobian_floats(q)
+    good = (np.abs(r).max(axis=1) < 1e-11 * size) & (np.linalg.cond(J[..., n:]) < 1e6)
+    q, J = q[good], J[good]
+    J_u, G = J[..., n:], -np.linalg.solve(J[..., n:], J[..., :n])
+    qd, qdd = rng.standard_normal((2, n, len(q)))[..., None].swapaxes(1, 2)
+
+    def joints(x: Array) -> dict[int, Array]:
+        return dict(zip(closure.independent, x.T, strict=True))
+
+    qd = np.concatenate([qd, G @ qd], axis=1)[..., 0]
+    algebra = FloatAlgebra(robot, joints(q), joints(qd))
+    B = np.stack([np.broadcast_to(x, len(q)) for x in system.curvature(algebra)], axis=-1)
+    qdd = np.concatenate([qdd, G @ qdd - np.linalg.solve(J_u, B[..., None])], axis=1)[..., 0]
+    rate = {
+        (u, i): G[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(robot.joints)
+    }
+    algebra = FloatAlgebra(robot, joints(q), joints(qd), joints(qdd), rate)
+    return _columns(closure, algebra, names, len(q))
+
+
+def float_base(W: Array) -> tuple[list[int], Array]:
+    """Independent columns of W, leftmost first, and the coefficients of every column in them, shape
+    (rank, columns).
+    """
+    norms = np.linalg.norm(W, axis=0)
+    norms[norms <= 1e-10 * norms.max(initial=0.0)] = np.inf
+    U = W / norms
+    Q = np.zeros((W.shape[0], 0))
+    pivots: list[int] = []
+    for c in range(W.shape[1]):
+        u = U[:, c] - Q @ (Q.T @ U[:, c])
+        u = u - Q @ (Q.T @ u)
+        if (size := float(np.linalg.norm(u))) > INDEPENDENT:
+            pivots.append(c)
+            Q = np.column_stack([Q, u / size])
+    K = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]
+    return pivots, np.where(np.abs(K) > NEGLIGIBLE, K, 0.0) * np.where(
+        np.isinf(norms), 0.0, norms
+    ) / norms[pivots][:, None]

@@ -1,0 +1,71 @@
+"""Columns of the standard regressor over F_p, at random states and geometries of any robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from symgen.derive.angles import Variable
+from symgen.derive.columns import columns
+from symgen.derive.exact import Array, Draw
+from symgen.derive.geometry import Geometry
+from symgen.derive.loops import close
+from symgen.derive.newton_euler import Motion
+from symgen.description.robot import Robot
+from symgen.regroup.closed_draw import closed_draw
+
+
+def drawn(
+    robot: Robot,
+    seed: int,
+    samples: int,
+    *,
+    p: int | None = None,
+    geometry: Mapping[Variable, Array] | None = None,
+    count: int = 0,
+) -> Draw:
+    """`samples` random states over F_p at one geometry, or at each of `count`; closed where joints
+    are tied. Raises ArithmeticError where general loops have no points of one geometry.
+    """
+    if close(robot).tied:
+        return closed_draw(robot, seed, samples, p=p, count=max(count, 1), geometry=geometry)
+    return Draw(robot, seed, samples, p=p, geometry=geometry, count=count)
+
+
+def sample(draw: Draw, names: tuple[str, ...]) -> Array:
+    """The regressor columns `names` at the draw's states, shape (..., n_active * samples,
+    len(names)), int64 residues.
+    """
+    robot = draw.robot
+    D = columns(Motion(Geometry(robot, draw, close(robot))), names)
+    W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
+    for k, name in enumerate(names):
+        for row, j in enumerate(robot.joints):
+            if j in D[name]:
+                W[k, row] = draw.spread(D[name][j])
+    W = np.moveaxis(W, -1, 2)  # names, joints, samples, geometries
+    return np.moveaxis(W.reshape(len(names), -1, *draw.shape[:-1]), (0, 1), (-1, -2))
+
+
+def states_for(robot: Robot, names: Sequence[str], spare: int = 4) -> int:
+    """Random states that show the rank of the columns `names`, and `spare` more.
+
+    The columns that act on the joints of a set S alone need |columns| <= states |S| rows: counted
+    for the set of every column, and for all joints.
+    """
+    acting = _acting(robot)
+    acts = np.stack([acting[name] for name in names])
+    sets = np.unique(
+        np.vstack([acts[acts.any(axis=1)], np.ones((1, len(robot.joints)), dtype=bool)]), axis=0
+    )
+    needed = max(np.count_nonzero((acts <= S).all(axis=1)) / np.count_nonzero(S) for S in sets)
+    return int(np.ceil(needed + (6 + spare) / len(robot.joints))) + spare
+
+
+@lru_cache(maxsize=8)
+def _acting(robot: Robot) -> dict[str, Array]:
+    """{column: whether it acts on each joint} of all standard parameters, at random states."""
+    W = sample(Draw(robot, 5, 2), robot.parameters).reshape(len(robot.joints), 2, -1)
+    return dict(zip(robot.parameters, (W != 0).any(axis=1).T, strict=True))

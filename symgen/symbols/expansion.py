@@ -1,0 +1,248 @@
+"""Closed forms: the graph of a model multiplied out, then collected by parameter,
+
+    entry = sum_k common_k inside_k chi_k ,
+
+common_k the factors that all terms of a coefficient share. Polynomials are SymPy's, sparse: in the
+parameters over K, and K in cosines and sines, constants, positions of slides and rates. Numbers of
+K are ints where they are whole, which is far faster than QQ, else fractions: rings take both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from functools import cache
+from itertools import combinations
+from math import prod
+from typing import Any
+
+import sympy
+from sympy.polys.orderings import lex
+from sympy.polys.rings import PolyRing
+
+from symgen.derive.graph import Node, Scalar, reachable
+from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.description.expression import Expression, call
+from symgen.errors import SymgenError
+from symgen.symbols import trees
+from symgen.symbols.factors import Factors
+from symgen.symbols.identities import Angle, Coefficient, Identities, forward, number
+from symgen.symbols.trees import Tree
+
+Polynomial = Any  # of the ring of the parameters
+CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of factors in a product
+
+
+class TooManyTermsError(SymgenError):
+    """A polynomial with more terms than the limit."""
+
+
+class Expansion:
+    """Polynomials of the nodes of one graph.
+
+    Parameters
+    ----------
+    algebra : GraphAlgebra
+        Where the graph came from: what its angles are.
+    parameters : sequence of str
+        Symbols by which entries are collected, in their order.
+    outputs : sequence
+        Values of the graph that polynomials are asked of.
+    limit : int
+        Terms that a polynomial may have. Raises TooManyTermsError beyond.
+    """
+
+    def __init__(
+        self,
+        algebra: GraphAlgebra,
+        parameters: Sequence[str],
+        outputs: Sequence[Scalar | int],
+        limit: int,
+    ) -> None:
+        self.algebra, self.limit = algebra, limit
+        self.names = self._names({*parameters, *algebra.robot.constants})
+        ranks: dict[Any, tuple[int, ...]] = {
+            x: (TURN, *(j for j, _ in turn), *(n for _, n in turn), k)
+            for (turn, _), names in self.names.items()
+            for k, x in enumerate(names)
+        }
+        nodes = reachable(outputs)
+        for node in nodes:
+            if str(node.value) not in parameters:
+                for x, rank in self._generators(node):
+                    ranks.setdefault(x, (rank,))
+        shown: list[Tree] = sorted(ranks, key=lambda x: (ranks[x], str(x)))
+        self.K = PolyRing([sympy.Dummy() for _ in shown], sympy.ZZ, lex)
+        self.generator = dict(zip(shown, self.K.gens, strict=True))
+        kinds = [ranks[x][0] for x in shown]
+        rates, others, constants = (
+            [k for k, kind in enumerate(kinds) if kind in kept]
+            for kept in ((RATE, DIRECTION), (CONSTANT, SLIDE, TURN), (CONSTANT,))
+        )
+        self.shown = shown
+        self.factors = Factors(self.K, shown, (rates, others, constants))
+        self.identities = Identities(
+            self.K,
+            {a: (self.generator[C], self.generator[S]) for a, (C, S) in self.names.items()},
+        )
+        used = {str(node.value) for node in nodes if node.op == "sym"}
+        own = [name for name in parameters if name in used]
+        self.ring = PolyRing([trees.symbol(name) for name in own], self.K.to_domain(), lex)
+        self.parameters = dict(zip(own, self.ring.gens, strict=True))
+        self._value: dict[int, Polynomial] = {}
+        for node in nodes:
+            self._value[node.index] = self._node(node)
+
+    # --- generators ---
+
+    def _names(self, taken: set[str]) -> dict[Angle, tuple[Tree, Tree]]:
+        """What the cosine and the sine of every angle of the graph are called."""
+        names: dict[Angle, tuple[Tree, Tree]] = {}
+        for node in self.algebra.graph.nodes:
+            if node.index not in self.algebra.angles:
+                continue
+            turn, rest = self.algebra.angles[node.index]
+            if turn:
+                C, S = (f"{letter}{str(node.name)[1:]}" for letter in "CS")
+                while {C, S} & taken:
+                    C, S = f"{C}_", f"{S}_"
+                turn, rest, _ = forward(turn, rest)
+                names.setdefault((turn, rest), (trees.symbol(C), trees.symbol(S)))
+        return names
+
+    def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
+        """What a node needs of K, with its rank."""
+        name = str(node.value)
+        match node.op:
+            case "sym":
+                stem, own = name.rstrip("0123456789_"), name in self.algebra.robot.constants
+                is_rate = stem in ("QP", "QDP", "G") and not own
+                yield trees.symbol(name), SLIDE if stem == "q" else RATE if is_rate else CONSTANT
+            case "cos" | "sin" | "sqrt":
+                for m in self._constant(node).terms:
+                    for a, n in m:
+                        yield trees.power(a, 1 if n > 0 else -1), CONSTANT
+            case "inv" | "sign" | "pos":
+                yield (node.op, node.index), CONSTANT if node.op == "inv" else DIRECTION
+
+    def _constant(self, node: Node) -> Expression:
+        """The constant that a square root, or the cosine or sine of a fixed angle, is; else
+        zero.
+        """
+        if node.op == "sqrt":
+            return self.algebra.roots[node.index]
+        turn, rest = self.algebra.angles[node.index]
+        return Expression() if turn else call(node.op, rest)
+
+    def _node(self, node: Node) -> Polynomial:
+        x = [self.of(s) for s in node.operands]
+        match node.op:
+            case "sym":
+                name = str(node.value)
+                return self.parameters.get(name) or self._lifted(self.generator[trees.symbol(name)])
+            case "const":
+                return self._lifted(self.K.one.mul_ground(number(node.value)))
+            case "add":
+                return self.checked(x[0] + x[1])
+            case "mul":
+                return self.mul(x[0], x[1])
+            case "cos" | "sin" if self.algebra.angles[node.index][0]:
+                turn, rest, sign = forward(*self.algebra.angles[node.index])
+                C, S = self.identities.pairs[turn, rest]
+                return self._lifted(C if node.op == "cos" else sign * S)
+            case "cos" | "sin" | "sqrt":
+                return self._lifted(
+                    sum(
+                        prod(
+                            (
+                                self.generator[trees.power(a, 1 if n > 0 else -1)] ** abs(n)
+                                for a, n in m
+                            ),
+                            start=self.K.one.mul_ground(number(c)),
+                        )
+                        for m, c in self._constant(node).terms.items()
+                    )
+                )
+        inside, made = self.written(x[0]), self.generator[node.op, node.index]
+        k = self.K.gens.index(made)
+        if node.op == "inv":
+            self.shown[k] = sympy.Pow(inside, -1, evaluate=False)
+        elif node.op == "sign":
+            self.shown[k] = sympy.sign(inside, evaluate=False)
+        else:  # max(x, 0)
+            self.shown[k] = sympy.Abs(inside, evaluate=False)
+            return self.halved(self._lifted(made) + x[0])
+        return self._lifted(made)
+
+    def _lifted(self, c: Coefficient) -> Polynomial:
+        return self.ring.ground_new(c)
+
+    # --- arithmetic ---
+
+    def of(self, x: Scalar | int) -> Polynomial:
+        """The polynomial of a graph value, multiplied out."""
+        value = self.ring(x) if isinstance(x, int) else self._value[x.node.index]
+        return value if isinstance(x, int) or x.sign > 0 else -value
+
+    def mul(self, a: Polynomial, b: Polynomial) -> Polynomial:
+        if (terms := length(a) * length(b)) > 100 * self.limit:
+            raise TooManyTermsError(f"more than {self.limit} terms")
+        return self.checked(self._each(a * b, self.identities.reduced)) if terms else self.ring(0)
+
+    def checked(self, a: Polynomial) -> Polynomial:
+        if length(a) > self.limit:
+            raise TooManyTermsError(f"more than {self.limit} terms")
+        return a
+
+    def _each(self, a: Polynomial, of: Any) -> Polynomial:
+        return self.ring.from_dict({m: of(c) for m, c in a.items()})
+
+    def derivative(self, a: Polynomial, j: int) -> Polynomial:
+        """da/dq_j."""
+        q = self.generator.get(trees.symbol(f"q{j}"))
+        return self._each(a, lambda c: self.identities.derivative(c, j, q))
+
+    def halved(self, a: Polynomial) -> Polynomial:
+        return self._each(a, lambda c: c.new({m: number(Fraction(n) / 2) for m, n in c.items()}))
+
+    def determinant(self, rows: Sequence[Sequence[Polynomial]]) -> Polynomial:
+        """Laplace's expansion by rows, those with most zeros first; minors are kept."""
+        size = len(rows)
+        order = sorted(range(size), key=lambda k: sum(map(bool, rows[k])))
+        odd = sum(order[i] > order[k] for i, k in combinations(range(size), 2)) % 2
+
+        @cache
+        def minor(depth: int, columns: tuple[int, ...]) -> Polynomial:
+            value = self.ring(0 if columns else 1)
+            for k, column in enumerate(columns):
+                if entry := rows[order[depth]][column]:
+                    rest = minor(depth + 1, columns[:k] + columns[k + 1 :])
+                    value = self.checked(value + (-1) ** k * self.mul(entry, rest))
+            return value
+
+        return (-1) ** odd * minor(0, tuple(range(size)))
+
+    def tidied(self, a: Polynomial) -> Polynomial:
+        """The same with every coefficient in fewer terms."""
+        return self._each(a, self.identities.tidy)
+
+    # --- as expressions ---
+
+    def written(self, a: Polynomial) -> Tree:
+        """An entry by parameter, written short; parameters with one coefficient share it."""
+        shared: dict[Coefficient, list[Tree]] = {}
+        signs: dict[Coefficient, int] = {}
+        for monomial in sorted(a, key=lambda m: (any(m), [-n for n in m])):
+            if c := self.identities.tidy(a[monomial]):
+                sign = 1 if c.LC > 0 else -1
+                names = [x**n for x, n in zip(self.ring.symbols, monomial, strict=True)]
+                own = signs.setdefault(sign * c, sign)
+                shared.setdefault(sign * c, []).append(trees.product(Fraction(sign * own), names))
+        return trees.total(
+            x for c, members in shared.items() for x in self.factors.terms(signs[c] * c, members)
+        )
+
+
+def length(a: Polynomial) -> int:
+    """Terms, multiplied out."""
+    return sum(map(len, a.values()))

@@ -1,0 +1,116 @@
+"""Coefficients written short: common factors before brackets, as few symbols as can be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any
+
+import sympy
+
+from symgen.symbols import trees
+from symgen.symbols.identities import Coefficient
+from symgen.symbols.trees import Tree
+
+Powers = tuple[int, ...]  # of the generators of a ring
+
+
+class Factors:
+    """How the coefficients of one ring are written.
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Of the coefficients.
+    shown : sequence
+        What each generator is written as.
+    fields : sequence
+        Generators by whose powers the terms of a coefficient may be collected.
+    """
+
+    def __init__(self, ring: Any, shown: Sequence[Tree], fields: Sequence[Sequence[int]]) -> None:
+        self.ring, self.shown, self.fields = ring, shown, fields
+        self._labels = [*map(str, shown)]
+
+    def terms(self, c: Coefficient, members: Sequence[Tree]) -> Sequence[Tree]:
+        """c times a sum of parameters, or of 1."""
+        number, factors = self._shortest(c)
+        factors = [*factors, *sympy.Mul.make_args(trees.total(members))]
+        factors = [x for x in factors if x != 1]
+        if abs(number) == 1 and len(factors) == 1:
+            return [x if number > 0 else trees.negative(x) for x in sympy.Add.make_args(factors[0])]
+        return [trees.product(number, factors)]
+
+    def _shortest(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
+        """(number, factors) of a coefficient: all in one bracket, or a bracket for each of its
+        parts by rates, by what is no rate, or by constants, whatever has the fewest symbols.
+        """
+        terms = {m: c[m] for m in sorted(c, key=self._order)}
+        ways = [[c], *([*self._parts(terms, fields)] for fields in self.fields)]
+        best = min(ways, key=lambda way: sum(map(self._symbols, way)))
+        if len(best) == 1:
+            return self._bracketed(c)
+        number, common, rest = self._split(c)
+        if number == 1 and not any(common):
+            return self._positive(number, [trees.product(*self._bracketed(x)) for x in best])
+        number_of_rest, factors = self._shortest(rest)
+        return number * number_of_rest, [*self._powers(common), *factors]
+
+    def _symbols(self, c: Coefficient) -> int:
+        """Symbols of a coefficient written with one bracket."""
+        number, shared = _content(c), sum(map(min, zip(*c, strict=True)))
+        inside = sum(sum(m) - shared + (abs(n) != number) for m, n in c.items())
+        return int(inside + shared + (number != 1))
+
+    def _positive(self, number: Fraction, terms: Sequence[Tree]) -> tuple[Fraction, list[Tree]]:
+        """(number, [sum of the terms]), the first one positive."""
+        if trees.is_negative(terms[0]):
+            number, terms = -number, [*map(trees.negative, terms)]
+        return number, [trees.total(terms)]
+
+    def _bracketed(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
+        """(number, factors) with the sum of all terms as the last factor, its first one
+        positive.
+        """
+        number, common, rest = self._split(c)
+        terms = [
+            trees.product(Fraction(rest[m]), self._powers(m)) for m in sorted(rest, key=self._order)
+        ]
+        number, inside = self._positive(number, terms)
+        return number, [*self._powers(common), *inside]
+
+    def _split(self, c: Coefficient) -> tuple[Fraction, Powers, Coefficient]:
+        """The greatest number and monomial that divide every term, and what is left."""
+        number, common = _content(c), tuple(map(min, zip(*c, strict=True)))
+        above, below, over = number.numerator, number.denominator, self.ring.monomial_ldiv
+        rest = {
+            over(m, common): n.numerator * below // (n.denominator * above) for m, n in c.items()
+        }
+        return number, common, c.new(rest)
+
+    def _parts(self, terms: Mapping[Powers, Any], fields: Sequence[int]) -> Iterable[Coefficient]:
+        """The terms by their powers of some generators."""
+        parts: dict[Powers, dict[Powers, Any]] = {}
+        for m, value in terms.items():
+            parts.setdefault(tuple(m[k] for k in fields), {})[m] = value
+        return map(self.ring.zero.new, parts.values())
+
+    def _order(self, m: Powers) -> tuple[Any, ...]:
+        """Order of the text: highest degree first."""
+        return -sum(m), [(self._labels[k], -n) for k, n in enumerate(m) if n]
+
+    def _powers(self, m: Powers) -> list[Tree]:
+        """The factors of a monomial."""
+        return [
+            x if n == 1 else sympy.Pow(x.as_base_exp()[0], n * x.as_base_exp()[1], evaluate=False)
+            for x, n in zip(self.shown, m, strict=True)
+            if n
+        ]
+
+
+def _content(c: Coefficient) -> Fraction:
+    """The greatest number that divides every term."""
+    return Fraction(
+        gcd(*(n.numerator for n in c.values())), lcm(*(n.denominator for n in c.values()))
+    )

@@ -1,0 +1,133 @@
+"""Cosines and sines of the angles of a model: S**2 becomes 1 - C**2 at once, hence S**2 + C**2
+never
+stays. `tidy` writes the other way whatever gets shorter by it:
+
+    1 - C**2 = S**2 ,     Ca Cb - Sa Sb = C(a + b) ,     Sa Cb + Ca Sb = S(a + b) ,
+
+and the same with a - b, for the sums and differences that are angles of the model themselves: those
+of joints with parallel axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from itertools import combinations, product
+from typing import Any
+
+from symgen.derive.scalar import Turn
+from symgen.description.expression import Expression, quarter_turns
+
+Coefficient = Any  # of the ring of cosines, sines, constants and rates
+Angle = tuple[Turn, Expression]  # sum n_j q_j + rest, the first n_j positive
+
+
+class Identities:
+    """What is known of cosines and sines.
+
+    Parameters
+    ----------
+    ring : PolyRing
+        Of the coefficients.
+    pairs : mapping
+        (cos, sin) of each angle, generators of the ring.
+    """
+
+    def __init__(self, ring: Any, pairs: Mapping[Angle, tuple[Coefficient, Coefficient]]) -> None:
+        self.ring, self.pairs, change = ring, pairs, ring.monomial_ldiv
+        self._circles = [
+            (S.LM.index(1), change(ring.zero_monom, (S**2).LM), change((C**2).LM, (S**2).LM))
+            for C, S in pairs.values()
+        ]
+        self._rules = [
+            (*_ends(first.LM), first.LM, second.LM, sign, value.LM, value.LC)
+            for first, second, sign, value in self._sums()
+        ]
+
+    def reduced(self, c: Coefficient) -> Coefficient:
+        """c without squares of sines."""
+        c, times = c.copy(), self.ring.monomial_mul
+        for k, less, other in self._circles:
+            while squares := [m for m in c if m[k] > 1]:
+                for m in squares:
+                    value = c.pop(m)
+                    c[times(m, less)] = c.get(times(m, less), 0) + value
+                    c[times(m, other)] = c.get(times(m, other), 0) - value
+        c.strip_zero()
+        return c
+
+    def derivative(self, c: Coefficient, j: int, slide: Coefficient | None) -> Coefficient:
+        """dc/dq_j by the angles that joint j turns, or by its position where it slides."""
+        moves = [(slide, self.ring(1), 1)] if slide else []
+        for (turn, _), (C, S) in self.pairs.items():
+            if n := dict(turn).get(j):
+                moves += [(S, C, n), (C, S, -n)]
+        slope = self.ring(0)
+        for x, becomes, n in moves:
+            k, step = x.LM.index(1), self.ring.monomial_ldiv(becomes.LM, x.LM)
+            slope += c.new({self.ring.monomial_mul(m, step): n * m[k] * c[m] for m in c if m[k]})
+        return self.reduced(slope)
+
+    def tidy(self, c: Coefficient) -> Coefficient:
+        """The same function in fewer terms: pairs of terms are put together until none is left."""
+        terms, times, over = dict(c), self.ring.monomial_mul, self.ring.monomial_div
+        size = 0
+        while size != len(terms):
+            size = len(terms)
+            for m in sorted(terms):
+                for i, k, first, second, sign, becomes, factor in self._rules:
+                    if not (m[i] and m[k] and m in terms) or (rest := over(m, first)) is None:
+                        continue
+                    if terms.get(other := times(rest, second)) == sign * terms[m]:
+                        made, value = times(rest, becomes), factor * terms.pop(m)
+                        del terms[other]
+                        value += terms.pop(made, 0)
+                        if value:
+                            terms[made] = value
+        return c.new(terms)
+
+    def _sums(self) -> Iterable[tuple[Coefficient, Coefficient, int, Coefficient]]:
+        """first + sign second = value."""
+        one = self.ring(1)
+        for C, S in self.pairs.values():
+            yield C**2, one, -1, -(S**2)
+            yield C**2, S**2, 1, one
+        for (a, b), way in product(combinations(self.pairs, 2), (1, -1)):
+            (Ca, Sa), (Cb, Sb) = self.pairs[a], self.pairs[b]
+            if whole := self._whole(a, b, way):
+                yield Ca * Cb, Sa * Sb, -way, whole[0]
+                yield Sa * Cb, Ca * Sb, way, whole[1]
+
+    def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
+        """cos and sin of a + way b, where that is an angle of the model."""
+        turns = dict(a[0])
+        for j, n in b[0]:
+            turns[j] = turns.get(j, 0) + way * n
+        turn = tuple((j, n) for j, n in sorted(turns.items()) if n)
+        if not turn:
+            return None
+        turn, rest, sign = forward(turn, a[1] + b[1] * way)
+        quarters, rest = quarter_turns(rest)
+        if (turn, rest) not in self.pairs:
+            return None
+        C, S = self.pairs[turn, rest]
+        c, s = ((C, S), (-S, C), (-C, -S), (S, -C))[quarters % 4]
+        return c, sign * s
+
+
+def number(c: Fraction) -> Fraction | int:
+    """An integer where it is one."""
+    return c.numerator if c.denominator == 1 else c
+
+
+def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
+    """The first and the last generator in a monomial."""
+    inside = [k for k, n in enumerate(monomial) if n]
+    return inside[0], inside[-1]
+
+
+def forward(turn: Turn, rest: Expression) -> tuple[Turn, Expression, int]:
+    """The angle with its first joint positive, and the sign of its sine."""
+    if turn[0][1] > 0:
+        return turn, rest, 1
+    return tuple((j, -n) for j, n in turn), -rest, -1

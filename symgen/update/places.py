@@ -1,0 +1,328 @@
+"""Where a URDF or MJCF file holds the numbers of its links and joints: one map for each format.
+
+With pose X of the link (URDF) or body (MJCF) in frame j and orientation R, in the link, of the axes
+in which the file states the tensor:
+
+    mass M,    centre MS / M in the link frame,    I = R' (J - M (c'c 1 - c c')) R about the centre
+
+A URDF has the axes of its <inertial>, which stay, and <dynamics> of a joint; motor inertia, offsets
+and springs have no place. MJCF has fullinertia in axes of the body, or diaginertia with the
+orientation of its principal axes. A body whose inertia comes from its geoms gets an <inertial>;
+inertiafromgeom="true" becomes "auto", by which the others stay as they are. What a class of
+defaults says for many joints is not changed: a joint that differs gets an attribute of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from symgen.description.mjcf_text import DEEPEST, ORIENTATION
+from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree
+from symgen.description.xml_text import XmlElement, read_elements
+from symgen.errors import DescriptionError
+from symgen.update.xml_edits import XmlEdits, numbers, same
+
+NUMBERS = (  # of a link: what, label and unit, in the order of `LinkPlace.numbers`
+    ("mass", "mass", "kg"),
+    *(("centre", label, "m") for label in "xyz"),
+    *(("inertia", label, "kg*m**2") for label in ("xx", "xy", "xz", "yy", "yz", "zz")),
+)
+SPRING = ("K", "OFFSET")  # of a joint that has one: OFFSET = -stiffness springref
+DIAGONAL = 1e-12  # of the largest moment: smaller products are none
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """The map of a format.
+
+    Attributes
+    ----------
+    format : str
+        URDF or MJCF.
+    inertial : mapping
+        Attributes of each child of <inertial>, of <inertial> itself under "", and their places in
+        NUMBERS.
+    dynamics : str
+        Child of a joint that holds its parameters; "": the joint itself.
+    joint : mapping
+        Attribute of each family of parameters.
+    """
+
+    format: str
+    inertial: Mapping[str, Mapping[str, tuple[int, ...]]]
+    dynamics: str
+    joint: Mapping[str, str]
+
+    @property
+    def order(self) -> list[int]:
+        """Places in NUMBERS in the order of the file."""
+        return [k for row in self.inertial.values() for places in row.values() for k in places]
+
+
+URDF = Attributes(
+    "URDF",
+    {
+        "mass": {"value": (0,)},
+        "origin": {"xyz": (1, 2, 3)},
+        "inertia": {f"i{NUMBERS[k][1]}": (k,) for k in range(4, 10)},
+    },
+    "dynamics",
+    {"FV": "damping", "FS": "friction"},
+)
+MJCF = Attributes(
+    "MJCF",
+    {"": {"mass": (0,), "pos": (1, 2, 3), "fullinertia": (4, 7, 9, 5, 6, 8)}},
+    "",
+    {
+        "FV": "damping",
+        "FS": "frictionloss",
+        "Ia": "armature",
+        "K": "stiffness",
+        "OFFSET": "springref",
+    },
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkPlace:
+    """A link or body of the file and its <inertial>, if it has one.
+
+    Attributes
+    ----------
+    attributes : Attributes
+        Map of the format.
+    link : XmlElement
+        <link> or <body>.
+    inertial : XmlElement or None
+        <inertial>.
+    X : ndarray, shape (4, 4)
+        Pose of the link in frame j.
+    axes : ndarray, shape (3, 3)
+        Orientation of the axes of the tensor in the link, as the file has it or MuJoCo compiles it.
+    stated : ndarray, shape (10,), or None
+        NUMBERS as a URDF states them; those of an MJCF are compiled.
+    """
+
+    attributes: Attributes
+    link: XmlElement
+    inertial: XmlElement | None
+    X: Array
+    axes: Array
+    stated: Array | None
+
+    @property
+    def principal(self) -> bool:
+        """Whether an MJCF states principal moments."""
+        full = self.inertial is None or "fullinertia" in self.inertial.attributes
+        return self.attributes is MJCF and not full
+
+    def numbers(self, ten: Array) -> Array:
+        """NUMBERS, shape (10,), that the file states for ten parameters in frame j."""
+        *J, mx, my, mz, M = (float(x) for x in ten)
+        if M <= 0:
+            if np.any(ten):
+                raise DescriptionError(f"a mass of {M:.4g} kg comes out; no link has it")
+            return np.zeros(10)
+        c, I = np.array([mx, my, mz]) / M, np.zeros((3, 3))
+        I[np.triu_indices(3)] = J
+        I = I + I.T - np.diag(np.diag(I)) - M * (c @ c * np.eye(3) - np.outer(c, c))
+        turned = self.X[:3, :3] @ (
+            self.axes if self.principal or self.attributes is URDF else np.eye(3)
+        )
+        tensor = (turned.T @ I @ turned)[np.triu_indices(3)]
+        return np.array([M, *(self.X[:3, :3].T @ (c - self.X[:3, 3])), *tensor])
+
+    def write(self, edits: XmlEdits, ten: Array) -> None:
+        """The edits that make the file state `ten`."""
+        x = self.numbers(ten)
+        if self.inertial is None:
+            row = self.attributes.inertial[""]
+            words = _words({key: x[[*row[key]]] for key in ("pos", "mass", "fullinertia")})
+            edits.insert_child(self.link, f"<inertial {words}/>")
+            return
+        for tag, row in self.attributes.inertial.items():
+            e, own = (
+                self.inertial.first(tag) if tag else self.inertial,
+                {key: x[[*places]] for key, places in row.items()},
+            )
+            default = (0.0, 0.0, 0.0) if tag == "origin" else None
+            if e is None and any(map(np.any, own.values())):
+                words = _words(own) + ' rpy="0 0 0"' * (tag == "origin")
+                edits.insert_child(self.inertial, f"<{tag} {words}/>")
+            for key, values in own.items():
+                if e is not None and (key != "fullinertia" or not self.principal):
+                    edits.set_numbers(e, key, values.tolist(), default)
+        if self.principal:
+            xx, xy, xz, yy, yz, zz = x[4:]
+            self._write_principal(edits, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+    def _write_principal(self, edits: XmlEdits, I: Array) -> None:
+        assert self.inertial is not None
+        moments, V = principal(I)
+        edits.set_numbers(self.inertial, "diaginertia", moments.tolist())
+        quat = quaternion(self.axes @ V)
+        if all(map(same, quat, quaternion(self.axes))):
+            return
+        written = next((name for name in ORIENTATION if name in self.inertial.attributes), "quat")
+        if written == "quat":
+            edits.set_numbers(self.inertial, "quat", quat.tolist(), (1.0, 0.0, 0.0, 0.0))
+        else:
+            edits.replace_attribute(self.inertial, written, "quat", quat.tolist())
+
+
+class Places:
+    """Elements of a file by the names of the links and joints of its tree."""
+
+    def __init__(self, content: bytes, tree: Tree, attributes: Attributes) -> None:
+        root = read_elements(content, DEEPEST)
+        self.attributes, self.tree = attributes, tree
+        self.from_geoms: list[XmlElement] = []
+        self.degrees = False
+        if attributes is MJCF:
+            self._find_bodies(root)
+        else:
+            self.links, self.joints = (
+                {e.text("name"): e for e in root.children if e.tag == tag}
+                for tag in ("link", "joint")
+            )
+
+    def _find_bodies(self, root: XmlElement) -> None:
+        compilers = [e for e in root.children if e.tag == "compiler"]
+        self.from_geoms = [e for e in compilers if e.attributes.get("inertiafromgeom") == "true"]
+        self.degrees = not any(e.attributes.get("angle") == "radian" for e in compilers)
+        bodies = [e for world in root.children if world.tag == "worldbody" for e in _bodies(world)]
+        joints = [x for e in bodies for x in e.own("joint", "freejoint")]
+        moving = [
+            joint.name
+            for joint in self.tree.joints
+            if joint.kind != FIXED_TYPE or not joint.name.endswith(" (fixed)")
+        ]
+        self.links = dict(zip(self.tree.places, bodies, strict=True))
+        self.joints = dict(zip(moving, joints, strict=True))
+        for name, e in self.joints.items():
+            if e.attributes.get("name", name) != name:
+                raise DescriptionError(
+                    f"joint {name!a:.60} is not found where MuJoCo has it; sort joints before "
+                    "bodies",
+                    line=e.line,
+                )
+
+    def link(self, name: str, tree: Tree, X: Array) -> LinkPlace:
+        """Where the numbers of link `name` stand, which has pose X in frame j of `tree`."""
+        link, inertial = self.links[name], tree.links[name]
+        e = next(link.own("inertial"), None)
+        if e is not None and e not in link.children:
+            raise DescriptionError(
+                "<inertial> inside a <frame>; write it into its body", line=e.line
+            )
+        if inertial is None or (e is None and self.attributes is URDF):
+            raise DescriptionError(f"link {name!a:.60} has no <inertial>", line=link.line)
+        place = self.tree.places.get(name, np.eye(4))  # a URDF has one frame for link and body
+        axes = place[:3, :3].T @ inertial.pose[:3, :3]
+        tensor = inertial.I[np.triu_indices(3)]
+        stated = np.array([inertial.M, *inertial.pose[:3, 3], *tensor])
+        of_file = stated if self.attributes is URDF else None
+        return LinkPlace(self.attributes, link, e, X @ place, axes, of_file)
+
+    def attribute(self, family: str, joint: Joint) -> str | None:
+        """Where a joint holds a parameter; None: nowhere."""
+        without = family in SPRING and not joint.stiffness
+        return None if without else self.attributes.joint.get(family)
+
+    def heed_inertials(self, edits: XmlEdits) -> None:
+        """The edit by which MuJoCo heeds an <inertial> that was inserted."""
+        own = (e for body in self.links.values() for e in body.own("inertial"))
+        if self.from_geoms and (ignored := next(own, None)):
+            raise DescriptionError(
+                "inertiafromgeom is true and this <inertial> without effect; remove the one or the "
+                "other",
+                line=ignored.line,
+            )
+        for e in self.from_geoms:
+            edits.set_word(e, "inertiafromgeom", "auto")
+
+    def set_joint(
+        self,
+        edits: XmlEdits,
+        joint: Joint,
+        values: Mapping[str, float],
+        before: Mapping[str, float],
+    ) -> None:
+        """The edits that make the file state `values` of a joint, by family, where it says
+        `before`.
+        """
+        e, names = self.joints[joint.name], self.attributes.joint
+        new = {family: x for family, x in values.items() if not same(x, before[family])}
+        own = {names[family]: x for family, x in new.items() if family not in SPRING}
+        if new and "springdamper" in e.attributes:
+            raise DescriptionError(
+                f"joint {joint.name!a:.60}: springdamper sets its damping; write stiffness and "
+                "damping instead",
+                line=e.line,
+            )
+        if new.keys() & set(SPRING):
+            K, offset = (values.get(family, before[family]) for family in SPRING)
+            if K <= 0:
+                raise DescriptionError(
+                    f"joint {joint.name!a:.60}: a stiffness of {K:.4g} comes out; MuJoCo takes "
+                    "positive ones",
+                    line=e.line,
+                )
+            turns = self.degrees and joint.kind != "prismatic"
+            own |= {"stiffness": K, "springref": np.degrees(-offset / K) if turns else -offset / K}
+        holder = e.first(self.attributes.dynamics) if self.attributes.dynamics else e
+        if holder is not None:
+            for key, x in own.items():
+                edits.set_numbers(holder, key, (x,))
+        elif any(own.values()):
+            words = _words({key: (x,) for key, x in own.items()})
+            edits.insert_child(e, f"<{self.attributes.dynamics} {words}/>")
+
+
+def _words(attributes: Mapping[str, Any]) -> str:
+    return " ".join(f'{key}="{numbers(values)}"' for key, values in attributes.items())
+
+
+def principal(I: Array) -> tuple[Array, Array]:
+    """Moments (3,) and axes V (3, 3) with I = V diag(moments) V', V as near to the identity as it
+    may be.
+    """
+    if np.abs(I - np.diag(np.diag(I))).max() <= DIAGONAL * np.abs(I).max():
+        return np.diag(I).copy(), np.eye(3)
+    moments, V = np.linalg.eigh((I + I.T) / 2)
+    order = list(
+        max(permutations((0, 1, 2)), key=lambda p: float(np.abs(V[[0, 1, 2], list(p)]).sum()))
+    )
+    V = V[:, order] * np.where(np.diag(V[:, order]) < 0, -1.0, 1.0)
+    if np.linalg.det(V) < 0:
+        V[:, int(np.argmin(np.abs(np.diag(V))))] *= -1
+    return moments[order], V
+
+
+def quaternion(R: Array) -> Array:
+    """Unit quaternion w, x, y, z of a rotation matrix, w not negative."""
+    xx, yy, zz = np.diag(R)
+    squares = np.array([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz]) / 4
+    k = int(np.argmax(squares))
+    products = {
+        (0, 1): R[2, 1] - R[1, 2], (0, 2): R[0, 2] - R[2, 0], (0, 3): R[1, 0] - R[0, 1],
+        (1, 2): R[1, 0] + R[0, 1], (1, 3): R[0, 2] + R[2, 0], (2, 3): R[2, 1] + R[1, 2],
+    }  # fmt: skip
+    q = np.array(
+        [squares[k] if i == k else products[min(i, k), max(i, k)] / 4 for i in range(4)]
+    ) / np.sqrt(squares[k])
+    return np.asarray(q / np.linalg.norm(q) * (-1.0 if q[0] < 0 else 1.0))
+
+
+def _bodies(e: XmlElement) -> Iterator[XmlElement]:
+    """Bodies in the order of MuJoCo: a body before those inside it."""
+    for child in e.children:
+        if child.tag == "body":
+            yield child
+        if child.tag in ("body", "frame"):
+            yield from _bodies(child)

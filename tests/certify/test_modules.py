@@ -1,0 +1,292 @@
+"""The certificate evaluates the emitted module, and `symgen.model` imports it from a cache that
+nothing can spoil.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import symgen
+from oracles.random_robots import random_robot
+from runtime import load_model
+from symgen.certify import importing
+from symgen.certify.importing import below
+from symgen.certify.modules import certified_files, certify, model, require_valid
+from symgen.certify.texts import TextCheck
+from symgen.cli.main import app
+from symgen.derive.lagrange import Lagrange
+from symgen.description import load_robot, packaged_robots
+from symgen.emit.generate import generate_files, generate_module
+from symgen.errors import CertificateError, SymgenError
+from symgen.regroup.regrouping import regroup
+
+ROBOT = """
+symgen: 1
+name: arm
+gravity: [0, 0, -g]
+constants: {g: 9.81, D2: 0.4}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: pi/6, d: D2, theta: q2, r: sqrt(3)/2}
+elements:
+  FV: {kind: viscous, along: all}
+"""
+FUNCTIONS = ("regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity")
+ALL = {
+    *FUNCTIONS, "base_parameters", "observation_matrix", "forward_dynamics", "frame_poses",
+    "jacobian",
+}  # fmt: skip
+
+
+def errors(certificate, what=str.islower):
+    """{function: error} of the NumPy module; its tables with what=str.isupper."""
+    (text,) = certificate.texts.values()
+    return {name: error for name, error in text.errors.items() if what(name.replace("_", ""))}
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def wrong(text: str, function: str) -> str:
+    """The text with 0.001 added to one entry of a function."""
+    head, mark, block = text.partition(f"def _{function}_block(")
+    changed, count = re.subn(
+        r"^( +(?:D|GAM|A)\[[^=]*\] = )(?=[^=]*$)",
+        r"\g<1>1e-3 + ",
+        block,
+        count=1,
+        flags=re.MULTILINE,
+    )
+    assert mark and count == 1
+    return head + mark + changed
+
+
+@pytest.mark.parametrize("name", packaged_robots())
+def test_modules_of_packaged_robots_are_evaluated(name: str) -> None:
+    certificate = certify(regroup(load_robot(name)))
+    assert certificate.valid, str(certificate)
+    passive = {"passive_joints"} if load_robot(name).passive else set()
+    assert set(errors(certificate)) == ALL | passive
+    assert max(errors(certificate).values()) < 1e-11
+    assert set(errors(certificate, str.isupper).values()) == {0.0}
+
+
+def test_gravity_is_left_out_where_friction_takes_in_a_weight() -> None:
+    """One-sided Coulomb friction without an offset: the module says in its header that torques at
+    rest are not those of the mechanism.
+    """
+    certificate = certify(regroup(random_robot(116)))
+    assert certificate.valid and set(errors(certificate)) == ALL - {"gravity"}
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_one_wrong_entry_of_a_module_is_caught(function: str) -> None:
+    """The formulas are right, the text is not: before, nothing read the text."""
+    base = regroup(load_robot("scara"))
+    text = generate_module(base.robot)
+    assert certify(base, {"scara.py": text}).valid
+    certificate = certify(base, {"scara.py": wrong(text, function)})
+    assert not certificate.valid and not certificate.failures and certificate.numeric_valid
+    users = {
+        "regressor": {"observation_matrix"},
+        "inertia_matrix": {"forward_dynamics"},
+        "bias": {"forward_dynamics"},
+    }
+    seen = {name for name, error in errors(certificate).items() if error > 1e-6}
+    assert seen == {function} | users.get(function, set())
+    assert f"FALSE {function} of scara.py" in str(certificate)
+    assert json.loads(json.dumps(certificate.mapping()))["valid"] is False
+
+
+def test_nothing_is_generated_where_the_module_is_wrong(monkeypatch, cache) -> None:
+    import symgen.certify.modules as certified
+
+    def spoiled(robot, **options):
+        return {
+            name: wrong(text, "regressor")
+            for name, text in generate_files(robot, **options).items()
+        }
+
+    monkeypatch.setattr(certified, "generate_files", spoiled)
+    for act in (certified_files, model):
+        with pytest.raises(
+            CertificateError,
+            match=(
+                r"^scara: the certificate does not hold \(regressor of scara.py .*\); "
+                r"nothing leaves"
+            ),
+        ) as error:
+            act(load_robot("scara"))
+        assert not error.value.certificate.valid
+    result = CliRunner().invoke(app, ["generate", "scara", "-o", str(cache)])
+    assert (
+        result.exit_code == 1
+        and "regressor of scara.py" in result.stderr
+        and "Traceback" not in result.output
+    )
+    assert not cache.exists()
+
+
+@pytest.mark.parametrize("given", ["name", "text", "path", "robot"])
+def test_a_robot_becomes_a_module(tmp_path, cache, given) -> None:
+    path = tmp_path / "arm.YAML"
+    path.write_text(ROBOT)
+    source = {"name": "planar_2r", "text": str(path), "path": path, "robot": load_robot(path)}[
+        given
+    ]
+    module = symgen.model(source)
+    described = load_robot("planar_2r" if given == "name" else path)
+    text = Path(module.__file__).read_text()
+    assert below(text) == generate_module(described) != text
+    digest = sha256(below(text).encode()).hexdigest()
+    assert text.startswith("# Certificate ") and f"# sha256 of what follows: {digest}\n" in text
+    assert Path(module.__file__).is_relative_to(cache)
+    assert load_model(module) is module
+    q, qd, qdd = np.random.default_rng(0).uniform(-1, 1, (3, 20, 2))
+    chi = np.random.default_rng(1).standard_normal(len(described.parameters))
+    tau = Lagrange(described).torque(q, qd, qdd, chi)
+    assert (
+        np.abs(module.regressor(q, qd, qdd) @ module.base_parameters(chi) - tau).max()
+        < 1e-12 * np.abs(tau).max()
+    )
+
+
+def test_other_targets_and_those_that_are_not_python(cache) -> None:
+    assert type(symgen.model("planar_2r", target="casadi").regressor).__name__ == "Function"
+    assert symgen.model("planar_2r", target="xp").NAME == "planar_2r"
+    with pytest.raises(SymgenError, match="target 'c'; Python imports numpy, casadi, xp"):
+        symgen.model("planar_2r", target="c")
+    with pytest.raises(SymgenError, match="no packaged robot"):
+        symgen.model("planar_3r")
+
+
+def test_a_second_call_takes_what_lies_in_the_cache(cache, monkeypatch) -> None:
+    import symgen.certify.modules as certified
+
+    first = symgen.model("planar_2r")
+    monkeypatch.setattr(
+        certified, "certify", None
+    )  # not called again: what lies there has been certified
+    assert symgen.model("planar_2r").__file__ == first.__file__
+    assert sum(1 for path in cache.rglob("*") if path.is_file()) == 1
+
+
+@pytest.mark.parametrize("spoiled", [b"", b"raise SystemExit\n", b"\xff\x00"])
+def test_a_spoiled_entry_is_written_again(cache, spoiled) -> None:
+    path = Path(symgen.model("planar_2r").__file__)
+    text = path.read_bytes()
+    path.write_bytes(spoiled)
+    module = symgen.model("planar_2r")
+    assert (
+        Path(module.__file__) == path and path.read_bytes() == text and module.NAME == "planar_2r"
+    )
+
+
+def test_bytecode_beside_an_entry_is_not_run(cache) -> None:
+    path = Path(symgen.model("planar_2r").__file__)
+    beside = path.parent / "__pycache__" / f"{path.stem}.{sys.implementation.cache_tag}.pyc"
+    beside.parent.mkdir()
+    beside.write_bytes(b"\x00" * 100)
+    assert symgen.model("planar_2r").NAME == "planar_2r" and beside.read_bytes() == b"\x00" * 100
+
+
+def test_where_the_cache_cannot_be_written_a_temporary_file_serves(tmp_path, monkeypatch) -> None:
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path / "file"))
+    module = symgen.model("planar_2r")
+    assert (
+        module.NAME == "planar_2r"
+        and Path(module.__file__).is_file()
+        and not Path(module.__file__).is_relative_to(tmp_path)
+    )
+
+
+def test_a_cache_for_reading_alone_is_read(cache, monkeypatch) -> None:
+    first = Path(symgen.model("planar_2r").__file__)
+
+    def refused(path: Path, text: str) -> Path:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(importing, "_write", refused)
+    assert Path(symgen.model("planar_2r").__file__) == first
+    with pytest.raises(SymgenError, match="Permission denied; set SYMGEN_CACHE or TMPDIR"):
+        symgen.model("emps")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permission bits")
+def test_a_cache_that_anyone_may_write_to_is_not_used(cache) -> None:
+    (cache / "modules").mkdir(parents=True)
+    (cache / "modules").chmod(0o777)
+    assert not Path(symgen.model("planar_2r").__file__).is_relative_to(cache)
+
+
+def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:
+    code = "import symgen; m = symgen.model('planar_2r'); print(m.__file__, m.NAME)"
+    environment = {**os.environ, "SYMGEN_CACHE": str(cache)}
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(2)
+    ]
+    files = {process.communicate(timeout=120)[0] for process in started}
+    assert [process.returncode for process in started] == [0, 0] and len(files) == 1
+    file, name = files.pop().split()
+    assert load_model(Path(file)).NAME == name == "planar_2r"
+    assert [path for path in cache.rglob("*") if path.is_file()] == [
+        Path(file)
+    ]  # nothing half written is left
+
+
+@pytest.mark.parametrize("change", [{"numeric_rank": 3}, {"torque_error": 1e-6}, {"torque_error": float("nan")}, {"failures": ("column of M1",)},
+                                    {"texts": {"planar_2r.py": TextCheck("numpy", "", {"bias": float("nan")})}}])  # fmt: skip
+def test_every_check_counts_for_the_verdict(change) -> None:
+    """`certify().valid` was true where `symgen check` printed FALSE: the numeric checks were those
+    of the command line alone.
+    """
+    certificate = certify(regroup(load_robot("planar_2r")))
+    worse = replace(certificate, **change)
+    assert (
+        certificate.valid
+        and certificate.mapping()["valid"]
+        and str(certificate).endswith("certificate valid")
+    )
+    assert (
+        not worse.valid
+        and not worse.mapping()["valid"]
+        and str(worse).endswith("certificate FALSE")
+    )
+    with pytest.raises(CertificateError):
+        require_valid(worse)
+
+
+@pytest.mark.parametrize(("name", "valid"), [("planar_2r", True), ("scara", False)])
+def test_the_verdict_is_that_of_symgen_check(name, valid, monkeypatch) -> None:
+    from symgen.regroup import regrouping as module
+
+    base = regroup(load_robot(name))
+    base = base if valid else replace(base, base=base.base[:-1])
+    monkeypatch.setattr(module, "regroup", lambda robot: base)
+    result = CliRunner().invoke(app, ["check", name, "--json"])
+    assert json.loads(result.stdout)["valid"] is certify(
+        base
+    ).valid is valid and result.exit_code == (0 if valid else 1)
+    shown = CliRunner().invoke(app, ["show", name])
+    assert (
+        shown.exit_code == (0 if valid else 1)
+        and ("certificate does not hold" in shown.stderr) is not valid
+    )

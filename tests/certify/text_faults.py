@@ -1,0 +1,272 @@
+"""Random faults in emitted texts: a sign, an index, two exchanged names, a term or a row that is
+dropped, a wrong shape; in any function of any text.
+
+    python tests/certify/text_faults.py [COUNT] [SEED]      a table of faults and survivors
+
+A fault is one changed line of a function, or of a table. Lines that compute nothing (comments,
+docstrings, messages of errors, hints) are left alone. A fault that changes no value at all, shown
+in EQUIVALENT by a reason, may survive; any other has to be refused.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+
+from symgen.certify.printed import evaluated
+from symgen.certify.texts import text_check
+from symgen.certify.witness import Witness
+from symgen.description import load_robot
+from symgen.emit.generate import generate_files
+from symgen.emit.targets import TARGETS
+from symgen.regroup.regrouping import regroup
+
+ROBOTS = ("tx40", "scara", "sr400", "four_bar", "haptic")
+NAME = r"[A-Za-z_]\w*"
+TERM = re.compile(r" [+-] [^+\-=()\[\],]+?(?= [+-] |;|\s*$|\s+[#/])")
+
+
+SAME = (  # changed lines that change no value, and why
+    (
+        r"(double|int32_t) .*\w\[\d+\]\[(TILE|3|8)\]",
+        "an array with room for more, or a parameter that is a pointer",
+    ),
+    (r"how (= -way|== -2)|flags & \d", "the way of writing: through the caches, or past them"),
+    (r"ready = -True", "what is not zero is true"),
+    (r"= -np\.zeros", "minus zero, where every entry is written"),
+    (r"^    B = |every = int", "samples at a time"),
+    (r"start && start \+ N >= TILE", "writes the same numbers again"),
+    (r"VP242 = C5b", "cancels: N342 enters NE332 and NE322, whose difference A holds"),
+)
+# Survivors that are no such thing: they change the way to a solution, not what is accepted as one.
+WAYS = (
+    (r"-?xp\.zeros_like\(T\[|- zero,", "zeros and their opposites are the same numbers"),
+    (
+        r"-beyond \?|-how == 1|S \+ start, 1\)",
+        "how a store is written, through the caches or past them: the same numbers",
+    ),
+    (r"steps = -int", "the way of Newton: mode and closure are checked behind it"),
+    (
+        r"^haptic_casadi\S* .*VSP24 = VP23$",
+        "haptic: the term cancels, the regressor is the same to 3e-18",
+    ),
+    (r"away = |\(given - s \* away\)", "the way of Newton: mode and closure are checked behind it"),
+    (
+        r"pick|moved|start \+ TILE|kept\[",
+        "stores of whole cache lines, on machines without AVX-512",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One changed line."""
+
+    file: str
+    target: str
+    function: str
+    kind: str
+    line: int
+    old: str
+    new: str
+
+
+@cache
+def texts(name: str) -> tuple[Witness, dict[str, tuple[str, str]]]:
+    """The witness of a robot, and {file: (target, text)}."""
+    regrouping = regroup(load_robot(name))
+    files = generate_files(regrouping.robot, targets=tuple(TARGETS), regrouping=regrouping)
+    target = {t.file.format(name): key for key, t in TARGETS.items()}
+    return Witness(regrouping), {file: (target[file], text) for file, text in files.items()}
+
+
+def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
+    """(function or table, number, line) of lines that compute."""
+    inside, quoted, start = (
+        "",
+        False,
+        re.compile(rf"^(?:.*\b)?({NAME})\([^;]*$" if c else rf"^def ({NAME})\("),
+    )
+    for number, line in enumerate(text.splitlines()):
+        if c:
+            quoted = ("/*" in line or quoted) and "*/" not in line
+            if (re.match(r"^[a-zK]", line) and (found := re.search(rf"({NAME})\(", line))) or (
+                found := re.search(rf"({NAME})\[\d+\]\[3\] = ", line)
+            ):
+                inside = found[1]
+        else:
+            quoted ^= line.count('"""') % 2 == 1
+            if (found := start.match(line)) or (found := re.match(r"^([A-Z_]+) = ", line)):
+                inside = found[1]
+            elif line[:1].isalpha():
+                inside = ""
+        stripped = line.strip()
+        idle = r'(#|"""|/\*|def |raise|class |import|from|\) ->|\):|extern)|.*(raise |expected|""")'
+        if inside and not quoted and stripped and not re.match(idle, stripped):
+            yield inside, number, line
+
+
+def turned_sign(line: str, rng: random.Random) -> str:
+    places = [
+        m for m in re.finditer(r" ([+-]) (?=[\w(])|(?<== )-?(?=[\w(])", line) if "for " not in line
+    ]
+    if not places:
+        return line
+    m = rng.choice(places)
+    new = {" + ": " - ", " - ": " + ", "-": "", "": "-"}[m[0]]
+    return line[: m.start()] + new + line[m.end() :]
+
+
+def other_index(line: str, rng: random.Random) -> str:
+    places = list(re.finditer(r"(?<=[\[\s,(])\d+(?=[\],)])", line)) + list(
+        re.finditer(r"(?<=\b[A-Z])\d(?=\d*\b)|(?<=\b[A-Z][A-Z])\d(?=\d*\b)", line)
+    )
+    if not places:
+        return line
+    m = rng.choice(places)
+    return (
+        line[: m.start()]
+        + str(int(m[0]) + rng.choice((1, -1)) if int(m[0]) else 1)
+        + line[m.end() :]
+    )
+
+
+def exchanged(line: str, rng: random.Random) -> str:
+    names = sorted({*re.findall(r"\b[A-Z]\w*\b", line.partition(" = ")[2])})
+    if len(names) < 2 or re.search(r"\b(\w+)=\1\b", line):  # keywords have no order
+        return line
+    a, b = rng.sample(names, 2)
+    head, mark, rest = line.partition(" = ")
+    return head + mark + re.sub(rf"\b({a}|{b})\b", lambda m: b if m[1] == a else a, rest)
+
+
+def dropped_term(line: str, rng: random.Random) -> str:
+    places = list(TERM.finditer(line))
+    if not places:
+        return line
+    m = rng.choice(places)
+    return line[: m.start()] + line[m.end() :]
+
+
+def dropped_row(line: str, rng: random.Random) -> str:
+    if re.match(r"\s+[A-Z]\w*\[[\d, ]+\](\[\w+\])* = ", line):
+        return re.match(r"\s*", line)[0] + (
+            ";" if line.rstrip().endswith(";") or ";  " in line else "pass"
+        )
+    return line
+
+
+def wrong_shape(line: str, rng: random.Random) -> str:
+    changes = (
+        (".T", ""), ("transpose(2, 1, 0)", "transpose(1, 2, 0)"), ("-1)", "-2)"), ("axis=-1", "axis=0"),
+        ("axis=1", "axis=0"), ("reshape(-1, ", "reshape("), ("moveaxis(result, -1, 0)", "moveaxis(result, 0, -1)"),
+        ("[..., 0]", ""), ("[..., None]", ""), ("(1, 0), (-2, -1)", "(0, 1), (-2, -1)"), ("(1, 0)", "(0, 1)"),
+        ("[:, :3", "[:, :2"), ("[:3", "[:2"), ("*start", "*start + 1"),
+    )  # fmt: skip
+    fitting = [(old, new) for old, new in changes if old in line]
+    old, new = rng.choice(fitting) if fitting else ("", "")
+    return line.replace(old, new, 1) if old else line
+
+
+KINDS: tuple[Callable[[str, random.Random], str], ...] = (
+    turned_sign, other_index, exchanged, dropped_term, dropped_row, wrong_shape,
+)  # fmt: skip
+
+
+def faults(count: int, seed: int) -> list[Fault]:
+    """Random faults, texts, functions and kinds alike."""
+    rng, found = random.Random(seed), []
+    places = [(name, file) for name in ROBOTS for file in texts(name)[1]]
+    while len(found) < count:
+        name, file = places[len(found) % len(places)]
+        target, text = texts(name)[1][file]
+        by_function: dict[str, list[tuple[int, str]]] = {}
+        for function, number, line in code_lines(text, target == "c"):
+            by_function.setdefault(function, []).append((number, line))
+        function = rng.choice(sorted(by_function))
+        number, line = rng.choice(by_function[function])
+        kind = rng.choice(KINDS)
+        code, _, comment = re.match(r"(.*?)(\s*(?:#|/\*).*)?$", line).group(1, 2, 2)
+        new = kind(code, rng) + (comment or "")
+        if new != line:
+            found.append(Fault(file, target, function, kind.__name__, number, line, new))
+    return found
+
+
+def refused(fault: Fault) -> bool:
+    """Whether the certificate refuses a text with the fault."""
+    name = re.sub(r"(_casadi|_xp)?\.\w+$", "", fault.file)
+    witness, files = texts(name)
+    lines = files[fault.file][1].splitlines()
+    assert lines[fault.line] == fault.old
+    lines[fault.line] = fault.new
+    return not text_check(fault.file, "\n".join(lines) + "\n", fault.target, witness).valid
+
+
+def equivalent(fault: Fault) -> str:
+    """Why a fault changes no value; empty where it does, or might."""
+    (old, new), c = (
+        (parts(line, fault.target == "c") for line in (fault.old, fault.new)),
+        fault.target,
+    )
+    name = re.sub(r"(_casadi|_xp)?\.\w+$", "", fault.file)
+    text = texts(name)[1][fault.file][1]
+    body = [line for f, _, line in code_lines(text, c == "c") if f == fault.function]
+    if old[0] == new[0] and re.fullmatch(NAME, old[0]):
+        if not any(
+            re.search(rf"\b{old[0]}\b", parts(line, fault.target == "c")[1]) for line in body
+        ):
+            return f"{old[0]} is never read"
+        names = {*re.findall(NAME, old[1])} | {*re.findall(NAME, new[1])}
+        rng = random.Random(3)
+        try:
+            values = [{n: rng.uniform(0.5, 2) for n in names} for _ in range(3)]
+            a, b = ([evaluated([("x", e)], v)["x"] for v in values] for e in (old[1], new[1]))
+            if all(abs(x - y) < 1e-12 * abs(x) for x, y in zip(a, b, strict=True)):
+                return "the same expression in another order"
+        except (SyntaxError, ValueError, KeyError, ZeroDivisionError):
+            pass
+    return next(
+        (reason for pattern, reason in SAME if re.search(pattern, f"{fault.file} {fault.new}")), ""
+    )
+
+
+def parts(line: str, c: bool) -> tuple[str, str]:
+    """What is assigned, and the expression."""
+    line = re.sub(r"(#|/\*).*", "", line).strip().rstrip(";")
+    left, _, right = line.removeprefix("const double ").partition(" = ")
+    return re.sub(r"^\w+\[[\w, ]+\](\[t\])?$", "entry", left), right.replace("np.", "").replace(
+        "ca.", ""
+    )
+
+
+def main() -> None:
+    count, seed = (
+        (int(x) for x in (*sys.argv[1:], "300", "1")[:2]) if len(sys.argv) > 2 else (300, 1)
+    )
+    survivors = 0
+    ways = dict.fromkeys((reason for _, reason in WAYS), 0)
+    for k, fault in enumerate(faults(count, seed)):
+        if not refused(fault):
+            reason = equivalent(fault)
+            way = next(
+                (why for pattern, why in WAYS if re.search(pattern, f"{fault.file} {fault.new}")),
+                "",
+            )
+            if way and not reason:
+                ways[way] += 1
+                reason = f"SURVIVES, {way}"
+            survivors += not reason
+            print(
+                f"{k}: {reason or 'SURVIVES'}: {fault.file} {fault.function} {fault.kind} line {fault.line + 1}\n   {fault.old}\n   {fault.new}",
+                flush=True,
+            )
+    print(f"{survivors} of {count} faults survive, beside {ways}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""Angles near multiples of pi/12: told where they are changed, kept by `exact`, and never said to
+move the tool less than they do.
+"""
+
+import warnings
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from symgen.certify.importing import imported
+from symgen.cli.main import app
+from symgen.description import AngleWarning, load_robot
+from symgen.description.urdf import read_urdf
+from symgen.emit.generate import generate_module
+
+LINK = (
+    '<link name="{0}"><inertial><mass value="1"/>'
+    '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+)
+JOINT = (
+    '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>'
+    '<origin xyz="{3}" rpy="{4}"/><axis xyz="0 0 1"/>'
+    '<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'
+)
+
+
+def arm(*angles):
+    """Three links of 0.5 m, 0.4 m and 0.3 m, the frames of the joints turned by these rolls."""
+    rows = [("shoulder", "base", "a", "0 0 0.5"), ("elbow", "a", "b", "0.4 0 0.1")]
+    rows += [("wrist", "b", "c", "0 0.3 0")]
+    joints = [JOINT.format(*row, f"{x} 0 0") for row, x in zip(rows, angles, strict=True)]
+    flange = JOINT.format("flange", "c", "tool", "0.2 0 0.1", "0 0 0").replace("revolute", "fixed")
+    links = ['<link name="base"/>', *map(LINK.format, "abc"), '<link name="tool"/>']
+    return "\n".join(['<robot name="arm">', *links, *joints, flange, "</robot>"]).encode()
+
+
+ROUNDED = arm(1.5708, -1.5707, 0.5236)
+
+
+def test_load_robot_tells_each_angle_and_the_way_of_the_tool(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(ROUNDED)
+    with pytest.warns(AngleWarning) as caught:
+        robot = load_robot(file)
+    (message,) = (str(warning.message) for warning in caught)
+    for joint, angle in (("shoulder", "1.5708"), ("elbow", "-1.5707"), ("wrist", "0.5236")):
+        assert f"roll of joint '{joint}'" in message and f"from {angle} to" in message
+    assert "exact=True or --exact" in message and " m" in message
+    assert "taken as these" in robot.angles and str(robot.frame(2).alpha) == "-pi/2"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        exact = load_robot(file, exact=True)
+    assert "are those of arm.urdf" in exact.angles and str(exact.frame(2).alpha) == "-1.5707"
+    for one in (robot, exact):
+        assert one.angles in " ".join(generate_module(one).split())
+
+
+def test_angles_that_are_multiples_are_not_told():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot, _ = read_urdf(arm(1.5707963267948966, 0.3, 0), "arm.urdf")
+    assert robot.angles == ""
+
+
+def tool(robot, q, folder):
+    path = folder / f"{robot.name}.py"
+    path.write_text(generate_module(robot))
+    return imported(path).frame_poses(q)[:, -1, :3, 3]
+
+
+def test_the_tool_moves_by_no_more_than_is_told(tmp_path):
+    """Over random positions of the joints, by no more than told and by more than a fifth of it."""
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (2000, 3))
+    with pytest.warns(AngleWarning):
+        robot = read_urdf(ROUNDED, "a.urdf", keep_fixed=True)[0]
+    exact = read_urdf(ROUNDED, "a.urdf", keep_fixed=True, exact=True)[0]
+    moved = np.linalg.norm(tool(robot, q, tmp_path) - tool(exact, q, tmp_path), axis=1).max()
+    limit = float(robot.angles.split()[-2])
+    assert 0.2 * limit < moved < 1.05 * limit  # two digits are told
+
+
+def test_verbs_note_it_and_keep_the_file_when_told_to(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(ROUNDED)
+    for verb in (["check"], ["show"], ["generate", "-o", str(tmp_path)]):
+        result = CliRunner().invoke(app, [verb[0], str(file), *verb[1:]])
+        assert "note: arm.urdf: 3 angles near" in result.stderr, result.stderr
+        result = CliRunner().invoke(app, [verb[0], str(file), *verb[1:], "--exact"])
+        assert "near multiples" not in result.stderr
+    assert "generate arm.urdf --exact" in (tmp_path / "arm.py").read_text()
+
+
+def test_verbs_on_records_keep_the_file_too(tmp_path):
+    file, record = tmp_path / "arm.urdf", tmp_path / "record.csv"
+    file.write_bytes(ROUNDED)
+    t, phase = np.arange(400) / 100, np.array([0.0, 1.0, 2.0])
+    q, tau = np.sin(t[:, None] * (1 + phase) + phase), np.cos(t[:, None] * (2 + phase))
+    names = ["t", *(f"{x}{j}" for x in ("q", "tau") for j in (1, 2, 3))]
+    np.savetxt(record, np.c_[t, q, tau], delimiter=",", header=",".join(names), comments="")
+    for options, noted in (([], True), (["--exact"], False)):
+        result = CliRunner().invoke(
+            app, ["identify", str(file), str(record), "--no-plausible", *options]
+        )
+        assert ("3 angles near" in result.stderr) == noted, result.stderr
