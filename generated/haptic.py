@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 651b1d707b6edf1fa9da0f184cabc57dbdec3dd78f3eede016ced60eaa6d55ed
+# sha256 of what follows: ae50655a4d4fe4886626769f0b0443e8e75ccfb6e285edfc8a5cd723e2ab4707
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
     parallelogram: base parameters, regressor, dynamics.
 
@@ -74,11 +74,11 @@ Names       family, then component digits, then link: W12 is component 1 of link
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor          101 multiplications, 63 additions, 6 sin, 6 cos
+    regressor          97 multiplications, 58 additions, 6 sin, 6 cos
     inverse_dynamics   141 multiplications, 119 additions, 6 sin, 6 cos
-    inertia_matrix     45 multiplications, 29 additions, 4 sin, 5 cos
+    inertia_matrix     42 multiplications, 26 additions, 4 sin, 5 cos
     bias               131 multiplications, 98 additions, 6 sin, 6 cos
-    gravity            42 multiplications, 34 additions, 5 sin, 5 cos
+    gravity            42 multiplications, 33 additions, 5 sin, 5 cos
     frame_poses        21 multiplications, 6 additions, 4 sin, 4 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis
@@ -544,10 +544,7 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     WP24 = Z241*QDP1
     DV124 = W14*W24
     DV224 = W24**2
-    VSP14 = VP13 + D4*U113
-    VSP24 = VP23 + D4*U213
     VSP34 = VSP33 + D4*U313
-    VP24 = C5b*VSP24 + S5b*VSP14
     # Link 5
     VP15 = C5*VP11
     VP25 = -S5*VP11
@@ -596,19 +593,19 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     D[25, 0] = -S5*VP21                 # DG1MY5
     D[29, 0] = U322*V361 - S2*VSP36     # DG1MY6
     # Joint 2
-    D[6, 1] = -DV122                                           # DG2XX2
-    D[7, 1] = DW122                                            # DG2XY2
-    D[8, 1] = -S2QDP1                                          # DG2XZ2
-    D[9, 1] = -C2QDP1                                          # DG2YZ2
-    D[10, 1] = QDP2                                            # DG2ZZ2
-    D[11, 1] = VP22                                            # DG2MX2
-    D[12, 1] = -VP12                                           # DG2MY2
-    D[13, 1] = QP2                                             # DG2FV2
-    D[14, 1] = np.sign(QP2)                                    # DG2FS2
-    D[21, 1] = U113*V132 + U213*V232                           # DG2MX3
-    D[22, 1] = U123*V132 + U223*V232                           # DG2MY3
-    D[23, 1] = VP24 + DV124*V242 - DV224*V142 - VP24 - DF3MX4  # DG2MX4
-    D[29, 1] = -VP16                                           # DG2MY6
+    D[6, 1] = -DV122                             # DG2XX2
+    D[7, 1] = DW122                              # DG2XY2
+    D[8, 1] = -S2QDP1                            # DG2XZ2
+    D[9, 1] = -C2QDP1                            # DG2YZ2
+    D[10, 1] = QDP2                              # DG2ZZ2
+    D[11, 1] = VP22                              # DG2MX2
+    D[12, 1] = -VP12                             # DG2MY2
+    D[13, 1] = QP2                               # DG2FV2
+    D[14, 1] = np.sign(QP2)                      # DG2FS2
+    D[21, 1] = U113*V132 + U213*V232             # DG2MX3
+    D[22, 1] = U123*V132 + U223*V232             # DG2MY3
+    D[23, 1] = DV124*V242 - DV224*V142 - DF3MX4  # DG2MX4
+    D[29, 1] = -VP16                             # DG2MY6
     # Joint 5
     D[16, 2] = -DV123                 # DG5XX3
     D[17, 2] = DW123                  # DG5XY3
@@ -836,25 +833,17 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     NE221 = S2m5*NE131 + N221 - C2m5*NE231 - D3*E331
     # Joint 1
     NE311 = ZZ1R - S5*NE151 - C5*NE251 - S2*NE121 - C2*NE221
-    # Link 3
-    S2m5D3 = D3*S2m5
-    C2m5D3 = D3*C2m5
-    # Link 4
-    VP242 = S5b*S2m5D3 - C5b*C2m5D3
     # Joint 6
     FDI262 = -MY6*S2m5
     NE352 = D6*FDI262
-    # Joint 4
-    N342 = MX4R*VP242
     # Joint 3
-    N332 = -MX3R*C2m5D3 - MY3*S2m5D3
-    NE332 = N342 + N332
+    N332 = -MX3R*D3*C2m5 - MY3*D3*S2m5
     # Inertia matrix
     A[0, 0] = NE311
     A[0, 1] = A[1, 0] = N321
     A[1, 1] = ZZ2R
     A[0, 2] = A[2, 0] = N331
-    A[1, 2] = A[2, 1] = NE332 + NE352 - N342
+    A[1, 2] = A[2, 1] = NE352 + N332
     A[2, 2] = ZZ3R
 
 
@@ -1067,7 +1056,7 @@ def _gravity_block(q, GAM, X, c, gx, gy):
     # Torques
     GAM[0] = OFFSET1 + NE31
     GAM[1] = OFFSET2 + NE32 + N36 - NE33
-    GAM[2] = NE33 + OFFSET5 + NE35 - N34 - N36
+    GAM[2] = N33 + OFFSET5 + NE35 - N36
 
 
 def _frame_poses_block(q, T, D3, D4, D6, c):

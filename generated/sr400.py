@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 5859b91d380ab1ad54b128818037f700224ca681227ed405a65bf8cbceaa4eb0
+# sha256 of what follows: 6c134909beaada14360d0d6be6a9ad2cb7ba955487f02b0900c6934bde5a971b
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
 GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0.
@@ -67,12 +67,12 @@ Names       family, then component digits, then link: W12 is component 1 of link
     FDI  the transmitted force, in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
-    DN   the part of DG that turns: axis times moment
+    DF   the part of DG that pushes: velocity times force
     R    orientation of a frame in frame 0
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor          392 multiplications, 290 additions, 6 sin, 6 cos
+    regressor          392 multiplications, 284 additions, 6 sin, 6 cos
     inverse_dynamics   300 multiplications, 281 additions, 6 sin, 6 cos
     inertia_matrix     284 multiplications, 201 additions, 6 sin, 6 cos
     bias               283 multiplications, 248 additions, 6 sin, 6 cos
@@ -694,25 +694,19 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Contributions that several joints share
     DV1_3_4Z2_4_1 = DV1_3_4*Z2_4_1
     C4DV1_3_4 = C4*DV1_3_4
-    DN2MX4 = C4*VSP2_4
-    DG3MX4 = DN2MX4 + U1_1_4*V1_4_3 + U2_1_4*V2_4_3 + D4*U3_1_4
-    DN2MY4 = -S4*VSP2_4
-    DG3MY4 = DN2MY4 + U1_2_4*V1_4_3 + U2_2_4*V2_4_3 + D4*U3_2_4
+    DF3MX4 = U1_1_4*V1_4_3 + U2_1_4*V2_4_3 + D4*U3_1_4
+    DF3MY4 = U1_2_4*V1_4_3 + U2_2_4*V2_4_3 + D4*U3_2_4
     DV1_3_5Z2_5_1 = DV1_3_5*Z2_5_1
     DV1_3_5Z2_5_2 = DV1_3_5*Z2_5_2
     C5DV1_3_5 = C5*DV1_3_5
-    DN2MX5 = VP2_4*Z2_5_2 + C4*VP2_5
-    DG3MX5 = DN2MX5 + U1_1_5*V1_5_3 + U2_1_5*V2_5_3 - U3_1_5*V2_4_3
-    DN2MY5 = -VP2_4*Z1_5_2 - C4*VP1_5
-    DG3MY5 = DN2MY5 + U1_2_5*V1_5_3 + U2_2_5*V2_5_3 - U3_2_5*V2_4_3
+    DF3MX5 = U1_1_5*V1_5_3 + U2_1_5*V2_5_3 - U3_1_5*V2_4_3
+    DF3MY5 = U1_2_5*V1_5_3 + U2_2_5*V2_5_3 - U3_2_5*V2_4_3
     DV1_3_6Z2_6_1 = DV1_3_6*Z2_6_1
     DV1_3_6Z2_6_2 = DV1_3_6*Z2_6_2
     DV1_3_6Z2_6_4 = DV1_3_6*Z2_6_4
     C6DV1_3_6 = C6*DV1_3_6
-    DN2MX6 = VP2_6*Z2_5_2 - VP2_5*Z2_6_2
-    DG3MX6 = DN2MX6 + U1_1_6*V1_6_3 + U2_1_6*V2_6_3 + U3_1_6*V2_5_3
-    DN2MY6 = VP2_5*Z1_6_2 - VP1_6*Z2_5_2
-    DG3MY6 = DN2MY6 + U1_2_6*V1_6_3 + U2_2_6*V2_6_3 + U3_2_6*V2_5_3
+    DF3MX6 = U1_1_6*V1_6_3 + U2_1_6*V2_6_3 + U3_1_6*V2_5_3
+    DF3MY6 = U1_2_6*V1_6_3 + U2_2_6*V2_6_3 + U3_2_6*V2_5_3
     # Joint 1
     D[0, 0] = QDP1                                                    # DG1ZZ1
     D[1, 0] = QP1                                                     # DG1FV1
@@ -765,12 +759,12 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[12, 1] = np.sign(QP2)                                           # DG2FS2
     D[19, 1] = U1_1_3*V1_3_2 + U2_1_3*V2_3_2                          # DG2MX3
     D[20, 1] = U1_2_3*V1_3_2 + U2_2_3*V2_3_2                          # DG2MY3
-    D[26, 1] = DN2MX4 + U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DG3MX4  # DG2MX4
-    D[27, 1] = DN2MY4 + U1_2_4*V1_4_2 + U2_2_4*V2_4_2 + U3_2_4*V3_4_2 - DG3MY4  # DG2MY4
-    D[37, 1] = DN2MX5 + U1_1_5*V1_5_2 + U2_1_5*V2_5_2 - U3_1_5*V2_4_2 - DG3MX5  # DG2MX5
-    D[38, 1] = DN2MY5 + U1_2_5*V1_5_2 + U2_2_5*V2_5_2 - U3_2_5*V2_4_2 - DG3MY5  # DG2MY5
-    D[48, 1] = DN2MX6 + U1_1_6*V1_6_2 + U2_1_6*V2_6_2 + U3_1_6*V2_5_2 - DG3MX6  # DG2MX6
-    D[49, 1] = DN2MY6 + U1_2_6*V1_6_2 + U2_2_6*V2_6_2 + U3_2_6*V2_5_2 - DG3MY6  # DG2MY6
+    D[26, 1] = U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DF3MX4  # DG2MX4
+    D[27, 1] = U1_2_4*V1_4_2 + U2_2_4*V2_4_2 + U3_2_4*V3_4_2 - DF3MY4  # DG2MY4
+    D[37, 1] = U1_1_5*V1_5_2 + U2_1_5*V2_5_2 - U3_1_5*V2_4_2 - DF3MX5  # DG2MX5
+    D[38, 1] = U1_2_5*V1_5_2 + U2_2_5*V2_5_2 - U3_2_5*V2_4_2 - DF3MY5  # DG2MY5
+    D[48, 1] = U1_1_6*V1_6_2 + U2_1_6*V2_6_2 + U3_1_6*V2_5_2 - DF3MX6  # DG2MX6
+    D[49, 1] = U1_2_6*V1_6_2 + U2_2_6*V2_6_2 + U3_2_6*V2_5_2 - DF3MY6  # DG2MY6
     D[59, 1] = -VP1_8                                                 # DG2MY8
     # Joint 4
     D[21, 2] = -DV1_2_4                                    # DG4XX4
@@ -839,22 +833,22 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[23, 5] = -S4*U2_1_4 - C4*DW3_1_4                         # DG7XZ4
     D[24, 5] = C4*U1_2_4 - S4*DW2_3_4                          # DG7YZ4
     D[25, 5] = C4DV1_3_4 - S4*DV2_3_4                          # DG7ZZ4
-    D[26, 5] = DG3MX4                                          # DG7MX4
-    D[27, 5] = DG3MY4                                          # DG7MY4
+    D[26, 5] = C4*VSP2_4 + DF3MX4                              # DG7MX4
+    D[27, 5] = DF3MY4 - S4*VSP2_4                              # DG7MY4
     D[32, 5] = WP1_5*Z1_5_2 + DV1_3_5Z2_5_2 - C4*DV1_2_5       # DG7XX5
     D[33, 5] = U3_2_5*Z2_5_2 + C4*DW1_2_5 - U3_1_5*Z1_5_2      # DG7XY5
     D[34, 5] = U2_1_5*Z1_5_2 + DW3_1_5*Z2_5_2 - C4*U2_3_5      # DG7XZ5
     D[35, 5] = DW2_3_5*Z1_5_2 + C4*U1_3_5 - U1_2_5*Z2_5_2      # DG7YZ5
     D[36, 5] = DV2_3_5*Z1_5_2 + C4*WP3_5 - DV1_3_5Z2_5_2       # DG7ZZ5
-    D[37, 5] = DG3MX5                                          # DG7MX5
-    D[38, 5] = DG3MY5                                          # DG7MY5
+    D[37, 5] = VP2_4*Z2_5_2 + C4*VP2_5 + DF3MX5                # DG7MX5
+    D[38, 5] = DF3MY5 - VP2_4*Z1_5_2 - C4*VP1_5                # DG7MY5
     D[43, 5] = WP1_6*Z1_6_2 + DV1_3_6Z2_6_2 - DV1_2_6*Z2_5_2   # DG7XX6
     D[44, 5] = U3_2_6*Z2_6_2 + DW1_2_6*Z2_5_2 - U3_1_6*Z1_6_2  # DG7XY6
     D[45, 5] = U2_1_6*Z1_6_2 + DW3_1_6*Z2_6_2 - U2_3_6*Z2_5_2  # DG7XZ6
     D[46, 5] = DW2_3_6*Z1_6_2 + U1_3_6*Z2_5_2 - U1_2_6*Z2_6_2  # DG7YZ6
     D[47, 5] = DV2_3_6*Z1_6_2 + WP3_6*Z2_5_2 - DV1_3_6Z2_6_2   # DG7ZZ6
-    D[48, 5] = DG3MX6                                          # DG7MX6
-    D[49, 5] = DG3MY6                                          # DG7MY6
+    D[48, 5] = VP2_6*Z2_5_2 + DF3MX6 - VP2_5*Z2_6_2            # DG7MX6
+    D[49, 5] = VP2_5*Z1_6_2 + DF3MY6 - VP1_6*Z2_5_2            # DG7MY6
     D[54, 5] = VP2_7                                           # DG7MX7
     D[55, 5] = -VP1_7                                          # DG7MY7
     D[56, 5] = QP7                                             # DG7FV7

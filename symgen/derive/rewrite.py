@@ -11,7 +11,8 @@ over F_p, which never rounds: nodes with the same value are merged, up to sign.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -159,12 +160,10 @@ class Rewrite:
         return image
 
     def _sum(self, a: Scalar | int, b: Scalar | int) -> Scalar | int:
-        """a + b, where x + (z - x) is z."""
-        for x, y in ((a, b), (b, a)):
-            if isinstance(x, Scalar) and isinstance(y, Scalar) and y.node.op == ADD:
-                for o, z in (y.node.operands, y.node.operands[::-1]):
-                    if o.node is x.node and o.sign * y.sign != x.sign:
-                        return z if y.sign > 0 else -z
+        """a + b, without a term of a that b takes away: (x + y) + (z - x) = y + z."""
+        for (x, y), (o, z) in product(_parted(a), _parted(b)):
+            if o.node is x.node and o.sign != x.sign:
+                return self._sum(y, z)
         return a + b
 
     def _is_given(self, node: Node) -> bool:
@@ -257,3 +256,12 @@ class Rewrite:
         if key not in self._drawn:
             self._drawn[key] = self._rng.integers(1, self.draw.p, SAMPLES)
         return self._drawn[key]
+
+
+def _parted(s: Scalar | int) -> Iterator[tuple[Scalar, Scalar | int]]:
+    """Each term of a value, the value itself first, and what is left without it."""
+    if isinstance(s, Scalar):
+        yield s, 0
+        if s.node.op == ADD:
+            x, y = (o if s.sign > 0 else -o for o in s.node.operands)
+            yield from ((x, y), (y, x))
