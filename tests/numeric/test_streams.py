@@ -412,7 +412,7 @@ def test_every_number_of_workers_gives_the_same_bits(tmp_path, kind, reader, mon
     )
     given = settings(write(kind, tmp_path, (t, np.round(q / 1e-3) * 1e-3, 3 * q)))
     monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 4096)
-    monkeypatch.setattr("runtime.records.formats.text.HELD", 1000)
+    monkeypatch.setattr("runtime.records.formats.text.PIECE", 20_000)
     signals = {
         "decimate": {"factor": 5},
         **({"reader": "counts", "step": 1e-3} if reader == "counts" else {}),

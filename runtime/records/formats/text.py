@@ -5,13 +5,13 @@ comma where that is said."""
 from __future__ import annotations
 
 import re
-from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from io import TextIOWrapper
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 
@@ -22,20 +22,21 @@ from runtime.records.missing import COUNTS
 from runtime.records.stream import Queue
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
-HELD = 2**25  # bytes of a file whose numbers are all kept: they are read once
-PIECE = 2**22  # bytes of a longer one, read at a time
+PIECE = 2**22  # characters read at a time
+HEAD = 2**13  # of which names and delimiter are told
 MOST_EMPTY = 5_000_000  # lines without a number
 CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
+Place = tuple[int, str, int]  # number of a line, what is read of it, where the rest stands
+BEGIN: Place = (1, "", 0)
+Piece = tuple[Place, Iterator[int], list[str]]  # where it begins, numbers of its lines, the lines
 
 
 @dataclass(eq=False, kw_only=True)
 class TextTable(Table):
-    """Lines of a text file. Where nothing but numbers stand under the header NumPy reads them, of a
-    file of at most HELD bytes at once and once,
-    of a longer one in pieces. From the first piece on that holds anything else, or is wrong, each
-    line is read by itself, and what is wrong with it
-    is told by line and column."""
+    """Lines of a text file, a sample each, read in pieces by NumPy; what is wrong with one is told
+    by line and column.
+    """
 
     what = "a text file"
 
@@ -45,7 +46,7 @@ class TextTable(Table):
 
     def samples(self, groups: Groups) -> int:
         self.require([name for group in groups for name in group])
-        count = self._count if self._numbers is None else len(self._numbers)
+        count, _ = self._places[-1]
         if not count:
             raise InputError(
                 f"no line of numbers under the header {', '.join(self.names)}", file=self.file
@@ -53,183 +54,70 @@ class TextTable(Table):
         return count
 
     def in_any_order(self) -> bool:
-        return self._numbers is not None or (self._places is not None and not self.source.packed)
+        return not self.source.packed
+
+    def widths(self, groups: Groups) -> list[int]:
+        return [len(group) for group in groups]
 
     def parts(
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
     ) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
-        if self._numbers is not None:
-            held = self._numbers[:stop]
-            yield from (
-                [held[a : a + size, i] for i in indices] for a in range(start, len(held), size)
-            )
-            return
-        waiting, done = Queue(), start
-        try:
-            for numbers in self._read(start, stop):
-                waiting.put(numbers[:, indices])
-                while waiting.count >= size:
-                    yield list(waiting.take(size).T)
-                    done += size
-        except ValueError:
-            yield from self._parts_by_lines(indices, size, done, stop)
-        else:
-            if waiting.count:
-                yield list(waiting.take(waiting.count).T)
-
-    def _read(self, start: int, stop: int | None) -> Iterator[Array]:
-        """Numbers of the samples [start, stop), shape (B, len(names)), in pieces; ValueError where
-        there is anything else.
-        """
-        first, offset = (
-            max(place for place in self._places or [(0, 0)] if place[0] <= start)
-            if start
-            else (0, 0)
-        )
-        for _, piece in self._pieces(offset):
-            numbers = self._loaded(piece)
-            yield numbers[max(start - first, 0) : None if stop is None else stop - first]
-            first += len(numbers)
+        waiting = Queue()
+        first, place = [known for known in self._places[:-1] if known[0] <= start][-1]
+        for _, numbers, lines in self._pieces(place):
+            skipped = max(start - first, 0)
+            own = lines[skipped : None if stop is None else max(stop - first, 0)]
+            if own:
+                waiting.put(self._loaded(indices, islice(numbers, skipped, None), own))
+            while waiting.count >= size:
+                yield list(waiting.take(size).T)
+            first += len(lines)
             if stop is not None and first >= stop:
-                return
+                break
+        if waiting.count:
+            yield list(waiting.take(waiting.count).T)
 
-    def _parts_by_lines(
-        self, indices: list[int], size: int, start: int, stop: int | None
-    ) -> Iterator[Sequence[Array]]:
-        """The samples [start, stop)."""
-        lines = islice(self._lines(), start, stop)
-        while block := list(islice(lines, size)):
-            numbers, texts = zip(*block, strict=True)
-            self.require_widths(numbers, texts)
-            plain: Sequence[str] = texts
-            if self.source.decimal != ".":
-                self._require_no_points(indices, numbers, texts)
-                plain = [text.replace(self.source.decimal, ".") for text in texts]
-            try:
-                yield list(
-                    np.loadtxt(
-                        plain,
-                        delimiter=self.delimiter,
-                        usecols=indices,
-                        ndmin=2,
-                        comments=None,
-                        quotechar='"',
-                    ).T
-                )
-            except ValueError:
-                if error := self._not_a_number(indices, numbers, plain):
-                    raise error from None
-                plain = [_with_nan(text, self.delimiter) for text in plain]
-                yield list(
-                    np.loadtxt(
-                        plain,
-                        delimiter=self.delimiter,
-                        usecols=indices,
-                        ndmin=2,
-                        comments=None,
-                        quotechar='"',
-                    ).T
-                )
-
-    def _pieces(self, offset: int = 0) -> Iterator[tuple[int, str]]:
-        """What stands under the header, or from byte `offset` on, in pieces of whole lines, and the
-        byte where each begins; ValueError where a line is
-        no line of numbers with decimal points."""
+    def _loaded(self, indices: list[int], numbers: Iterator[int], lines: list[str]) -> Array:
+        """Numbers of these columns, shape (len(lines), len(indices))."""
+        if self.source.decimal == ".":
+            with suppress(ValueError):
+                whole = _numbers(lines, self.delimiter)
+                if whole.shape[1] == len(self.names):
+                    return whole[:, indices]
+        numbered = [*zip(numbers, lines, strict=False)]
+        self.require_widths(numbered)
         if self.source.decimal != ".":
-            raise ValueError("decimal comma")
-        with opened(self.source.path) as stream:
-            rest = b""
-            if not offset:
-                lines_of_text = (
-                    line.removeprefix(BOM_UTF8)
-                    for line in iter(lambda: stream.readline(LONGEST + 1), b"")
-                )
-                first = next(
-                    (
-                        line
-                        for line in lines_of_text
-                        if line.strip() and not line.lstrip().startswith(b"#")
-                    ),
-                    b"",
-                )
-                if b"\r" in first.rstrip():
-                    raise ValueError("lines that end with a carriage return alone")
-                rest = b"" if self.has_header else first
-            else:
-                stream.seek(offset)
-            begin = stream.tell() - len(rest)
-            while block := stream.read(PIECE):
-                lines, newline, rest = (rest + block).rpartition(b"\n")
-                if newline:
-                    yield begin, _regular(lines)
-                    begin += len(lines) + 1
-            if rest:
-                yield begin, _regular(rest)
-
-    def _loaded(self, lines: str) -> Array:
-        """Numbers, shape (B, len(names)); ValueError where there is anything else."""
+            self._require_no_points(indices, numbered)
+            numbered = [(k, line.replace(self.source.decimal, ".")) for k, line in numbered]
         try:
-            numbers = self._plain(lines)
+            return _numbers([line for _, line in numbered], self.delimiter, indices)
         except ValueError:
-            if not self.missing:
-                raise
-            numbers = self._plain(_with_nan(lines, self.delimiter))
-            if np.isnan(numbers[:, [name not in self.positions for name in self.names]]).any():
-                raise
-        return numbers
+            if error := self._not_a_number(indices, numbered):
+                raise error from None
+            filled = [_with_nan(line, self.delimiter) for _, line in numbered]
+            return _numbers(filled, self.delimiter, indices)
 
-    def _plain(self, lines: str) -> Array:
-        quote = '"' if '"' in lines else None
-        numbers = np.loadtxt(
-            lines.split("\n"), delimiter=self.delimiter, ndmin=2, comments=None, quotechar=quote
-        )
-        if numbers.shape[1] != len(self.names):
-            raise ValueError("columns")
-        return numbers
+    def _pieces(self, place: Place = BEGIN) -> Iterator[Piece]:
+        """Lines of numbers, by pieces of the file, from the one that begins at `place`."""
+        header = self.has_header and place == BEGIN
+        for begin, numbers, lines in _pieces(self.source, place):
+            under = header and bool(lines)
+            yield begin, islice(numbers, under, None), lines[under:]
+            header = header and not under
 
     @cached_property
-    def _count(self) -> int:
-        """Lines of numbers."""
-        return sum(1 for _ in self._lines()) if self._places is None else self._places[-1][0]
-
-    @cached_property
-    def _places(self) -> list[tuple[int, int]] | None:
-        """Number of the first sample of each piece of the file and the byte where it begins, then
-        their end; None where a line holds anything else.
-        """
-        places, samples = [], 0
-        try:
-            for begin, piece in self._pieces():
-                places.append((samples, begin))
-                samples += piece.count("\n") + 1
-        except ValueError:
-            return None
-        return [*places, (samples, self.source.size)]
-
-    @cached_property
-    def _numbers(self) -> Array | None:
-        """Every column, shape (N, len(names)); None where the file is long, or something in it is
-        neither a number nor the header.
-        """
-        try:
-            with opened(self.source.path) as stream:
-                whole = stream.read(HELD + 1)
-            if len(whole) > HELD:
-                return None
-            text = _one_newline(whole.decode("utf-8-sig")).lstrip()
-            lines = text.partition("\n")[2] if self.has_header else text
-            if "#" in text or self.source.decimal != "." or not lines or lines.isspace():
-                return None
-            return self._loaded(lines)
-        except ValueError:  # the file is read again by lines, which tells where
-            return None
+    def _places(self) -> list[tuple[int, Place]]:
+        """Samples ahead of each piece and where it begins; last the number of all samples."""
+        places, count = [], 0
+        for place, _, lines in self._pieces():
+            places.append((count, place))
+            count += len(lines)
+        return [*places, (count, BEGIN)]
 
     def row(self, i: int) -> str:
-        return f"line {next(islice(self._lines(), i, None))[0]}"
-
-    def _lines(self) -> Iterator[tuple[int, str]]:
-        return islice(_numbered_lines(self.source), 1 if self.has_header else 0, None)
+        numbers = chain.from_iterable(numbers for _, numbers, _ in self._pieces())
+        return f"line {next(islice(numbers, i, None))}"
 
     def require(self, names: Sequence[str]) -> None:
         """Raise InputError unless these columns are there."""
@@ -244,18 +132,12 @@ class TextTable(Table):
             )
         super().require(names)
 
-    def require_widths(self, numbers: Sequence[int], lines: Sequence[str]) -> None:
+    def require_widths(self, numbered: Sequence[tuple[int, str]]) -> None:
         """Raise InputError unless every line has one field per name."""
-        widths = [
-            len(line.split()) if self.delimiter is None else line.count(self.delimiter) + 1
-            for line in lines
-        ]
-        if widths.count(len(self.names)) < len(widths):
-            k, width = next(
-                (k, width)
-                for k, width in zip(numbers, widths, strict=True)
-                if width != len(self.names)
-            )
+        for k, line in numbered:
+            width = len(_fields(line, self.delimiter))
+            if width == len(self.names):
+                continue
             hint = "put # before lines that are neither names nor numbers"
             if self.delimiter == "," and width > len(self.names):
                 hint = (
@@ -268,13 +150,11 @@ class TextTable(Table):
                 row=f"line {k}",
             )
 
-    def _require_no_points(
-        self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]
-    ) -> None:
+    def _require_no_points(self, indices: list[int], numbered: Sequence[tuple[int, str]]) -> None:
         """Raise InputError where a field has a point beside decimal commas: 1.234 may be a
         thousand.
         """
-        for k, line in zip(numbers, lines, strict=True):
+        for k, line in numbered:
             if "." in line:
                 fields = _fields(line, self.delimiter)
                 for i in (i for i in indices if "." in fields[i]):
@@ -289,12 +169,12 @@ class TextTable(Table):
                     )
 
     def _not_a_number(
-        self, indices: list[int], numbers: Sequence[int], lines: Sequence[str]
+        self, indices: list[int], numbered: Sequence[tuple[int, str]]
     ) -> InputError | None:
         """What is wrong with the first field that is not a number; None where all of them are empty
         ones of positions, which may be missing.
         """
-        for k, line in zip(numbers, lines, strict=True):
+        for k, line in numbered:
             fields = _fields(line, self.delimiter)
             for i in indices:
                 position = not fields[i] and self.names[i] in self.positions
@@ -302,7 +182,7 @@ class TextTable(Table):
                     what = "an empty field" if not fields[i] else repr(fields[i])
                     hint = (
                         "; put # before a second line of names or units"
-                        if k == next(self._lines())[0] and fields[i]
+                        if fields[i] and self.row(0) == f"line {k}"
                         else ""
                     )
                     if position:
@@ -325,11 +205,13 @@ class TextTable(Table):
 
 def open_text(source: Source) -> TextTable:
     """Table of a text file; without a header line the columns are called 1, 2, 3 ..."""
-    first = next(_numbered_lines(source), None)
-    if first is None:
+    lines_of = (zip(*piece[1:], strict=True) for piece in _pieces(source, BEGIN, HEAD))
+    head = [*islice(chain.from_iterable(lines_of), 2)]
+    if not head:
         raise InputError("no line of numbers", file=source.file)
-    delimiter = next((d for d in (";", "\t", ",") if d in first[1] and d != source.decimal), None)
-    header = _fields(first[1], delimiter)
+    first = head[0][1]
+    delimiter = next((d for d in (";", "\t", ",") if d in first and d != source.decimal), None)
+    header = _fields(first, delimiter)
     if len(header) > WIDEST:
         raise InputError(
             (
@@ -352,29 +234,32 @@ def open_text(source: Source) -> TextTable:
         delimiter=delimiter,
         has_header=has_header,
     )
-    table.require_widths(
-        *zip(*islice(_numbered_lines(source), 2), strict=True)
-    )  # a title is no header
+    table.require_widths(head)  # a title is no header
     return table
 
 
-def _numbered_lines(source: Source) -> Iterator[tuple[int, str]]:
-    """Lines that hold something, comments aside, with their numbers from 1."""
+def _pieces(source: Source, place: Place, size: int = PIECE) -> Iterator[Piece]:
+    """Lines that hold something, comments aside, by pieces of `size` characters of the file, from
+    the one that begins at `place`.
+    """
+    first, rest, begin = place
     empty = 0
     try:
         with opened(source.path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
-            for k, raw in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
-                if len(raw) > LONGEST:
+            text.seek(begin)
+            for piece in chain(iter(lambda: text.read(size), ""), ["\n"]):
+                *lines, rest = (rest + piece).split("\n")
+                if max(map(len, (*lines, rest))) > LONGEST:
+                    long = next(k for k, x in enumerate((*lines, rest), first) if len(x) > LONGEST)
                     raise InputError(
                         f"a line of more than {LONGEST} characters; expected one sample a line",
                         file=source.file,
-                        row=f"line {k}",
+                        row=f"line {long}",
                     )
-                line = raw.strip()
-                if line and not line.startswith("#"):
-                    yield k, line
-                    continue
-                empty += 1
+                lines = [*map(str.strip, lines)]
+                filled = [line for line in lines if line and line[0] != "#"]
+                numbers = (k for k, x in enumerate(lines, first) if x and x[0] != "#")
+                first, empty = first + len(lines), empty + len(lines) - len(filled)
                 if empty > MOST_EMPTY:
                     raise InputError(
                         (
@@ -384,25 +269,21 @@ def _numbered_lines(source: Source) -> Iterator[tuple[int, str]]:
                         ),
                         file=source.file,
                     )
+                yield place, numbers, filled
+                place = first, rest, text.tell()
     except UnicodeDecodeError as e:
         raise InputError(
             f"not a text file in UTF-8 (byte {e.start} of a block); {UTF8}", file=source.file
         ) from None
 
 
-def _regular(lines: bytes) -> str:
-    """The lines without empty ones at their ends; ValueError where one of them is empty, indented
-    or a comment, or none is left.
+def _numbers(lines: list[str], delimiter: str | None, columns: list[int] | None = None) -> Array:
+    """Numbers of these columns, shape (len(lines), len(columns)), default: of all; ValueError where
+    there is anything else.
     """
-    text = _one_newline(lines.decode()).strip("\n")
-    if "#" in text or not text or text[0].isspace() or re.search(r"\n\s", text):
-        raise ValueError("lines of another kind")
-    return text
-
-
-def _one_newline(text: str) -> str:
-    """The text with "\\n" at the end of every line."""
-    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+    return np.loadtxt(
+        lines, delimiter=delimiter, usecols=columns, ndmin=2, comments=None, quotechar='"'
+    )
 
 
 def _with_nan(text: str, delimiter: str | None) -> str:
