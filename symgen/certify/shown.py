@@ -6,7 +6,7 @@ of the JSON, which is read in their place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -16,17 +16,13 @@ from symgen.certify.printed import equations, evaluated
 from symgen.certify.texts import TOLERANCE, difference
 from symgen.certify.witness import Witness
 from symgen.derive.exact import Array
+from symgen.derive.models import SYMBOLIC
 from symgen.derive.names import Names
-from symgen.description.robot import parameter
 from symgen.errors import CertificateError, SymgenError
 from symgen.regroup.regrouping import Regrouping
 from symgen.symbols.printing import FORMS
 from symgen.symbols.symbolic import SymbolicRobot, symbolic
 from symgen.symbols.symbolic_model import SymbolicModel
-
-UP_TO_A_CONSTANT = "potential_energy"
-AT_CONSTANT_RATES = ("bias", "jacobian_rate", "forward_dynamics")
-FRICTION = ("viscous", "coulomb")
 
 
 def certified_model(
@@ -72,21 +68,26 @@ def _error(
     """Largest difference of what is printed from what the model has to give, of the largest entry;
     `divided`: whether the entries of a direct model are still to be.
     """
-    found, right = evaluated(printed, _symbols(witness, model)), expected(witness, model)
+    found, request = evaluated(printed, _symbols(witness, model)), model.request
+    right = witness.value(model.model.name, request.of, request.frame, model.rows)
+    right = np.broadcast_to(right, (len(right), *map(len, model.axes)))
     value = _entries(found, model, right.shape)
-    if model.model.name == UP_TO_A_CONSTANT:
+    if model.model.up_to_a_constant:
         value, right = value - value[:1], right - right[:1]
-    if divided and "det A" in found:
-        value = value / np.reshape(found["det A"], (-1, 1))
+    if divided and model.model.denominator in found:
+        value = value / np.reshape(found[model.model.denominator], (-1, 1))
     return difference(value, right, max(np.abs(right).max(initial=0.0), 1.0))
 
 
-def require_models(regrouping: Regrouping, names: Iterable[str]) -> None:
-    """Raise CertificateError unless all forms of these models that there are hold."""
+def require_models(regrouping: Regrouping) -> None:
+    """Raise CertificateError unless the models of a robot's page hold in all forms that there
+    are.
+    """
     models = symbolic(regrouping.robot)
-    for name, form in product(names, FORMS):
+    for model, form in product(SYMBOLIC.values(), FORMS):
         try:
-            certified_model(models, regrouping, name, form, "json")
+            if model.page:
+                certified_model(models, regrouping, model.name, form, "json")
         except CertificateError:
             raise
         except SymgenError:
@@ -97,7 +98,7 @@ def _symbols(witness: Witness, model: SymbolicModel) -> dict[str, Any]:
     """Value of every symbol of a model, by sample."""
     robot, source = witness.robot, model.source
     named = Names(len(robot.frames))
-    qdd = witness.qdd * (model.model.name not in AT_CONSTANT_RATES)  # of tied joints by the rates
+    qdd = witness.qdd * ("qdd" in model.model.arguments)  # else tied joints by the rates alone
     accelerations = witness.model.motion(witness.q, witness.qd, qdd)[2]
     motion = {"q": witness.x, "QP": witness.xd, "QDP": accelerations}
     values: dict[str, Any] = {
@@ -107,8 +108,7 @@ def _symbols(witness: Witness, model: SymbolicModel) -> dict[str, Any]:
         values[f"GAM{j}"] = witness.tau[:, k]
         values |= {named("G", u, j): witness.G[:, m, k] for m, u in enumerate(robot.moving)}
     values |= dict(zip(robot.parameters, witness.chi, strict=True))
-    if source.kind == "base":
-        values |= dict(zip(source.parameters, witness.X, strict=True))
+    values |= dict(zip(source.parameters, witness.X, strict=True))
     return values | witness.constants
 
 
@@ -125,77 +125,3 @@ def _entries(found: Mapping[str, Any], model: SymbolicModel, shape: tuple[int, .
                 model.label(above), 0.0 if matrix is None or place else matrix
             )
     return value
-
-
-def expected(witness: Witness, model: SymbolicModel) -> Array:
-    """What a model has to give, (N, ...)."""
-    w, request = witness, model.request
-    T = np.concatenate(
-        [np.broadcast_to(np.eye(4), (len(w.q), 1, 4, 4)), w.model.poses(w.x)], axis=1
-    )
-    R = T[:, request.frame, :3, :3].swapaxes(1, 2)
-
-    def seen(twist: Array) -> Array:
-        """The same twist in components of the frame asked for."""
-        return np.concatenate([R @ twist[:, :3], R @ twist[:, 3:]], axis=1)
-
-    def jacobian() -> Array:
-        J = (
-            w.model.jacobian(w.x, request.of)
-            if request.of
-            else np.zeros((len(w.q), 6, len(w.robot.moving)))
-        )
-        return seen(J @ w.G)
-
-    def acceleration(qdd: Array) -> Array:
-        linear_and_angular = w.model.acceleration(*w.model.motion(w.q, w.qd, qdd)[:3], request.of)
-        return seen(linear_and_angular[..., None])[..., 0]
-
-    def determinant() -> Array:
-        J = jacobian()
-        rows = [k for k in range(6) if np.abs(J[:, k]).max() > TOLERANCE]
-        square = J[:, rows if model.rows is None else [k - 1 for k in model.rows]]
-        return np.asarray(np.linalg.det(square))
-
-    def coriolis() -> Array:
-        """C e_j = (h(qd + e_j) - h(qd) - h(e_j))/2 of the quadratic h = C(qd) qd."""
-        still = w.chi * (1 - _of_kinds(w, FRICTION))
-        at_rest = w.torque(w.q, 0 * w.q, 0 * w.q, still)
-        h = [
-            w.torque(w.q, u, 0 * w.q, still) - at_rest
-            for e in np.eye(w.q.shape[1])
-            for u in (w.qd + e, w.qd, 0 * w.qd + e)
-        ]
-        return np.stack([h[k] - h[k + 1] - h[k + 2] for k in range(0, len(h), 3)], axis=-1) / 2
-
-    values: dict[str, Callable[[], Array]] = {
-        "pose": lambda: np.linalg.inv(T[:, request.frame]) @ T[:, request.of],
-        "jacobian": jacobian,
-        "determinant": determinant,
-        "velocity": lambda: (jacobian() @ w.qd[..., None])[..., 0],
-        "jacobian_rate": lambda: acceleration(0 * w.qdd),
-        "acceleration": lambda: acceleration(w.qdd),
-        "inverse_dynamics": lambda: w.tau,
-        "inertia_matrix": lambda: w.A,
-        "bias": lambda: w.H,
-        "gravity": lambda: w.rest,
-        "coriolis": coriolis,
-        "friction": lambda: w.torque(w.q, w.qd, 0 * w.q, w.chi * _of_kinds(w, FRICTION)),
-        "kinetic_energy": lambda: np.einsum("ti,tij,tj->t", w.qd, w.A, w.qd) / 2,
-        "potential_energy": lambda: w.model.potential_energy(w.x, w.chi),
-        "forward_dynamics": lambda: w.qdd,
-        "regressor": lambda: w.own if model.source.kind == "base" else w.D,
-        "base_parameters": lambda: np.tile(
-            w.X if model.source.kind == "base" else w.chi, (len(w.q), 1)
-        ),
-        "closure": lambda: np.zeros((len(w.q), len(model.places))),
-    }
-    return np.asarray(values[model.model.name]())
-
-
-def _of_kinds(witness: Witness, kinds: tuple[str, ...]) -> Array:
-    """1 for the parameters of elements of these kinds, 0 for others."""
-    names = {
-        parameter(e.family, j) for e in witness.robot.elements for j in e.keys if e.kind in kinds
-    }
-    return np.array([float(name in names) for name in witness.robot.parameters])

@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -138,7 +138,7 @@ def module_errors(path: Path, target: str, witness: Witness) -> dict[str, float]
     if target == "casadi":  # all three, by position
         del checks["observation_matrix"]
         checks |= {
-            n: c[:1] for n, c in checks.items() if n == "passive_joints"
+            n: c[:2] for n, c in checks.items() if n == "passive_joints"
         } | witness.derivatives
     errors = {name: largest(module, name, checks[name], call, witness) for name in checks}
     own = [
@@ -157,24 +157,12 @@ def largest(
 ) -> float:
     """Largest error of a function in all its checks."""
     try:
-        return max(max(_errors(module, name, check, call, witness)) for check in checks)
+        return max(
+            difference(c.compared(call(module, name, c, witness.constants)), c.expected, c.scale)
+            for c in checks
+        )
     except Exception:  # a text may fail in any way
         return float("inf")
-
-
-def _errors(
-    module: ModuleType, name: str, check: Check, call: Callable[..., Array], witness: Witness
-) -> Iterator[float]:
-    constants = witness.constants
-    value = call(module, name, check.arguments, check.keywords, constants, check.expected.ndim)
-    yield difference(check.compared(value), check.expected, check.scale)
-    if check.alone is not None:
-        N = len(check.arguments[0])
-        first = tuple(a[0] if a.ndim > 1 and len(a) == N else a for a in check.arguments)
-        value = call(module, name, first, check.keywords, constants, check.alone.ndim)
-        if check.compared is not np.asarray:
-            value = check.compared(value[None])[0]
-        yield difference(value, check.alone, check.scale)
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
@@ -185,27 +173,14 @@ def difference(value: Any, expected: Array, scale: Array | float) -> float:
     return float(np.max(np.abs(value - expected) / scale, initial=0.0))
 
 
-def _called(
-    module: ModuleType,
-    name: str,
-    arguments: tuple[Array, ...],
-    keywords: Mapping[str, int],
-    constants: Mapping[str, float],
-    ndim: int,
-) -> Array:
-    value = getattr(module, name)(*arguments, **keywords, **constants)
+def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
+    value = getattr(module, name)(*check.arguments, **check.keywords, **constants)
     return np.stack(value, axis=-2) if isinstance(value, tuple) else np.asarray(value)
 
 
-def _casadi(
-    module: ModuleType,
-    name: str,
-    arguments: tuple[Array, ...],
-    keywords: Mapping[str, int],
-    constants: Mapping[str, float],
-    ndim: int,
-) -> Array:
+def _casadi(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
     """Results side by side, by sample, as the NumPy module has them."""
+    arguments, keywords, ndim = check.arguments, check.keywords, check.expected.ndim
     function = module.jacobian_of(keywords["frame"]) if keywords else getattr(module, name)
     alone = arguments[0].ndim == 1
     N = 1 if alone else len(arguments[0])

@@ -11,17 +11,17 @@ as they are where formulas are numbers, which hold for these alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
-from symgen.derive.models import MODELS
+from symgen.derive.models import DISSIPATIVE, EMITTED
 from symgen.description.expression import ONE
 from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.emit.header import one_sided_friction_that_absorbs
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 STATES = 20  # of every function: more than a tile of C, the last one at rest
 BLOCKS = 8200
 FEW = 4  # states of the derivatives
+MOVED = 1e-9  # rows of a Jacobian below are zero
 SMALL = 1e-6  # of the largest entry: columns of the regressor below are compared with that
 SPREADS = ((0.25, 0.3), (0.25, 0.0), (0.03, 0.03), (0.03, 0.0))  # of constants, of those that are 0
 RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
@@ -48,13 +49,11 @@ class Check:
     Attributes
     ----------
     arguments : tuple of ndarray
-        Of all states, first axis, or parameters.
+        States, with or without an axis of samples, or parameters.
     expected : ndarray
-        First axis states, unless `alone` is None.
+        The result.
     scale : ndarray or float
         What a difference is divided by.
-    alone : ndarray or None
-        What one state, the first, without its axis, has to give; None where no state is read.
     keywords : mapping
         Keyword arguments beside the constants.
     compared : callable
@@ -64,7 +63,6 @@ class Check:
     arguments: tuple[Array, ...]
     expected: Array
     scale: Array | float
-    alone: Array | None = None
     keywords: Mapping[str, int] = field(default_factory=dict)
     compared: Callable[[Array], Array] = np.asarray
 
@@ -126,6 +124,12 @@ class Witness:
         return self.D[:, :, [self.robot.parameters.index(name) for name in self.regrouping.own]]
 
     @cached_property
+    def poses(self) -> Array:
+        """0T0, then 0Tj of every frame, (N, 1 + frames, 4, 4)."""
+        base = np.broadcast_to(np.eye(4), (len(self.q), 1, 4, 4))
+        return np.concatenate([base, self.model.poses(self.x)], axis=1)
+
+    @cached_property
     def tau(self) -> Array:
         """Gamma, (N, n)."""
         return np.asarray(self.D @ self.chi)
@@ -151,44 +155,52 @@ class Witness:
         A, H, size = self.A, self.H, np.abs(X).max(initial=1e-300)
 
         def of_states(
-            arguments: tuple[Array, ...], expected: Array, scale: Array | float = largest
-        ) -> Check:
-            return Check(arguments, expected, scale, expected[0])
+            arguments: tuple[Array, ...], expected: Array, scale: Array | float, **given: Any
+        ) -> list[Check]:
+            first = tuple(a[0] if len(a) == N and a.ndim > 1 else a for a in arguments)
+            return [
+                Check(arguments, expected, scale, **given),
+                Check(first, expected[0], scale, **given),
+            ]
 
-        def driven(qdd: Array) -> Array:
-            return np.asarray((A[: len(qdd)] @ qdd[..., None])[..., 0] + H[: len(qdd)])
-
-        given = {"q": q, "qd": qd, "qdd": qdd, "X": X}
-        expected = {
-            "regressor": (self.own, columns),
-            "inverse_dynamics": (self.tau,),
-            "inertia_matrix": (A,),
-            "bias": (H,),
-            "gravity": (self.rest,),
-            "frame_poses": (T := self.model.poses(self.x), np.abs(T).max()),
-        }
-        composed = {
-            "forward_dynamics": [
-                Check((q, qd, self.tau, X), self.tau, largest, self.tau[0], {}, driven)
-            ],
-            "jacobian": list(self._jacobians()),
-        }
+        given = {"q": q, "qd": qd, "qdd": qdd, "tau": self.tau, "X": X}
         checks = {
             "base_parameters": [Check((self.chi,), X, size)],
             "regressor": [],  # its place, before what is stacked of it
-            "observation_matrix": [Check((q, qd, qdd), W, columns, self.own[0])],
-        } | {
-            m.name: composed.get(m.name)
-            or [of_states(tuple(given[a] for a in m.arguments), *expected[m.name])]
-            for m in MODELS.values()
-            if m.result and not m.of_loops
+            "observation_matrix": [
+                Check((q, qd, qdd), W, columns),
+                Check((q[0], qd[0], qdd[0]), self.own[0], columns),
+            ],
         }
+        for m in EMITTED.values():
+            arguments, checks[m.name] = tuple(given[a] for a in m.arguments), []
+            for j in (None, *(f.j for f in self.robot.frames)) if m.of_frames else (None,):
+                expected = self.value(m.name, j or self.robot.frames[-1].j)
+                scale = largest if m.reads_X else max(np.abs(expected).max(), 1.0)
+                checks[m.name] += of_states(
+                    arguments,
+                    expected,
+                    columns if m.by_columns else scale,
+                    keywords={} if j is None else {"frame": j},
+                )
+        whole, first = checks["forward_dynamics"]  # as good as A is regular: by its torque
+        checks["forward_dynamics"] = [
+            replace(
+                whole,
+                expected=self.tau,
+                compared=lambda qdd: np.asarray((A @ qdd[..., None])[..., 0] + H),
+            ),
+            replace(
+                first, expected=self.tau[0], compared=lambda qdd: np.asarray(A[0] @ qdd + H[0])
+            ),
+        ]
         if self.robot.passive:
             place = [self.robot.moving.index(j) for j in self.robot.passive]
             motion = np.stack([x[:, place] for x in (self.x, self.xd, self.xdd)], axis=1)
+            size = np.abs(motion).max()
             checks["passive_joints"] = [
-                of_states((q, qd, qdd), motion, np.abs(motion).max()),
-                of_states((q,), motion[:, 0], np.abs(motion).max()),
+                *of_states((q, qd, qdd), motion, size),
+                *of_states((q,), motion[:, 0], size),
             ]
         if not close(self.robot).tied:  # more samples than a block of the NumPy module has
             rows = np.arange(BLOCKS) % N
@@ -198,12 +210,67 @@ class Witness:
     def _kept(self, checks: dict[str, list[Check]]) -> dict[str, list[Check]]:
         return {name: check for name, check in checks.items() if name not in self.left_out}
 
-    def _jacobians(self) -> Iterator[Check]:
-        """Of the last frame without its number, then of every frame by its number."""
-        for j in (None, *(f.j for f in self.robot.frames)):
-            J = self.model.jacobian(self.x, j) @ self.G
-            keywords = {} if j is None else {"frame": j}
-            yield Check((self.q,), J, max(np.abs(J).max(), 1.0), J[0], keywords)
+    def value(
+        self, name: str, of: int = 0, frame: int = 0, rows: Sequence[int] | None = None
+    ) -> Array:
+        """What a model has to give, (N, ...): of frame `of`, in components of frame `frame`; of a
+        determinant, of these rows from 1, else of those that are not zero.
+        """
+        N, chi, T = len(self.q), self.chi, self.poses
+        R = T[:, frame, :3, :3].swapaxes(1, 2)
+
+        def turned(twist: Array) -> Array:
+            return np.concatenate([R @ twist[:, :3], R @ twist[:, 3:]], axis=1)
+
+        def jacobian() -> Array:
+            J = self.model.jacobian(self.x, of) if of else np.zeros((N, 6, self.x.shape[1]))
+            return turned(J @ self.G)
+
+        def acceleration(qdd: Array) -> Array:
+            motion = self.model.motion(self.q, self.qd, qdd)[:3]
+            return turned(self.model.acceleration(*motion, of)[..., None])[..., 0]
+
+        def determinant() -> Array:
+            J = jacobian()
+            moved = [k for k in range(6) if np.abs(J[:, k]).max() > MOVED]
+            square = J[:, moved if rows is None else [k - 1 for k in rows]]
+            return np.asarray(np.linalg.det(square))
+
+        def coriolis() -> Array:
+            """C e_j = (h(qd + e_j) - h(qd) - h(e_j))/2 of the quadratic h = C(qd) qd."""
+            q, qd, still = self.q, self.qd, chi * ~of_kinds(self.robot, *DISSIPATIVE)
+            at_rest = self.torque(q, 0 * q, 0 * q, still)
+            h = [
+                self.torque(q, u, 0 * q, still) - at_rest
+                for e in np.eye(q.shape[1])
+                for u in (qd + e, qd, 0 * qd + e)
+            ]
+            return np.stack([h[k] - h[k + 1] - h[k + 2] for k in range(0, len(h), 3)], axis=-1) / 2
+
+        values: dict[str, Callable[[], Array]] = {
+            "regressor": lambda: self.own,
+            "inverse_dynamics": lambda: self.tau,
+            "inertia_matrix": lambda: self.A,
+            "bias": lambda: self.H,
+            "gravity": lambda: self.rest,
+            "forward_dynamics": lambda: self.qdd,
+            "frame_poses": lambda: T[:, 1:],
+            "pose": lambda: np.linalg.inv(T[:, frame]) @ T[:, of],
+            "jacobian": jacobian,
+            "determinant": determinant,
+            "jacobian_rate": lambda: acceleration(0 * self.qdd),
+            "velocity": lambda: (jacobian() @ self.qd[..., None])[..., 0],
+            "acceleration": lambda: acceleration(self.qdd),
+            "coriolis": coriolis,
+            "friction": lambda: self.torque(
+                self.q, self.qd, 0 * self.q, chi * of_kinds(self.robot, *DISSIPATIVE)
+            ),
+            "kinetic_energy": lambda: np.einsum("ti,tij,tj->t", self.qd, self.A, self.qd) / 2,
+            "potential_energy": lambda: self.model.potential_energy(self.x, chi),
+            "base_parameters": lambda: np.tile(self.X, (N, 1)),
+            "closure": lambda: np.zeros((N, 1)),
+        }
+        return np.asarray(values[name]())
 
     @cached_property
     def derivatives(self) -> dict[str, list[Check]]:
@@ -211,7 +278,7 @@ class Witness:
         zero.
         """
         q, qd, qdd, n = self.q[:FEW], self.qd[:FEW], self.qdd[:FEW], self.q.shape[1]
-        smooth = self.chi * [name not in dry(self.robot) for name in self.robot.parameters]
+        smooth = self.chi * ~of_kinds(self.robot, "coulomb")
         by_q, by_qd = np.zeros((2, FEW, n, n))
         for k, e in enumerate(np.eye(n)):
             for m, c in SIX_POINTS.items():
@@ -247,9 +314,10 @@ def ungrouped(robot: Robot) -> Regrouping:
     )
 
 
-def dry(robot: Robot) -> set[str]:
-    """Parameters of Coulomb friction."""
-    return {parameter(e.family, j) for e in robot.elements for j in e.keys if e.kind == "coulomb"}
+def of_kinds(robot: Robot, *kinds: str) -> Array:
+    """Whether each standard parameter is one of elements of these kinds."""
+    own = {parameter(e.family, j) for e in robot.elements if e.kind in kinds for j in e.keys}
+    return np.array([name in own for name in robot.parameters])
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:

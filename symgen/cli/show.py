@@ -145,9 +145,8 @@ def page_file(regrouping: Regrouping, certificate: Certificate, output: Path | N
     """Path of the page of a robot, written to `output` or to <name>.html once its models hold."""
     from symgen.certify.shown import require_models
     from symgen.report.page import robot_page
-    from symgen.symbols.markup import SHOWN
 
-    require_models(regrouping, SHOWN)
+    require_models(regrouping)
     path = output or Path(f"{regrouping.robot.name}.html")
     return write_all(path.parent, {path.name: robot_page(regrouping, certificate)})[0]
 

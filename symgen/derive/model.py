@@ -91,6 +91,12 @@ class Model:
         What it is.
     cases : callable or None
         Its entries from a derivation; None for what is composed of others.
+    composed : str
+        How its closed form is composed of others: "formulas", "determinant" or "quotient".
+    instead : str
+        What works in the place of a recursion that it does not have.
+    denominator : str
+        What its entries are still to be divided by, where the closed form says that apart.
     steps : callable or None
         Its entries by recursion, where that is another way than its closed form.
     result : str
@@ -105,6 +111,10 @@ class Model:
         Whether it is stored column by column in a store that is reused.
     of_loops : bool
         Whether it serves the closing of general loops alone.
+    up_to_a_constant : bool
+        Whether a constant may be added to it.
+    page : int
+        Its place on the page of a robot, from 1; 0 where it is not shown there.
     """
 
     name: str
@@ -121,6 +131,11 @@ class Model:
     symmetric: bool = False
     by_columns: bool = False
     of_loops: bool = False
+    composed: str = ""
+    instead: str = ""
+    denominator: str = ""
+    up_to_a_constant: bool = False
+    page: int = 0
 
     @property
     def summary(self) -> str:

@@ -82,6 +82,12 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
+    if d.closure.tied:
+        tied = ", ".join(f"q{u}" for u in d.closure.tied)
+        raise SymgenError(
+            f"C(q, qd) of {d.robot.name} has no closed form in its actuated joints while {tied} "
+            "are symbols; bias has C qd + Q + friction, with the passive joints as symbols"
+        )
     row = {j: k for k, j in enumerate(d.robot.joints)}
     yield Case([Entry((row[i], row[k]), x) for (i, k), x in coriolis(d).items()])
 
@@ -212,26 +218,29 @@ MODELS = {
         Model(
             "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("joints",), TORQUE,
             "joint torques Gamma = A qdd + C qd + Q + friction", _inverse_dynamics, result="GAM",
+            page=7,
         ),
         Model(
             "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
             "A(q), actuators included: column i is Gamma for a unit acceleration of joint i from "
             "rest",
-            _inertia_matrix, result="A", symmetric=True,
+            _inertia_matrix, result="A", symmetric=True, page=3,
         ),
         Model(
             "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,
             "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset", _bias,
-            result="GAM",
+            result="GAM", page=6,
         ),
         Model(
             "gravity", "Q", ("q", "X"), ("joints",), TORQUE,
             "Gamma at rest without friction: gravity, offset and springs "
-            "(a base parameter may mix them)", _gravity, result="GAM",
+            "(a base parameter may mix them)", _gravity, result="GAM", page=5,
         ),
         Model(
             "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("joints",), "rad/s**2 | m/s**2",
-            "qdd = A(q)**-1 (tau - bias)", None, result="qdd",
+            "qdd = A(q)**-1 (tau - bias)", None, result="qdd", composed="quotient",
+            denominator="det A",
+            instead="A qdd = Gamma - H, with the equations of inertia_matrix and bias",
         ),
         Model(
             "frame_poses", "T", ("q",), ("frames", "pose", "pose"), "1, m",
@@ -241,16 +250,18 @@ MODELS = {
         Model(
             "pose", "T", ("q",), ("pose", "pose"), "1, m",
             "homogeneous transform: axes and origin of frame `of` in frame `frame`", _pose,
-            of_frames=True,
+            of_frames=True, page=1,
         ),
         Model(
             "jacobian", "J", ("q",), ("twist", "joints"), "m/s, rad/s by rad/s | m/s",
             "velocity of the origin of frame `of`, then its angular velocity, per joint rate, "
             "in frame `frame`", _jacobian, result="J", steps=_carried_jacobian, of_frames=True,
+            page=2,
         ),
         Model(
             "determinant", "det J", ("q",), (), "m**3 for six hinges",
             "determinant of the Jacobian, where it is square", None, of_frames=True,
+            composed="determinant", instead="form closed, or the equations of jacobian",
         ),
         Model(
             "jacobian_rate", "JPQP", ("q", "qd"), ("twist",), "m/s**2, rad/s**2",
@@ -270,7 +281,7 @@ MODELS = {
         Model(
             "coriolis", "C", ("q", "qd", "X"), ("joints", "joints"), "N*m*s/rad | N*s/m",
             "C(q, qd) of Coriolis and centrifugal torques C qd, with Christoffel symbols: "
-            "Ad - 2C is skew symmetric", _coriolis,
+            "Ad - 2C is skew symmetric", _coriolis, page=4,
         ),
         Model(
             "friction", "F", ("q", "qd", "X"), ("joints",), TORQUE,
@@ -283,14 +294,16 @@ MODELS = {
         Model(
             "potential_energy", "U", ("q", "X"), (), "J",
             "potential energy of gravity, springs and offset: dU/dq = Q", _potential_energy,
+            up_to_a_constant=True,
         ),
         Model(
             "base_parameters", "X", ("standard",), ("parameters",), "see UNITS",
-            "what each parameter is made of", None,
+            "what each parameter is made of", None, composed="formulas",
+            instead="form closed, or symgen show ROBOT --recursive for the regrouping link by link",
         ),
         Model(
             "closure", "r", ("q",), ("equations",), "m | rad",
-            "residuals of the loops, zero where they close", _closure,
+            "residuals of the loops, zero where they close", _closure, page=8,
         ),
         Model(
             "linearised_closure", "R", ("q",), ("equations", "residual, derivatives"), "m | rad",
@@ -304,3 +317,6 @@ MODELS = {
         ),
     )
 }  # fmt: skip
+SYMBOLIC = {name: model for name, model in MODELS.items() if model.symbolic}
+EMITTED = {name: m for name, m in MODELS.items() if m.result and not m.of_loops}
+"""Those that targets have as functions."""

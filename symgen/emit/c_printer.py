@@ -20,9 +20,9 @@ from symgen.emit.printers import Language, Section, Text
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto
 if inline int long register restrict return short signed sizeof static struct switch typedef union
 unsigned void volatile while"""
-MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL PART STREAM PORTABLE
+MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL STREAM PORTABLE
 WIDTH"""
-OWN = """sin cos sqrt sign above below load save constants flags m t start row tile U V T S N
+OWN = """sin cos sqrt sign above below load save constants flags m t start row tile U T S N
 size_t int32_t int64_t memcpy memset"""
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
 HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")

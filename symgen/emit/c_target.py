@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from symgen.derive.graph import Scalar
 from symgen.derive.model import Entry, Model
 from symgen.description.namespace import Namespace
-from symgen.emit.c_parts import Part, definitions, parts, words_of
 from symgen.emit.c_printer import CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, Text
@@ -61,10 +60,6 @@ class Kernel:
         Number of sines and cosines.
     sections : tuple of Section
         The loop over a tile.
-    parts : tuple of Part
-        The same, divided, where it is long.
-    crossing : int
-        Rows of V, which the parts hand over.
     rows : tuple of str
         {row of the store, signal, sign}, as source.
     entries, count, computed : int
@@ -81,8 +76,6 @@ class Kernel:
     trigonometry: tuple[Section, ...]
     calls: int
     sections: tuple[Section, ...]
-    parts: tuple[Part, ...]
-    crossing: int
     rows: tuple[str, ...]
     entries: int
     count: int
@@ -102,7 +95,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         for f in spec.functions.values()
         if {*f.model.axes} <= {*RESULTS}
     ]
-    most = max(kernel.computed + kernel.crossing for kernel in kernels)
+    most = max(kernel.computed for kernel in kernels)
     lines = [
         line
         for kernel in kernels
@@ -189,10 +182,7 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> Kernel:
     trigonometry_loops = tuple(
         Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines
     )
-    body = [*text.sections, *results]
-    before = [*constants, *parameters, *text.fixed]
-    divided, crossing = parts(before, [*inputs, *recalled], body)
-    sections = [Section("Inputs", (*inputs, *recalled)), *body]
+    sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
     read = text.trigonometry_inputs | text.main_inputs
     return Kernel(
         function=f,
@@ -201,14 +191,10 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> Kernel:
         used=tuple(s for s in model.states if any(place[x][0] == s for x in read if x in place)),
         needs_X=bool(parameters),
         needs_constants=bool(constants),
-        before=definitions(before, words_of(line for s in trigonometry_loops for line in s.lines))
-        if divided
-        else tuple(before),
+        before=(*constants, *parameters, *text.fixed),
         trigonometry=trigonometry_loops,
         calls=len(trigonometry),
         sections=tuple(s for s in sections if s.lines),
-        parts=tuple(divided),
-        crossing=crossing,
         rows=tuple(packed([f"{{{row}, {signal}, {sign}}}" for row, signal, sign in signals.rows])),
         entries=len(signals.rows),
         count=len(signals.rows)
@@ -314,7 +300,6 @@ def _layout(spec: ModuleSpec, k: Kernel) -> dict[str, object]:
         "name": model.name,
         "summary": f"/* {summary} */",
         "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", tile),
-        "part_functions": _part_functions(k, n),
         "tile_arguments": ", ".join(arguments),
         "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
         "scratch": ", ".join(
@@ -326,32 +311,6 @@ def _layout(spec: ModuleSpec, k: Kernel) -> dict[str, object]:
 
 def _missing(pointers: Sequence[str]) -> str:
     return " || ".join(f"{p} == NULL" for p in pointers)
-
-
-def _part_functions(k: Kernel, n: int) -> list[dict[str, object]]:
-    result = k.result
-    parameters = {
-        **{s: f"double {s}[restrict {n}][TILE]" for s in k.used},
-        "X": "const double *restrict X",
-        "constants": "const double *restrict constants",
-        "T": f"double T[restrict {k.calls}][TILE]",
-        "V": f"double V[restrict {k.crossing}][TILE]",
-        result: f"double {result}[restrict {k.computed}][TILE]",
-    }
-    laid: list[dict[str, object]] = []
-    for number, part in enumerate(k.parts, 1):
-        own = {name: text for name, text in parameters.items() if name in part.words}
-        name = f"{k.model.name}_part{number}"
-        prototype = signature(f"PART static void {name}", list(own.values()))
-        laid.append(
-            {
-                "prototype": prototype,
-                "call": f"{name}({', '.join(own)})",
-                "before": part.before,
-                "sections": part.sections,
-            }
-        )
-    return laid
 
 
 def _signals_layout(spec: ModuleSpec, regressor: Kernel) -> dict[str, object]:

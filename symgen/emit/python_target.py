@@ -12,7 +12,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.columns import element_names
 from symgen.derive.model import Entry
-from symgen.derive.models import MODELS
+from symgen.derive.models import EMITTED
 from symgen.description.expression import Expression
 from symgen.description.namespace import Namespace
 from symgen.description.robot import FIXED, Robot
@@ -193,7 +193,7 @@ def context(
         ],
         "tied": spec.tied,
         "passive": robot.passive,
-        "models": {name: m for name, m in MODELS.items() if m.result and not m.of_loops},
+        "models": EMITTED,
         "functions": spec.functions,
         "takes": {name: list(b.arguments) for name, b in blocks.items()},
         "listed": listed,

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
-from math import hypot, isfinite
+from math import isfinite
 from typing import Any
 
 from symgen.derive.closure import Closure, open_tree
@@ -31,7 +31,6 @@ from symgen.regroup.regrouping import Regrouping, regroup
 
 PARAMETERS = ("base", "standard")
 PASSIVE = ("functions", "symbols")
-GRAVITY = ("symbol", "number")
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,6 @@ class Source:
 def source_of(
     robot: Robot,
     parameters: str = "base",
-    gravity: str | None = None,
     values: Mapping[str, Any] | None = None,
     passive: str | None = None,
     regrouping: Regrouping | None = None,
@@ -123,9 +121,6 @@ def source_of(
         own = {p: p for p in robot.parameters}
         formulas = {p: Formula({p: ONE}) for p in robot.parameters}
     given = _parsed(robot, own.values(), values or {})
-    if gravity is not None:
-        _one_of("gravity", gravity, GRAVITY)
-        robot = _with_gravity(robot, gravity)
     constants = {name: e for name, e in given.items() if name in robot.constants}
     if constants:
         robot = at_values(robot, constants)
@@ -191,23 +186,3 @@ def _parsed(
             )
             result[name] = parse(text, [c for c in robot.constants if c not in values])
     return result
-
-
-def _with_gravity(robot: Robot, kind: str) -> Robot:
-    """Gravity as a number times a direction, or with its size as the symbol g."""
-    symbols = {s for e in robot.gravity for s in e.symbols}
-    if kind == "number":
-        numbers = {name: exact(robot.constants[name]) for name in symbols}
-        x, y, z = (e.substitute(numbers) for e in robot.gravity)
-        return replace(robot, gravity=(x, y, z))
-    if symbols or not any(robot.gravity):
-        return robot
-    size = hypot(*map(float, robot.gravity))
-    if "g" in robot.constants:
-        raise SymgenError(
-            f"gravity='symbol': g is another constant of {robot.name}; write its gravity with a "
-            "symbol in the robot file"
-        )
-    unit = exact(size).inverse()
-    x, y, z = (e * unit * Expression.symbol("g") for e in robot.gravity)
-    return replace(robot, gravity=(x, y, z), constants={**robot.constants, "g": size})

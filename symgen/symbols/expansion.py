@@ -197,11 +197,6 @@ class Expansion:
     def _each(self, a: Polynomial, of: Any) -> Polynomial:
         return self.ring.from_dict({m: of(c) for m, c in a.items()})
 
-    def derivative(self, a: Polynomial, j: int) -> Polynomial:
-        """da/dq_j."""
-        q = self.generator.get(trees.symbol(f"q{j}"))
-        return self._each(a, lambda c: self.identities.derivative(c, j, q))
-
     def halved(self, a: Polynomial) -> Polynomial:
         return self._each(a, lambda c: c.new({m: number(Fraction(n) / 2) for m, n in c.items()}))
 

@@ -56,18 +56,6 @@ class Identities:
         c.strip_zero()
         return c
 
-    def derivative(self, c: Coefficient, j: int, slide: Coefficient | None) -> Coefficient:
-        """dc/dq_j by the angles that joint j turns, or by its position where it slides."""
-        moves = [(slide, self.ring(1), 1)] if slide else []
-        for (turn, _), (C, S) in self.pairs.items():
-            if n := dict(turn).get(j):
-                moves += [(S, C, n), (C, S, -n)]
-        slope = self.ring(0)
-        for x, becomes, n in moves:
-            k, step = x.LM.index(1), self.ring.monomial_ldiv(becomes.LM, x.LM)
-            slope += c.new({self.ring.monomial_mul(m, step): n * m[k] * c[m] for m in c if m[k]})
-        return self.reduced(slope)
-
     def tidy(self, c: Coefficient) -> Coefficient:
         """The same function in fewer terms: pairs of terms are put together until none is left."""
         terms, times, over = dict(c), self.ring.monomial_mul, self.ring.monomial_div

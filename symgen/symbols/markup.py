@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from symgen.derive.models import MODELS
+from symgen.derive.models import SYMBOLIC
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import Regrouping
 from symgen.symbols import mathml, trees
@@ -13,16 +13,6 @@ from symgen.symbols.mathml import MathML
 from symgen.symbols.printing import passive_notes, text_lines
 from symgen.symbols.symbolic_model import SymbolicModel
 
-SHOWN = (
-    "pose",
-    "jacobian",
-    "inertia_matrix",
-    "coriolis",
-    "gravity",
-    "bias",
-    "inverse_dynamics",
-    "closure",
-)
 READABLE = 150  # terms of a closed form on a page; longer ones are shown as recursion
 EXPANDED = 2000  # terms that are multiplied out to see
 
@@ -49,25 +39,25 @@ def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
     source = source_of(robot, regrouping=regrouping)
     request = source.request(robot.frames[-1].j, 0)
     models = [
-        SymbolicModel(MODELS[name], source, request, None, EXPANDED)
-        for name in SHOWN
-        if name != "closure" or source.closure.tied
+        SymbolicModel(model, source, request, None, EXPANDED)
+        for model in sorted(SYMBOLIC.values(), key=lambda model: model.page)
+        if model.page
     ]
-    return [
-        _shown(model)
-        for model in models
-        if model.model.name != "coriolis" or not source.closure.tied
-    ], passive_notes(models[0])
+    return [*filter(None, map(_shown, models))], passive_notes(models[0])
 
 
-def _shown(model: SymbolicModel) -> ShownModel:
+def _shown(model: SymbolicModel) -> ShownModel | None:
+    """None where the robot has neither form of the model."""
     title = model.model.name.replace("_", " ")
     try:
         closed = model.closed
     except SymgenError:
         closed = None
     if closed is None or closed.size > READABLE:
-        listing = model.listing
+        try:
+            listing = model.listing
+        except SymgenError:
+            return None
         return ShownModel(
             title,
             model.summary,

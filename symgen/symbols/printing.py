@@ -30,13 +30,8 @@ def printed(model: SymbolicModel, form: str, language: str) -> str:
     for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
         if given not in known:
             raise SymgenError(f"{what} {given!r}; expected one of {', '.join(known)}")
-    if language == "json":
-        return json.dumps(mapping(model, form), indent=2, ensure_ascii=False)
-    if language == "sympy":
-        return sympy_lines(model, form)
-    return {"text": text, "latex": latex_document, "latex-fragment": latex_fragment}[language](
-        model, form
-    )
+    writers = (text, latex_document, latex_fragment, sympy_lines, json_text)
+    return dict(zip(FORMATS, writers, strict=True))[language](model, form)
 
 
 @dataclass(frozen=True)
@@ -79,8 +74,8 @@ def notes(model: SymbolicModel) -> list[str]:
     if model.model.axes:
         symmetric = ", those below the diagonal are those above it" if model.model.symmetric else ""
         lines.append(f"Entries that are not shown are zero{symmetric}.")
-    if model.model.name == "forward_dynamics":
-        lines.append("Each entry is to be divided by det A, the last line.")
+    if model.model.denominator:
+        lines.append(f"Each entry is to be divided by {model.model.denominator}, the last line.")
     return [*lines, *passive_notes(model)]
 
 
@@ -132,7 +127,7 @@ def text_lines(model: SymbolicModel, form: str) -> list[str]:
         closed = model.closed
         texts = closed_texts(model)
         if closed.denominator is not None:
-            texts["det A"] = plain(closed.denominator)
+            texts[model.model.denominator] = plain(closed.denominator)
         width = max(map(len, texts), default=0)
         body = [
             line
@@ -239,7 +234,7 @@ def sympy_lines(model: SymbolicModel, form: str) -> str:
 # --- JSON ---
 
 
-def mapping(model: SymbolicModel, form: str) -> dict[str, Any]:
+def json_text(model: SymbolicModel, form: str) -> str:
     """Plain values: labels of the axes, entries or equations as text, what C and S stand for, what
     is to be known of the passive joints.
     """
@@ -263,9 +258,6 @@ def mapping(model: SymbolicModel, form: str) -> dict[str, Any]:
         if closed.denominator is not None:
             values["denominator"] = plain(closed.denominator)
         values["terms"] = closed.size
-        return values
-    values["equations"] = [
-        {"section": e.section, "name": e.name, "expression": e.expression}
-        for e in model.listing.lines
-    ]
-    return values
+    else:
+        values["equations"] = [vars(equation) for equation in model.listing.lines]
+    return json.dumps(values, indent=2, ensure_ascii=False)

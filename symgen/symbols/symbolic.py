@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from symgen.derive.models import MODELS as ALL_MODELS
+from symgen.derive.models import SYMBOLIC
 from symgen.derive.names import Names
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
@@ -24,7 +24,6 @@ def symbolic(
     robot: Robot | str | Path,
     *,
     parameters: str = "base",
-    gravity: str | None = None,
     values: Mapping[str, Any] | None = None,
     passive: str | None = None,
     limit: int = LARGEST,
@@ -38,9 +37,6 @@ def symbolic(
         A robot, a packaged name or a file, as of `load_robot`.
     parameters : str
         "base": the dynamics in base parameters; "standard": in XX1, ..., M1, Ia1, ...
-    gravity : str, optional
-        "number" puts the value of the robot file in the place of its symbol, "symbol" the symbol g
-        in the place of a number; as in the file where left out.
     values : mapping, optional
         Value of any symbol (constants, q1, QP1, QDP1, parameters), by name: a number, or a text as
         in robot files ("pi/2"). Zeros leave the recursion.
@@ -63,10 +59,7 @@ def symbolic(
         A value for a symbol that is none, or functions that passive joints do not have.
     """
     described = robot if isinstance(robot, Robot) else load_robot(robot)
-    return SymbolicRobot(source_of(described, parameters, gravity, values, passive), limit)
-
-
-MODELS = {name: model for name, model in ALL_MODELS.items() if model.symbolic}
+    return SymbolicRobot(source_of(described, parameters, values, passive), limit)
 
 
 @dataclass(frozen=True)
@@ -91,13 +84,13 @@ class SymbolicRobot:
         SymgenError
             If the model or the frame does not exist.
         """
-        if name not in MODELS:
-            raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(MODELS)}")
+        if name not in SYMBOLIC:
+            raise SymgenError(f"no model is called {name!r}; expected one of {', '.join(SYMBOLIC)}")
         robot = self.source.robot
-        if (of is not None or frame) and not MODELS[name].of_frames:
+        if (of is not None or frame) and not SYMBOLIC[name].of_frames:
             raise SymgenError(
                 f"{name} is of no frame; leave out of and frame (they are for "
-                f"{', '.join(m for m in MODELS if MODELS[m].of_frames)})"
+                f"{', '.join(name for name, m in SYMBOLIC.items() if m.of_frames)})"
             )
         if rows is not None and name != "determinant":
             raise SymgenError(f"rows are for the determinant; leave them out of {name}")
@@ -108,7 +101,7 @@ class SymbolicRobot:
                     f"frame {j} does not exist; {robot.name} has frames 0 to {robot.frames[-1].j}"
                 )
         return SymbolicModel(
-            MODELS[name],
+            SYMBOLIC[name],
             self.source,
             self.source.request(of, frame),
             None if rows is None else tuple(rows),
@@ -195,7 +188,7 @@ class SymbolicRobot:
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         """A model of the table as SymPy object: arm.inertia_matrix(), arm.pose(of=6, frame=4)."""
-        if name not in MODELS:
+        if name not in SYMBOLIC:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return partial(self._sympy, name)
 
@@ -203,17 +196,6 @@ class SymbolicRobot:
         self, name: str, of: int | None = None, frame: int = 0, rows: Sequence[int] | None = None
     ) -> Any:
         return of_model(self.model(name, of=of, frame=frame, rows=rows))
-
-    def coriolis(self, by: str = "christoffel") -> Any:
-        """C(q, qd), (n, n): by the Christoffel symbols of A, or by "recursion" over the links; both
-        are the same matrix, Ad - 2C is skew symmetric.
-        """
-        if by not in ("christoffel", "recursion"):
-            raise SymgenError(f"by={by!r}; expected christoffel or recursion")
-        model = self.model("coriolis")
-        if by == "recursion":
-            model = replace(model, model=replace(model.model, name="coriolis by recursion"))
-        return of_model(model)
 
     def base_parameters(self) -> dict[Any, Any]:
         """What each parameter is made of: {ZZ1R: ZZ1 + Ia1 + ...}."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -126,23 +126,20 @@ class SymbolicModel:
             ) from e
 
     def _closed(self) -> ClosedModel:
-        name = self.model.name
-        if name == "base_parameters":
-            formulas = self.source.formulas.values()
-            return ClosedModel({(k,): trees.formula(f) for k, f in enumerate(formulas)}, None, {})
-        if self.model.letter == "C":
-            self.refuse_tied("C(q, qd)")
-        if name == "determinant":
-            return self._determinant()
-        if name == "forward_dynamics":
-            return self._direct()
-        if name == "coriolis" and not any(
-            f"q{j}" in self.source.given for j in self.source.robot.joints
-        ):  # it differentiates by them
-            return self._christoffel()
+        composed = {
+            "formulas": self._formulas,
+            "determinant": self._determinant,
+            "quotient": self._quotient,
+        }
+        if self.model.composed:
+            return composed[self.model.composed]()
         algebra, entries = self._entries(self.model)
         expansion = self._expansion(algebra, entries)
         return self._collected(expansion, {place: expansion.of(x) for place, x in entries.items()})
+
+    def _formulas(self) -> ClosedModel:
+        formulas = self.source.formulas.values()
+        return ClosedModel({(k,): trees.formula(f) for k, f in enumerate(formulas)}, None, {})
 
     def _entries(self, *models: Model, request: Request | None = None) -> tuple[Any, ...]:
         """A graph whose angles are those of all pairs of frames, and the entries of each model."""
@@ -185,37 +182,6 @@ class SymbolicModel:
             if str(x) in used
         }
         return ClosedModel(entries, denominator, angles)
-
-    def _christoffel(self) -> ClosedModel:
-        """C_ij = sum_k 1/2 (dA_ij/dq_k + dA_ik/dq_j - dA_jk/dq_i) qd_k."""
-        joints = self.source.robot.joints
-        n = range(len(joints))
-        algebra, A = self._entries(MODELS["inertia_matrix"])
-        rates = {k: algebra.qd(j) for k, j in enumerate(joints)}
-        expansion = self._expansion(algebra, A, rates)
-        qd = [expansion.of(rate) for rate in rates.values()]
-
-        @cache
-        def dA(i: int, j: int, k: int) -> Polynomial:
-            """dA_ij/dq_k."""
-            return expansion.derivative(expansion.of(A[min(i, j), max(i, j)]), joints[k])
-
-        C: dict[Place, Polynomial] = {
-            (i, j): expansion.halved(
-                sum(expansion.mul(dA(i, j, k) + dA(i, k, j) - dA(j, k, i), qd[k]) for k in n)
-            )
-            for i, j in product(n, repeat=2)
-        }
-        return self._collected(expansion, C)
-
-    def refuse_tied(self, what: str) -> None:
-        if self.source.closure.tied:
-            tied = ", ".join(f"q{u}" for u in self.source.closure.tied)
-            raise SymgenError(
-                f"{what} of {self.source.robot.name} has no closed form in its actuated joints "
-                f"while {tied} are symbols; "
-                "bias has C qd + Q + friction, with the passive joints as symbols"
-            )
 
     def _determinant(self) -> ClosedModel:
         """Of the whole Jacobian in the frames that give the fewest terms: neither the frame nor the
@@ -266,7 +232,7 @@ class SymbolicModel:
             )
         return moved
 
-    def _direct(self) -> ClosedModel:
+    def _quotient(self) -> ClosedModel:
         """qdd = adj(A) (Gamma - H) / det A, by Cramer's rule."""
         robot = self.source.robot
         n = range(len(robot.joints))
@@ -295,18 +261,9 @@ class SymbolicModel:
         where the model has none.
         """
         if self.model.cases is None:
-            works = {
-                "determinant": "form closed, or the equations of jacobian",
-                "forward_dynamics": (
-                    "A qdd = Gamma - H, with the equations of inertia_matrix and bias"
-                ),
-                "base_parameters": (
-                    "form closed, or symgen show ROBOT --recursive for the regrouping link by link"
-                ),
-            }[self.model.name]
-            raise SymgenError(f"{self.model.name} has no recursion; what works is {works}")
-        if self.model.name == "coriolis":
-            self.refuse_tied("C(q, qd)")
+            raise SymgenError(
+                f"{self.model.name} has no recursion; what works is {self.model.instead}"
+            )
         values = self.model.values(self.source.derivation, self.request, by_steps=True)
         by_place = {entry.place: entry.value for entry in values.entries}
         outputs = {place: by_place[place] for place in self.places if place in by_place}

@@ -12,17 +12,18 @@ from symgen.certify.shown import certified_model
 from symgen.certify.tables import certified_formulas
 from symgen.certify.witness import ungrouped
 from symgen.cli.main import app
+from symgen.derive.models import SYMBOLIC
 from symgen.description import load_robot
 from symgen.errors import CertificateError, SymgenError
 from symgen.regroup.regrouping import regroup
-from symgen.symbols.symbolic import MODELS, SymbolicRobot, symbolic
+from symgen.symbols.symbolic import SymbolicRobot, symbolic
 
 ROBOTS = ("planar_2r", "scara", "emps", "emps_asymmetric", "haptic", "four_bar", "five_bar")
 CASES = [
     (robot, parameters, model)
     for robot in ROBOTS
     for parameters in ("base", "standard")
-    for model in MODELS
+    for model in SYMBOLIC
 ]
 
 

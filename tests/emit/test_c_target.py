@@ -5,7 +5,6 @@ deterministic, closed to hostile texts.
 from __future__ import annotations
 
 import ctypes
-import platform
 import shutil
 import subprocess
 from dataclasses import replace
@@ -19,7 +18,6 @@ from campaign import campaign, sampled
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
-from symgen.emit import c_parts
 from symgen.emit.generate import generate_files
 
 FLAGS = [
@@ -156,27 +154,8 @@ def test_portable_path(name: str, compiler: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_long_bodies_in_parts(
-    compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Every kernel cut into functions of a few lines says the same, without warnings, in one width."""
-    monkeypatch.setattr(c_parts, "LONG", 30)
-    monkeypatch.setattr(c_parts, "PART", 25)
-    text = generate_files(load_robot("two_branch"), targets=("c",), command="two_branch")[
-        "two_branch.c"
-    ]
-    assert all(f"PART static void {name}_part2(" in text for name in FUNCTIONS)
-    width = ['-DWIDTH="sse2"'] if platform.machine() == "x86_64" else []
-    library = ctypes.CDLL(str(compiled(tmp_path, text, compiler, [*FAST, *width])))
-    compare(library, numpy_module("two_branch", files("two_branch")["two_branch.py"]), (1, 131))
-
-
-@needs_compiler
 def test_long_chain(tmp_path: Path) -> None:
-    """Ten joints: bodies in parts of their own accord, headings that come again in one part (the
-    columns of the inertia matrix).
-    """
+    """Ten joints: headings that come again in one body (the columns of the inertia matrix)."""
     frames = "\n".join(
         (
             f"  {j}: {{ant: {j - 1}, sigma: 0, alpha: {('0', '-pi/2', 'pi/2')[j % 3]}, d: L, "
@@ -193,7 +172,6 @@ def test_long_chain(tmp_path: Path) -> None:
         file="chain.yaml",
     )
     emitted_files = generate_files(robot, targets=("numpy", "c"))
-    assert "inertia_matrix_part3(" in emitted_files["chain.c"]
     library = ctypes.CDLL(
         str(
             compiled(

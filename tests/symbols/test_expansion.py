@@ -69,7 +69,7 @@ def drawn(expansion: Expansion, units: list[Any], rng: np.random.Generator) -> A
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_tidy_and_derivative(seed: int) -> None:
+def test_tidy(seed: int) -> None:
     expansion, units = ring()
     rng = np.random.default_rng(seed)
     a = drawn(expansion, units, rng)
@@ -78,13 +78,6 @@ def test_tidy_and_derivative(seed: int) -> None:
         assert sum(map(len, short.values())) <= sum(map(len, polynomial.values()))
         assert value(expansion, short, Q) == pytest.approx(
             value(expansion, polynomial, Q), rel=1e-12, abs=1e-12
-        )
-    h = 1e-6
-    for j in (2, 3, 5):
-        up, down = (Q | {f"q{j}": Q[f"q{j}"] + step} for step in (h, -h))
-        slope = (value(expansion, a, up) - value(expansion, a, down)) / (2 * h)
-        assert value(expansion, expansion.derivative(a, j), Q) == pytest.approx(
-            slope, rel=1e-6, abs=1e-7
         )
 
 

@@ -221,7 +221,6 @@ def test_bad_input_is_one_sentence_with_what_works(asked: dict, told: str) -> No
         ({"values": {"D2": "1 +"}}, "in '1 +'"),
         ({"values": {"D2": "__import__('os')"}}, "__import__"),
         ({"parameters": "minimal"}, "expected one of base, standard"),
-        ({"gravity": "none"}, "expected one of symbol, number"),
         ({"passive": "none"}, "expected one of functions, symbols"),
     ],
 )
@@ -269,24 +268,12 @@ def test_steps_give_way_to_constants(constant: str, model: str, form: str) -> No
     assert re.sub(r"\b([A-Z]+\d+)_", r"\1", text) == shown("L")
 
 
-def test_gravity_as_symbol_or_number() -> None:
-    assert (
-        symbolic("planar_2r", gravity="number")
-        .gravity()
-        .free_symbols.isdisjoint({sympy.Symbol("g", real=True)})
-    )
-    weightless = symgen.parse_robot(
-        b"symgen: 1\nname: a\ngravity: [0, -9.81, 0]\nframes:\n  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}\n",
-        "a.yaml",
-    )
+def test_gravity_as_number() -> None:
     g = sympy.Symbol("g", real=True)
-    by_number, by_symbol = (
-        symbolic(weightless, gravity=kind).gravity()[0] for kind in (None, "symbol")
-    )
-    assert (
-        g in by_symbol.free_symbols
-        and sympy.expand(by_symbol.subs(g, sympy.Rational("9.81")) - by_number) == 0
-    )
+    models = symbolic("planar_2r"), symbolic("planar_2r", values={"g": 9.81})
+    by_symbol, by_number = (m.gravity()[0] for m in models)
+    assert g in by_symbol.free_symbols and g not in by_number.free_symbols
+    assert sympy.expand(by_symbol.subs(g, sympy.Rational("9.81")) - by_number) == 0
 
 
 def test_formulas_to_sympy_are_the_base_parameters() -> None:
