@@ -22,7 +22,7 @@ and Langou (2012) for TSQR.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -181,16 +181,53 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
             f"W has shape {W.shape}; got Y of shape {Y.shape}, {sum(rows)} rows over the joints "
             f"and {len(names)} names"
         )
+    return Factor.of(names, *joint_factors(W, Y, rows, np.zeros(r, dtype=int)))
+
+
+def joint_factors(
+    W: Array,
+    Y: Array,
+    rows: Sequence[int],
+    parts: Array,
+    columns: Sequence[Array] | None = None,
+) -> list[tuple[JointFactor, ...]]:
+    """Factors by joint of each part of the rows.
+
+    Parameters
+    ----------
+    W, Y, rows
+        As of `factor`.
+    parts : ndarray of int, shape (r,)
+        Number of the part of each row, from 0.
+    columns : sequence of ndarray of int, optional
+        C_j of each joint; default: those that are not zero in its rows.
+    """
     if not (np.isfinite(W).all() and np.isfinite(Y).all()):
         raise ValueError(
             "W or Y holds values that are not finite; leave those samples out of the record"
         )
-    joints = []
-    start = 0
-    for count in rows:
-        W_j, Y_j = W[start : start + count], Y[start : start + count]
-        columns = np.flatnonzero(W_j.any(axis=0))
-        R_j = np.asarray(np.linalg.qr(np.column_stack([W_j[:, columns], Y_j]), mode="r"))
-        joints.append(JointFactor(columns, R_j, count))
-        start += count
-    return Factor.of(names, joints)
+    by_joint, count = [], int(parts.max(initial=0)) + 1
+    for j, end in enumerate(np.cumsum(rows)):
+        own = slice(end - rows[j], end)
+        C = np.flatnonzero(W[own].any(axis=0)) if columns is None else columns[j]
+        order = np.argsort(parts[own], kind="stable")
+        ends = np.cumsum(np.bincount(parts[own], minlength=count))[:-1]
+        A = np.vstack([W[own].T[C], Y[own]])[:, order]
+        by_joint.append(
+            [JointFactor(C, triangularise(x.T), x.shape[1]) for x in np.split(A, ends, axis=1)]
+        )
+    return list(zip(*by_joint, strict=True))
+
+
+def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
+    """Factors by joint of all rows, from those of several sets of rows with the same columns."""
+    return tuple(
+        same[0]
+        if len(same) == 1
+        else JointFactor(
+            same[0].columns,
+            triangularise(np.vstack([joint.R for joint in same])),
+            sum(joint.rows for joint in same),
+        )
+        for same in zip(*parts, strict=True)
+    )

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.rows.factor import Factor, factor, selected
-from runtime.rows.segments import Segment, Window, cut, merged
+from runtime.rows.factor import Factor, factor, joint_factors, merged, selected
+from runtime.rows.segments import Cuts, Segment, Window, within
 
 Array = np.ndarray
 
@@ -185,7 +185,17 @@ class Observation:
             return self.reduced.segments
         if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
             return None
-        return cut(self.W, self.Y, [self.joint(j) for j in range(self.n)], self.blocks())
+        parts = joint_factors(self.W, self.Y, self.rows, self.blocks())
+        return tuple(Segment(0, k, (), joints) for k, joints in enumerate(parts))
+
+    def cut(self, record: int, cuts: Cuts, columns: Sequence[Array]) -> list[Segment]:
+        """Segments of the rows of one record; columns : C_j, columns that act on joint j."""
+        keys, of_row = cuts.segments(self.t)
+        parts = joint_factors(self.W, self.Y, self.rows, of_row, columns)
+        return [
+            Segment(record, int(block), tuple(map(bool, inside)), joints)
+            for (block, *inside), joints in zip(keys, parts, strict=False)
+        ]
 
     def columns(self, names: Sequence[str]) -> Observation:
         """The same rows with the named columns alone, in the order given."""
@@ -245,10 +255,7 @@ class Observation:
             w = self.reduced.windows.index((t0, t1))
             part = self._of_segments([s for s in self.reduced.segments if s.inside[w]])
         else:
-            part = self.where(
-                (self.t >= (-np.inf if t0 is None else t0))
-                & (self.t <= (np.inf if t1 is None else t1))
-            )
+            part = self.where(within(self.t, (t0, t1)))
         if not any(part.rows):
             raise InputError(
                 f"no row in [{t0}, {t1}] s; the rows lie in [{self.span[0]:g}, {self.span[1]:g}] s"
@@ -395,21 +402,25 @@ def stack(observations: Sequence[Observation]) -> Observation:
                 f"columns {o.names} on {o.n} joints; expected those of the first record, "
                 f"{first.names} on {first.n} joints"
             )
-    offsets = np.cumsum([0] + [int(o.record.max(initial=-1)) + 1 for o in observations])
-    order = [
-        (o, o.joint(j), k)
-        for j in range(first.n)
-        for o, k in zip(observations, offsets, strict=False)
-    ]
+    offsets = np.cumsum([0] + [int(o.record.max(initial=0)) + 1 for o in observations])
+    return in_time(
+        [replace(o, record=o.record + k) for o, k in zip(observations, offsets, strict=False)]
+    )
+
+
+def in_time(observations: Sequence[Observation]) -> Observation:
+    """Parts of one system that follow each other, with the same columns, as one, joint-major."""
+    first = observations[0]
+    order = [(o, o.joint(j)) for j in range(first.n) for o in observations]
     W = np.empty((sum(sum(o.rows) for o in observations), len(first.names)), order="F")
-    np.concatenate([o.W[rows] for o, rows, _ in order], out=W)
+    np.concatenate([o.W[rows] for o, rows in order], out=W)
     return Observation(
         W=W,
-        Y=np.concatenate([o.Y[rows] for o, rows, _ in order]),
+        Y=np.concatenate([o.Y[rows] for o, rows in order]),
         rows=tuple(sum(o.rows[j] for o in observations) for j in range(first.n)),
         names=first.names,
-        t=np.concatenate([o.t[rows] for o, rows, _ in order]),
-        record=np.concatenate([o.record[rows] + k for o, rows, k in order]),
+        t=np.concatenate([o.t[rows] for o, rows in order]),
+        record=np.concatenate([o.record[rows] for o, rows in order]),
         rate=max(o.rate for o in observations),
         dropped={
             reason: tuple(

@@ -11,7 +11,6 @@ read what they need.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -20,16 +19,15 @@ from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import Workers, in_order, started
 from runtime.records.stream import RecordStream, Stream
-from runtime.rows.by_blocks import BlockTask, Layout, piece_rows, row_counts
+from runtime.rows.by_blocks import BlockTask, piece_rows, row_counts
 from runtime.rows.observation import (
     HELD,
     Observation,
     Reduced,
-    all_files,
     default_block,
     halves,
+    in_time,
     rows_reduced,
-    same_settings,
     stack,
 )
 from runtime.rows.pieces import Piece, pieces
@@ -39,11 +37,11 @@ from runtime.rows.prepared import (
     decimated_torque,
     prepared,
     record_of,
-    settings_of,
 )
-from runtime.rows.segments import HeldRows, SegmentFactors, Window
-from runtime.rows.selection import instants_of
+from runtime.rows.segments import Cuts, Segment, Window, joined
+from runtime.rows.selection import instants_of, nothing_left
 from runtime.settings.study import Study
+from runtime.signals.states import sentences
 
 Array = np.ndarray
 
@@ -149,16 +147,12 @@ def _observed_by_blocks(
     A record is read once; twice where rows are left out by speed, since their number is needed
     first.
     """
-    records = [
-        (
-            k,
-            stream,
-            instants_of(stream.times(), stream.rate, study.signals, study.rows, stream.name),
-        )
-        for k, stream in enumerate(streams)
-    ]
+    signals, chosen, numbers = study.signals, study.rows, range(len(streams))
+    instants = [instants_of(x.times(), x.rate, signals, chosen, x.name) for x in streams]
     every = [
-        piece for k, stream, whole in records for piece in pieces(k, stream, study.signals, whole)
+        piece
+        for k, stream, whole in zip(numbers, streams, instants, strict=True)
+        for piece in pieces(k, stream, signals, whole)
     ]
     task = BlockTask(model, tuple(streams), study, constants).with_starts(every)
     if not all(stream.in_any_order for stream in streams):
@@ -166,69 +160,50 @@ def _observed_by_blocks(
     asked = (
         every
         if task.filters_choose
-        else [Piece(k, 0, len(stream), whole, ()) for k, stream, whole in records]
+        else [Piece(k, 0, len(streams[k]), instants[k], ()) for k in numbers]
     )
-    counted = list(zip(asked, in_order(row_counts, task, asked, workers), strict=True))
-    layouts = [
-        Layout.of(
-            stream,
-            study,
-            whole,
-            [part for piece, part in counted if piece.record == k],
-            task.skimmed.get(k),
-        )
-        for k, stream, whole in records
-    ]
-    counts = np.array([at.rows for at in layouts])
-    names, columns = tuple(model.BASE_PARAMETERS), task.columns
-    held = 8 * int(counts.sum()) * len(names) <= HELD
+    rows = np.zeros((len(streams), len(model.JOINTS)), dtype=int)
+    spans = np.array([[np.inf, -np.inf]] * len(streams))
+    for piece, (count, t0, t1) in zip(
+        asked, in_order(row_counts, task, asked, workers), strict=True
+    ):
+        rows[piece.record] += count
+        first, last = spans[piece.record]
+        spans[piece.record] = min(first, t0), max(last, t1)
+    held = 8 * int(rows.sum()) * len(model.BASE_PARAMETERS) <= HELD
     if needed_by and not held:
         raise rows_reduced(needed_by)
-    rows = tuple(counts.sum(axis=0).tolist())
-    rate = max(stream.rate / whole.factor for _, stream, whole in records)
-    span = min(at.t0 for at in layouts), max(at.t1 for at in layouts)
+    rate = max(x.rate / whole.factor for x, whole in zip(streams, instants, strict=True))
+    span = float(spans[:, 0].min()), float(spans[:, 1].max())
     cuts = tuple(windows if windows is not None else study.validate.split or halves(*span))
-    length = float(study.estimate.options.get("block") or default_block(rows, rate))
-    kept = HeldRows(columns, counts if held else np.array([at.shown for at in layouts]), len(names))
-    factors = tuple(SegmentFactors(k, at.t0, length, cuts, columns) for k, at in enumerate(layouts))
-    wanted = replace(task, factors=None if held else deepcopy(factors))
-    for piece, (blocks, own) in zip(
-        every, in_order(piece_rows, wanted, every, workers), strict=True
+    in_all = tuple(rows.sum(axis=0).tolist())
+    length = float(study.estimate.options.get("block") or default_block(in_all, rate))
+    if not held:
+        task = replace(task, cuts=tuple(Cuts(float(t0), length, cuts) for t0, _ in spans))
+    parts: list[list[Observation]] = [[] for _ in streams]
+    segments: list[Segment] = []
+    counts = dict(task.skimmed)
+    for piece, (own, reduced, stage) in zip(
+        every, in_order(piece_rows, task, every, workers), strict=True
     ):
-        for block in blocks:
-            kept.take(piece.record, *block)
-        if own is not None:
-            factors[piece.record].join(own)
-    settings = same_settings(
-        [settings_of(study.signals, study.rows, whole.factor) for *_, whole in records]
-    )
-    observation = Observation(
-        W=kept.transposed.T,
-        Y=kept.Y,
-        rows=kept.rows,
-        names=names,
-        t=kept.t,
-        record=kept.record,
-        rate=rate,
-        dropped={
-            reason: tuple(np.sum([at.dropped[reason] for at in layouts], axis=0).tolist())
-            for reason in layouts[0].dropped
-        },
-        settings={**settings, "stream": {"block": max(stream.block for stream in streams)}},
-        files=all_files([stream.origin.files for stream in streams]),
-        findings=tuple(dict.fromkeys(text for at in layouts for text in at.findings)),
-    )
+        parts[piece.record] += own
+        segments += reduced
+        if stage is not None:
+            counts.setdefault(piece.record, stage).join(stage)
+    records = []
+    for k, stream in enumerate(streams):
+        own = in_time(parts.pop(0))
+        dropped = {**own.dropped, "trim": (2 * chosen.trim,) * stream.n}
+        if not rows[k].any():
+            raise InputError(nothing_left(dropped, instants[k].kept), file=stream.name)
+        found = sentences(counts[k].findings, stream.name) if k in counts else ()
+        records.append(replace(own, dropped=dropped, files=stream.origin.files, findings=found))
+    observation = stack(records)
+    stream = {"block": max(stream.block for stream in streams)}
+    observation = replace(observation, settings={**observation.settings, "stream": stream})
     if held:
         return observation
-    no_rows = np.empty(0)
-    segments = tuple(segment for of_record in factors for segment in of_record.finish())
-    reduced = Reduced(segments, cuts, span, length, observation)
+    reduced = Reduced(joined(segments), cuts, span, length, observation)
     return replace(
-        observation,
-        W=np.empty((0, len(names))),
-        Y=no_rows,
-        t=no_rows,
-        record=no_rows.astype(int),
-        rows=rows,
-        reduced=reduced,
+        observation.where(np.zeros(len(observation.Y), dtype=bool)), rows=in_all, reduced=reduced
     )

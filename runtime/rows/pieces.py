@@ -10,7 +10,7 @@ results are joined in the order of time: they agree in every bit, however many p
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, log
 
 import numpy as np
@@ -58,12 +58,16 @@ class Piece:
     stretches: tuple[tuple[int, int, int, int], ...]
 
 
-def chunks(whole: Instants) -> Iterator[Instants]:
-    """CHUNK used instants at a time, with the samples that the decimation asks for."""
+def chunks(whole: Instants) -> Iterator[tuple[slice, Instants]]:
+    """The samples that decide CHUNK used instants at a time, and these instants, counted from the
+    first of the samples.
+    """
     far = decimation_reach(whole.factor)
     for a in range(*whole.used, CHUNK):
         b = min(a + CHUNK, whole.used[1])
-        yield whole.part(whole.sample(a) - far, whole.sample(b - 1) + far + 1, (a, b))
+        begin = max(whole.sample(a) - far, whole.start)
+        end = min(whole.sample(b - 1) + far + 1, whole.stop)
+        yield slice(begin, end), whole.part(begin, end, (a, b))
 
 
 def pieces(record: int, stream: Stream, signals: Signals, whole: Instants) -> list[Piece]:
@@ -82,9 +86,7 @@ def pieces(record: int, stream: Stream, signals: Signals, whole: Instants) -> li
             if signals.reader == "counts":
                 begin, end = own[0][0], own[-1][3]
             shifted = tuple((x[0] - begin, x[1] - begin, x[2] - begin, x[3] - begin) for x in own)
-            part = whole.part(begin, end, used)
-            inside = replace(part, start=part.start - begin, stop=part.stop - begin)
-            found.append(Piece(record, begin, end, inside, shifted))
+            found.append(Piece(record, begin, end, whole.part(begin, end, used), shifted))
     return found
 
 

@@ -30,7 +30,8 @@ from runtime.rows.observation import Observation, column_numbers
 from runtime.rows.regressor import decimated_columns
 from runtime.rows.selection import Selection, certain_rows, nothing_left, select_rows
 from runtime.settings.study import Rows, Signals, Study, to_mapping
-from runtime.signals.filters import States, decimated, filtered_states, median_filtered
+from runtime.signals.decimation import decimate
+from runtime.signals.filters import States, filtered_states, median_filtered
 from runtime.signals.states import observed_states
 
 Array = np.ndarray
@@ -161,8 +162,13 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
     """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
     filter, window, decimation.
     """
-    windowed = median_filtered(tau, selection.signals.median)[selection.samples]
-    return decimated(np.ascontiguousarray(windowed.T), selection.factor, selection.signals.decimate)
+    return decimated_rows(median_filtered(tau, selection.signals.median), selection)
+
+
+def decimated_rows(tau: Array, selection: Selection) -> Array:
+    """The same of torques behind their median filter."""
+    windowed, plan = np.ascontiguousarray(tau[selection.samples].T), selection.plan
+    return windowed if plan is None else decimate(windowed, plan)
 
 
 def observation_from_states(
@@ -183,6 +189,26 @@ def observation_from_states(
     uncertain ("direction") are left out as well.
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
+    observation = rows_of(
+        model, states, torque, selection, files=files, columns=columns, constants=constants
+    )
+    if not any(observation.rows):
+        left_out = nothing_left(observation.dropped, selection.mask.shape[1])
+        raise InputError(left_out, file=", ".join(files or ()) or None)
+    return observation
+
+
+def rows_of(
+    model: GeneratedModel,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+    columns: Sequence[str] | None = None,
+    constants: Mapping[str, float] | None = None,
+) -> Observation:
+    """The same of a part of a record, which may be without rows."""
     check_states(model, states.q, states.qd, states.qdd)
     n, K = selection.mask.shape
     if torque.shape != (n, K) or len(model.JOINTS) != n:
@@ -193,13 +219,9 @@ def observation_from_states(
     names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
     numbers = column_numbers(names, model.BASE_PARAMETERS)
     window = states[selection.samples]
-    store = decimated_columns(
-        model, window, selection.factor, selection.signals.decimate, constants or {}, numbers
-    )
+    store = decimated_columns(model, window, selection.plan, constants or {}, numbers)
     selection = certain(model, states, selection, constants)
     mask = selection.mask.ravel()
-    if not mask.any():
-        raise InputError(nothing_left(selection.dropped, K), file=", ".join(files or ()) or None)
     return Observation(
         W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
         Y=torque.ravel()[mask],

@@ -17,9 +17,8 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel
-from runtime.settings.study import Decimate
 from runtime.signals.decimation import Decimation, Plan
-from runtime.signals.filters import States, decimation_plan
+from runtime.signals.filters import States
 
 Array = np.ndarray
 
@@ -47,14 +46,14 @@ class Entries:
 def decimated_columns(
     model: GeneratedModel,
     states: States,
-    factor: int,
-    settings: Decimate | None,
+    plan: Plan | None,
     constants: Mapping[str, float],
     columns: Sequence[int] | None = None,
 ) -> Array:
     """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the
     window.
 
+    plan : of the decimation; None keeps every sample.
     columns : numbers of the columns wanted, in the order wanted; default: all b. Others are not
     filtered.
     """
@@ -62,9 +61,7 @@ def decimated_columns(
         np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
     )
     entries = distinct_entries(model, constants, wanted)
-    signals = DecimatedSignals(
-        model, entries, constants, decimation_plan(len(states), factor, settings)
-    )(states)
+    signals = DecimatedSignals(model, entries, constants, plan)(states)
     store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
     store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
     return store

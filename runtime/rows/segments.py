@@ -1,4 +1,4 @@
-"""Rows of W that come block by block: kept, or reduced to triangular factors of segments of time.
+"""Rows of W reduced to triangular factors of segments of time.
 
 Time is cut into segments at the ends of the blocks of residuals
 (`runtime.estimators.block_covariance`) and of the windows of a validation.
@@ -18,11 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.rows.factor import Array, JointFactor, triangularise
+from runtime.rows.factor import Array, JointFactor, merged
 
 Window = tuple[float | None, float | None]
-
-PENDING = 4096  # rows of a joint gathered before they are triangularised
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,191 +45,45 @@ class Segment:
     joints: tuple[JointFactor, ...]
 
 
-def merged(parts: Iterable[Sequence[JointFactor]]) -> tuple[JointFactor, ...]:
-    """Factors by joint of all rows, from those of several sets of rows with the same columns."""
-    return tuple(
-        JointFactor(
-            same[0].columns,
-            triangularise(np.vstack([joint.R for joint in same])),
-            sum(joint.rows for joint in same),
-        )
-        for same in zip(*parts, strict=True)
-    )
+@dataclass(frozen=True)
+class Cuts:
+    """Where the time of a record is cut.
 
-
-def cut(W: Array, Y: Array, joints: Sequence[slice], blocks: Array) -> tuple[Segment, ...]:
-    """Segments of rows that are held: one for each block of residuals.
-
-    Parameters
+    Attributes
     ----------
-    W, Y : ndarray, shape (r, b) and (r,)
-    joints : sequence of slice
-        Rows of each joint.
-    blocks : ndarray of int, shape (r,)
-        Number of the block of each row, from 0.
-    """
-    if not (np.isfinite(W).all() and np.isfinite(Y).all()):
-        raise ValueError(
-            "W or Y holds values that are not finite; leave those samples out of the record"
-        )
-    factors = []
-    for own in joints:
-        columns = np.flatnonzero(W[own].any(axis=0))
-        order, counts = (
-            np.argsort(blocks[own], kind="stable"),
-            np.bincount(blocks[own], minlength=int(blocks.max()) + 1),
-        )
-        rows = np.vstack([W[own].T[columns], Y[own]])[:, order]
-        parts = np.split(rows, np.cumsum(counts)[:-1], axis=1)
-        factors.append(
-            [JointFactor(columns, triangularise(part.T), part.shape[1]) for part in parts]
-        )
-    return tuple(Segment(0, k, (), same) for k, same in enumerate(zip(*factors, strict=True)))
-
-
-class HeldRows:
-    """The first rows of several records in the order of an Observation: joint by joint, records one
-    after the other.
-
-    Parameters
-    ----------
-    columns : sequence of ndarray of int
-        C_j, columns that act on joint j.
-    counts : ndarray of int, shape (records, n)
-        Rows kept of each record and joint.
-    b : int
-        Number of columns of W.
-    """
-
-    def __init__(self, columns: Sequence[Array], counts: Array, b: int) -> None:
-        self.columns, self.rows = columns, tuple(counts.sum(axis=0).tolist())
-        self.end = np.cumsum(counts.T.ravel()).reshape(
-            counts.T.shape
-        )  # place after the last row of a joint of a record
-        self.next = self.end - counts.T
-        r = int(counts.sum())
-        self.transposed = np.zeros((b, r))
-        self.Y, self.t, self.record = np.empty(r), np.empty(r), np.empty(r, dtype=int)
-
-    def take(self, record: int, t: Array, mask: Array, rows: Sequence[Array]) -> None:
-        """The next rows of a record, as many as are kept: [W_j[:, C_j] Y_j]' of each joint, at the
-        instants t where mask, shape (n, k), is true.
-        """
-        for j, (C, joint) in enumerate(zip(self.columns, rows, strict=True)):
-            start = self.next[j, record]
-            count = min(joint.shape[1], self.end[j, record] - start)
-            place = slice(start, start + count)
-            self.transposed[C, place], self.Y[place] = joint[:-1, :count], joint[-1, :count]
-            self.t[place], self.record[place] = t[mask[j]][:count], record
-            self.next[j, record] += count
-
-
-class SegmentFactors:
-    """The segments of one record, whose rows come in the order of time.
-
-    Parameters
-    ----------
-    record : int
-        Number of the record.
     t0 : float, s
         Time of its first row.
     length : float, s
         Length of a block of residuals.
-    windows : sequence of (float or None, float or None), s
+    windows : tuple of (float or None, float or None), s
         Windows at whose ends a segment ends.
-    columns : sequence of ndarray of int
-        C_j, columns that act on joint j.
     """
 
-    def __init__(
-        self,
-        record: int,
-        t0: float,
-        length: float,
-        windows: Sequence[Window],
-        columns: Sequence[Array],
-    ) -> None:
-        self.record, self.t0, self.length, self.columns = record, t0, length, columns
-        self.ends = [
-            (-np.inf if low is None else low, np.inf if high is None else high)
-            for low, high in windows
-        ]
-        self.R: dict[tuple[int, tuple[bool, ...]], list[RowsFactor]] = {}
+    t0: float
+    length: float
+    windows: tuple[Window, ...]
 
-    def take(self, t: Array, mask: Array, rows: Sequence[Array]) -> None:
-        """Rows [W_j[:, C_j] Y_j]' of every joint, shape (|C_j| + 1, rows of the joint), at the
-        instants t where mask, shape (n, k), is true.
+    def segments(self, t: Array) -> tuple[Array, Array]:
+        """Block of residuals and whether it lies in each window, by segment, shape (segments, 1 +
+        windows), and the number of the segment of every row, shape (r,), of rows at the times t.
         """
-        if not all(np.isfinite(x).all() for x in rows):
-            raise ValueError(
-                "W or Y holds values that are not finite; leave those samples out of the record"
-            )
         block = np.floor((t - self.t0) / self.length + 1e-9).astype(int)
-        inside = np.array(
-            [(t >= low) & (t <= high) for low, high in self.ends], dtype=bool
-        ).reshape(len(self.ends), len(t))
-        changes = np.flatnonzero(np.diff(block) | (inside[:, 1:] != inside[:, :-1]).any(axis=0)) + 1
-        for a, b in zip([0, *changes], [*changes, len(t)], strict=True):
-            if a < b:
-                key = int(block[a]), tuple(inside[:, a].tolist())
-                segment = self.R.setdefault(key, [RowsFactor(len(C) + 1) for C in self.columns])
-                for j, joint in enumerate(segment):
-                    first = np.count_nonzero(mask[j, :a])
-                    joint.take(rows[j][:, first : first + np.count_nonzero(mask[j, a:b])])
-
-    def reduce(self) -> None:
-        """Keep nothing but triangular factors."""
-        for joints in self.R.values():
-            for rows in joints:
-                rows.factor()
-
-    def join(self, later: SegmentFactors) -> None:
-        """Rows that another one took, behind those taken so far."""
-        for key, joints in later.R.items():
-            if key in self.R:
-                for rows, other in zip(self.R[key], joints, strict=True):
-                    rows.join(other)
-            else:
-                self.R[key] = joints
-
-    def finish(self) -> list[Segment]:
-        """The segments, in time."""
-
-        def factors(joints: Sequence[RowsFactor]) -> tuple[JointFactor, ...]:
-            return tuple(
-                JointFactor(C, rows.factor(), rows.count)
-                for C, rows in zip(self.columns, joints, strict=True)
-            )
-
-        return [
-            Segment(self.record, block, inside, factors(joints))
-            for (block, inside), joints in self.R.items()
-        ]
+        keys = np.stack([block, *(within(t, window) for window in self.windows)], axis=1)
+        keys, of_row = np.unique(keys, axis=0, return_inverse=True)
+        return keys, of_row.reshape(-1)
 
 
-class RowsFactor:
-    """R factor of rows that come in parts: R = R factor of [R; new rows]."""
+def within(t: Array, window: Window) -> Array:
+    """Whether t0 <= t <= t1, s; None leaves an end open."""
+    t0, t1 = window
+    return np.asarray(
+        (t >= (-np.inf if t0 is None else t0)) & (t <= (np.inf if t1 is None else t1))
+    )
 
-    def __init__(self, width: int) -> None:
-        self.parts: list[Array] = [np.zeros((0, width))]
-        self.pending = self.count = 0
 
-    def take(self, rows: Array) -> None:
-        """Rows, transposed: shape (width, B)."""
-        self.parts.append(rows.T)
-        self.count += rows.shape[1]
-        self.pending += rows.shape[1]
-        if self.pending >= PENDING:
-            self.factor()
-
-    def join(self, later: RowsFactor) -> None:
-        """Rows that another one took."""
-        R = later.factor()
-        self.parts.append(R)
-        self.count, self.pending = self.count + later.count, self.pending + len(R)
-
-    def factor(self) -> Array:
-        """R of all rows so far."""
-        if self.pending:
-            self.parts, self.pending = [triangularise(np.vstack(self.parts))], 0
-        return self.parts[0]
+def joined(segments: Iterable[Segment]) -> tuple[Segment, ...]:
+    """Segments that come in parts, in the order of their first parts."""
+    parts: dict[tuple[int, int, tuple[bool, ...]], list[Sequence[JointFactor]]] = {}
+    for one in segments:
+        parts.setdefault((one.record, one.block, one.inside), []).append(one.joints)
+    return tuple(Segment(*key, merged(joints)) for key, joints in parts.items())

@@ -17,7 +17,8 @@ from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.rows.sign_errors import switches
 from runtime.settings.study import Rows, Signals
-from runtime.signals.filters import States, decimation_factor, kept_samples
+from runtime.signals.decimation import Plan
+from runtime.signals.filters import States, decimation_factor, decimation_plan, kept_samples
 
 Array = np.ndarray
 
@@ -56,6 +57,12 @@ class Selection:
     rows: Rows
     dropped: Mapping[str, tuple[int, ...]]
 
+    @property
+    def plan(self) -> Plan | None:
+        """The decimation of the window; None where every sample is kept."""
+        window, settings = self.samples, self.signals.decimate
+        return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
+
 
 @dataclass(frozen=True)
 class Instants:
@@ -88,13 +95,15 @@ class Instants:
         return self.start + self.first + (number - self.number) * self.factor
 
     def part(self, begin: int, end: int, used: tuple[int, int]) -> Instants:
-        """The kept instants of the samples [begin, end), of which `used` are used."""
+        """The kept instants of the samples [begin, end), counted from `begin`, of which `used` are
+        used.
+        """
         start, stop = max(self.start, begin), min(self.stop, end)
         ahead = start - self.start
         first = (self.first - ahead) % self.factor
         kept = len(range(first, stop - start, self.factor))
         number = self.number + (ahead + first - self.first) // self.factor
-        return Instants(start, stop, self.factor, first, kept, used, number)
+        return Instants(start - begin, stop - begin, self.factor, first, kept, used, number)
 
 
 def window_of(
@@ -143,35 +152,43 @@ def select_rows(
     (N, n), are the filtered velocities.
     """
     at = instants_of([record.t], record.rate, signals, rows, record.file)
-    kept = np.arange(at.first, at.stop - at.start, at.factor)
-    instants = kept + at.start
-    mask = np.ones((record.n, len(kept)), dtype=bool)
+    usable = None if keep is None else _keep(keep, record)
+    selection = selected(at, record.t, qd, record.rate, signals, rows, usable)
+    if not selection.mask.any():
+        raise InputError(nothing_left(selection.dropped, at.kept), file=record.file)
+    return selection
+
+
+def selected(
+    at: Instants,
+    t: Array,
+    qd: Array,
+    rate: float,
+    signals: Signals,
+    rows: Rows,
+    keep: Array | None = None,
+) -> Selection:
+    """The rows used among these instants of samples at the times t, shape (N,), s, with velocities
+    qd, shape (N, n); keep : samples, and joints, that may be used.
+    """
+    kept, n = np.arange(at.first, at.stop - at.start, at.factor), qd.shape[1]
+    instants, number = kept + at.start, at.number + np.arange(at.kept)
+    mask = np.ones((n, len(kept)), dtype=bool)
     dropped = {}
     for reason, usable in (
-        ("trim", (np.arange(at.kept) >= at.used[0]) & (np.arange(at.kept) < at.used[1])),
+        ("trim", (number >= at.used[0]) & (number < at.used[1])),
         (
             "low_speed",
-            np.abs(qd[instants].T)
-            >= per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None],
+            np.abs(qd[instants].T) >= per_joint(rows.low_speed, n, "rows.low_speed")[:, None],
         ),
-        ("mask", True if keep is None else _keep(keep, record)[instants].T),
+        ("mask", True if keep is None else keep[instants].T),
     ):
         before = mask.sum(axis=1)
         mask &= usable
         dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
-    if not mask.any():
-        raise InputError(nothing_left(dropped, len(kept)), file=record.file)
-    return Selection(
-        slice(at.start, at.stop),
-        kept,
-        mask,
-        at.factor,
-        record.t[instants],
-        record.rate / at.factor,
-        signals,
-        rows,
-        dropped,
-    )
+    window = slice(at.start, at.stop)
+    rate = rate / at.factor
+    return Selection(window, kept, mask, at.factor, t[instants], rate, signals, rows, dropped)
 
 
 def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:

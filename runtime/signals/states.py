@@ -19,8 +19,9 @@ from runtime.model.drives import Drives
 from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.records.record import Record
 from runtime.settings.study import Signals
+from runtime.signals.counts.by_blocks import CountStage
 from runtime.signals.counts.lattice import unwrapped_counts
-from runtime.signals.counts.reading import Reading, read_counts
+from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import SpeedErrors, States, filtered_states
 
 Array = np.ndarray
@@ -34,6 +35,7 @@ def observed_states(
     *,
     missing: Missing | None = None,
     name: str = "record",
+    counts: CountStage | None = None,
 ) -> States:
     """q, qd, qdd of measured joint positions by the reader of the study.
 
@@ -51,6 +53,8 @@ def observed_states(
         Samples of q that hold no position.
     name : str
         What errors call the record.
+    counts : CountStage, optional
+        Reads the counts of a piece of the record, whose findings it keeps; default: q is the whole.
 
     Raises
     ------
@@ -63,10 +67,11 @@ def observed_states(
         return filtered_states(q, rate, signals)
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(q, drives, None if missing is None else missing.at_encoders(drives))
+    if counts is not None:
+        return joint_states(*counts.read(position), rate, signals, drives)
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
-    return replace(
-        joint_states(reading, rate, signals, drives), findings=sentences(reading.findings, name)
-    )
+    states = joint_states(reading.q, reading.speed_errors, rate, signals, drives)
+    return replace(states, findings=sentences(reading.findings, name))
 
 
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
@@ -89,18 +94,18 @@ def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:
     return tuple(f"{name}: {text}." for text in findings)
 
 
-def joint_states(reading: Reading, rate: float, signals: Signals, drives: Drives | None) -> States:
-    """States of a reading, joint side, through the filters of the study; drives : None for encoders
-    on the joint side.
+def joint_states(
+    x: Array, deviation: Array, rate: float, signals: Signals, drives: Drives | None
+) -> States:
+    """States of positions x read at the encoders, shape (N, n), joint side, through the filters of
+    the study.
+
+    deviation : of their velocities, shape (N, n), per s; infinite where the state is unknown.
+    drives : None for encoders on the joint side.
     """
-    q = reading.q if drives is None else drives.joint_position(reading.q)
+    q = x if drives is None else drives.joint_position(x)
     states = filtered_states(q, rate, replace(signals, median=1))
-    return replace(
-        states,
-        errors=SpeedErrors(
-            np.where(reading.unknown, np.inf, reading.s_qd), encoder_root(drives, q.shape[1])
-        ),
-    )
+    return replace(states, errors=SpeedErrors(deviation, encoder_root(drives, q.shape[1])))
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:

@@ -25,7 +25,7 @@ from runtime.model.loading import cache_folder
 from runtime.resolution.c.kernels import SignalEntries
 from runtime.rows.regressor import decimated_columns
 from runtime.settings.study import Decimate
-from runtime.signals.filters import States
+from runtime.signals.filters import States, decimation_plan
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files
 
@@ -256,9 +256,9 @@ def test_decimated_columns_of_both(model: GeneratedModel, warm: Path, changed: b
     constants = {next(iter(model.CONSTANTS)): 0.7} if changed else {}
     given, c = States(*states(903)), in_c(model, warm)
     for columns in (None, [3, 0, len(model.BASE_PARAMETERS) - 1]):
-        for factor, how in ((4, Decimate(factor=4)), (1, None)):
+        for plan in (decimation_plan(903, 4, Decimate(factor=4)), None):
             found, expected = (
-                decimated_columns(m, given, factor, how, constants, columns) for m in (c, model)
+                decimated_columns(m, given, plan, constants, columns) for m in (c, model)
             )
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 

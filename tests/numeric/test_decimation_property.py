@@ -90,10 +90,11 @@ def test_any_parts(kind, N, factor, how, seed, data):
     at = Instants(0, N, factor, first, K, (0, K))
     a = data.draw(st.integers(0, K - 1))
     b = data.draw(st.integers(a + 1, K))
-    part = at.part(at.sample(a) - far, at.sample(b - 1) + far + 1, (a, b))
+    begin = at.sample(a) - far
+    part = at.part(begin, at.sample(b - 1) + far + 1, (a, b))
     plan = decimation_plan(part.stop - part.start, factor, how, part.first)
-    assert part.sample(a) == first + a * factor and plan is not None
-    found = decimate(u[:, part.start : part.stop], plan)
+    assert begin + part.sample(a) == first + a * factor and plan is not None
+    found = decimate(u[:, begin + part.start : begin + part.stop], plan)
     np.testing.assert_allclose(
         found[:, a - part.number : b - part.number],
         whole[:, a:b],

@@ -15,9 +15,8 @@ from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.method import LINEAR, linear_system
 from runtime.estimators.solution import null_groups, solve
 from runtime.loop.methods import METHODS, estimate_of
-from runtime.rows.factor import Factor, factor
+from runtime.rows.factor import Factor, factor, merged
 from runtime.rows.observation import split_rows
-from runtime.rows.segments import merged
 from runtime.settings.study import EstimateSettings
 
 EVERY = [

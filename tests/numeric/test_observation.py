@@ -30,7 +30,7 @@ from runtime.rows.regressor import (
 )
 from runtime.rows.selection import select_rows
 from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
-from runtime.signals.filters import States, decimated, filtered_states
+from runtime.signals.filters import States, decimated, decimation_plan, filtered_states
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE
@@ -124,7 +124,7 @@ def test_opposite_and_constant_signals():
     entries = distinct_entries(model, {})
     assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
     qd = np.random.default_rng(0).normal(size=(300, 2))
-    columns = decimated_columns(model, States(qd, qd, qd), 2, Decimate(), {})
+    columns = decimated_columns(model, States(qd, qd, qd), decimation_plan(300, 2, Decimate()), {})
     np.testing.assert_array_equal(columns[0, 1], -columns[0, 0])
     np.testing.assert_array_equal(columns[1, 0], columns[2, 1])
     np.testing.assert_allclose(columns[3, 0], decimated(np.sign(qd[:, 0]), 2, Decimate()))

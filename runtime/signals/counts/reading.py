@@ -95,6 +95,11 @@ class Reading:
                 np.where(self.s_qd > 0, erf(self.qd / (np.sqrt(2) * self.s_qd)), np.sign(self.qd))
             )
 
+    @property
+    def speed_errors(self) -> Array:
+        """s_qd, infinite where the state is unknown."""
+        return np.where(self.unknown, np.inf, self.s_qd)
+
     def draw(self, rng: np.random.Generator) -> Array:
         """Positions drawn from the posterior, shape (N, n)."""
         x = np.array(self.q)
