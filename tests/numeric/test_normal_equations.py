@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators.normal_equations import least_squares, normal, triangular
+from runtime.estimators.normal_equations import JointEquations
 from runtime.estimators.solution import solve
 from runtime.limits import LIMIT
 from runtime.model.generated import load_model
+from runtime.resolution.c.least_squares import least_squares
+from runtime.rows.factor import Factor, JointFactor
 
 N = 2003  # no multiple of a block
 
@@ -66,20 +68,53 @@ def columns():
     return tuple(np.flatnonzero(column) for column in np.asarray(model().STRUCTURE).T)
 
 
+class Rows:
+    """What `least_squares` reads of rows, in NumPy: [W_j[:, C_j] Y_j] of every joint, by blocks of
+    `size` samples.
+    """
+
+    def __init__(self, q, qd, qdd, tau, size=500):
+        W = model().observation_matrix(q, qd, qdd).reshape(6, len(q), 60)
+        self.joints = [np.column_stack([W[j][:, C], tau[:, j]]) for j, C in enumerate(columns())]
+        self.starts = range(0, len(q), size)
+        self.size = size
+
+    def blocks(self, rows):
+        return [rows[k : k + self.size] for k in self.starts]
+
+    def normal(self):
+        grams = [sum(x.T @ x for x in self.blocks(rows)) for rows in self.joints]
+        return JointEquations(columns(), tuple(grams), 60)
+
+    def gradient(self, X):
+        residuals = [
+            rows[:, -1] - rows[:, :-1] @ X[C]
+            for rows, C in zip(self.joints, columns(), strict=True)
+        ]
+        pairs = zip(self.joints, residuals, strict=True)
+        return [rows[:, :-1].T @ r for rows, r in pairs], np.array([r @ r for r in residuals])
+
+    def factor(self):
+        joints = [
+            JointFactor(C, np.linalg.qr(rows, mode="r"), len(rows))
+            for C, rows in zip(columns(), self.joints, strict=True)
+        ]
+        return Factor.of(model().BASE_PARAMETERS, joints)
+
+
 @lru_cache
-def blocks(swing, size=500):
-    """[W_j[:, C_j] Y_j]' of every joint, by blocks of `size` samples."""
-    return blocks_of(*states(swing), size)
+def rows_of(swing, size=500):
+    return Rows(*states(swing), size)
 
 
-def blocks_of(q, qd, qdd, tau, size=500):
-    W = model().observation_matrix(q, qd, qdd).reshape(6, len(q), 60)
-    rows = [np.vstack([W[j][:, C].T, tau[:, j]]) for j, C in enumerate(columns())]
-    return [[x[:, t0 : t0 + size] for x in rows] for t0 in range(0, len(q), size)]
-
-
-def solved(given, **how):
-    return least_squares(lambda: given, columns(), 60, **how)
+def refined(rows, refinements):
+    """X of the normal equations after some refinements."""
+    equations = rows.normal()
+    cholesky = equations.cholesky()
+    X = cholesky.solve(equations.g)
+    for _ in range(refinements):
+        X = X + cholesky.solve(equations.scattered(rows.gradient(X)[0]))
+    return X
 
 
 @pytest.mark.skipif(
@@ -92,18 +127,21 @@ def test_digits_by_condition_number(swing):
     """
     _, kappa, W, Y = extended(swing)
     eps = np.finfo(float).eps
-    plain, once, twice = (solved(blocks(swing), refinements=k, limit=np.inf) for k in (0, 1, 2))
+    rows = rows_of(swing)
+    plain, once, twice = (error(refined(rows, k), swing) for k in (0, 1, 2))
     by_lstsq = error(np.linalg.lstsq(W, Y, rcond=None)[0], swing)
-    by_factor = error(solve(triangular(blocks(swing), columns(), model().BASE_PARAMETERS)).X, swing)
+    by_factor = error(solve(rows.factor()).X, swing)
     print(
         f"kappa {kappa:.1e}: lstsq {by_lstsq:.1e} factor {by_factor:.1e}",
-        *(f"{error(x.X, swing):.1e}" for x in (plain, once, twice)),
+        *(f"{x:.1e}" for x in (plain, once, twice)),
     )
-    assert error(plain.X, swing) < 10 * kappa**2 * eps
-    assert error(once.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 2, 1e-14)
-    assert error(twice.X, swing) < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 3, 1e-14)
+    assert plain < 10 * kappa**2 * eps
+    assert once < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 2, 1e-14)
+    assert twice < max(10 * by_lstsq, (10 * kappa**2 * eps) ** 3, 1e-14)
     assert by_factor < 10 * by_lstsq + 1e-14
-    assert 0.1 * kappa < once.kappa < 10 * kappa
+    solution = least_squares(rows, np.inf)
+    assert 0.1 * kappa < solution.kappa < 10 * kappa
+    np.testing.assert_array_equal(solution.X, refined(rows, 1))
 
 
 @pytest.mark.parametrize("block", [7, 97, 1000, N, 10 * N])
@@ -112,7 +150,7 @@ def test_blocks_change_nothing(block):
     q, qd, qdd, tau = states(3.0)
     W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
     exact = np.linalg.lstsq(W, Y, rcond=None)[0]
-    found = solved(blocks(3.0, block))
+    found = least_squares(rows_of(3.0, block))
     assert found.method == "normal equations"
     np.testing.assert_allclose(found.X, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
     norms = np.linalg.norm((Y - W @ exact).reshape(6, -1), axis=1)
@@ -120,17 +158,17 @@ def test_blocks_change_nothing(block):
 
 
 def test_residual_norms_of_an_exact_fit():
-    """y'y - X'g would leave sqrt(eps) ||Y||; the refinement reads them from the rows."""
+    """y'y - X'g would leave sqrt(eps) ||Y||; they are read from the rows."""
     q, qd, qdd, _ = states(3.0)
     X = np.arange(1.0, 61.0)
     tau = model().inverse_dynamics(q, qd, qdd, X)
-    found = solved(blocks_of(q, qd, qdd, tau))
+    found = least_squares(Rows(q, qd, qdd, tau))
     np.testing.assert_allclose(found.X, X, rtol=1e-11)
     assert (found.residual_norms < 1e-11 * np.linalg.norm(tau, axis=0)).all()
 
 
 def test_ill_conditioned_rows_go_to_the_triangular_factor():
-    found = solved(blocks(0.1))
+    found = least_squares(rows_of(0.1))
     assert found.method == "triangular factor" and found.kappa > LIMIT.NORMAL_EQUATIONS
     assert error(found.X, 0.1) < 1e-9
 
@@ -138,7 +176,7 @@ def test_ill_conditioned_rows_go_to_the_triangular_factor():
 def test_rows_that_do_not_determine_every_parameter():
     q, qd, qdd, tau = (x.copy() for x in states(3.0))
     q[:, 5], qd[:, 5], qdd[:, 5] = 0.3, 0, 0
-    found = solved(blocks_of(q, qd, qdd, tau))
+    found = least_squares(Rows(q, qd, qdd, tau))
     W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
     assert found.method == "triangular factor" and np.isinf(found.kappa)
     best = np.linalg.norm(Y - W @ np.linalg.lstsq(W, Y, rcond=None)[0])
@@ -148,11 +186,8 @@ def test_rows_that_do_not_determine_every_parameter():
 def test_factor_and_equations_have_the_gram_matrix_of_the_rows():
     q, qd, qdd, tau = states(3.0)
     whole = np.column_stack([model().observation_matrix(q, qd, qdd), tau.T.ravel()])
-    rows = blocks(3.0, 333)
-    equations, factor = (
-        normal(rows, columns(), 60),
-        triangular(rows, columns(), model().BASE_PARAMETERS),
-    )
+    rows = rows_of(3.0, 333)
+    equations, factor = rows.normal(), rows.factor()
     scale = np.outer(*2 * [np.linalg.norm(whole, axis=0)])
     np.testing.assert_allclose(
         equations.A / scale[:60, :60], (whole.T @ whole / scale)[:60, :60], atol=1e-13
