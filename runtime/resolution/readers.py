@@ -256,8 +256,7 @@ class RealEncoders:
         rate, signals = part.record.rate, part.record.selection.signals
         deviation = np.zeros_like(part.x)
         if self.reader == "counts":
-            counts = read_counts(y, rate, delta)
-            read = joint_states(counts.q, counts.speed_errors, rate, signals, None)
+            read = joint_states(*read_counts(y, rate, delta).motion, rate, signals, None)
             assert read.errors is not None
             deviation[:, chosen] = read.errors.deviation
         else:

@@ -70,7 +70,7 @@ def observed_states(
     if counts is not None:
         return joint_states(*counts.read(position), rate, signals, drives)
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
-    states = joint_states(reading.q, reading.speed_errors, rate, signals, drives)
+    states = joint_states(*reading.motion, rate, signals, drives)
     return replace(states, findings=sentences(reading.findings, name))
 
 

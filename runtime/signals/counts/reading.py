@@ -96,9 +96,9 @@ class Reading:
             )
 
     @property
-    def speed_errors(self) -> Array:
-        """s_qd, infinite where the state is unknown."""
-        return np.where(self.unknown, np.inf, self.s_qd)
+    def motion(self) -> tuple[Array, Array]:
+        """q, and s_qd, infinite where the state is unknown."""
+        return self.q, np.where(self.unknown, np.inf, self.s_qd)
 
     def draw(self, rng: np.random.Generator) -> Array:
         """Positions drawn from the posterior, shape (N, n)."""
