@@ -7,14 +7,14 @@ Samples run along the longer side: a record has more samples than joints.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import prod
 from typing import Protocol
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.records.formats.columns import WIDEST, Array, Groups, Table, check_names
+from runtime.records.formats.columns import WIDEST, Array, Groups, Table
 
 
 class Series(Protocol):
@@ -65,12 +65,9 @@ class ArrayTable(Table):
     ----------
     arrays : mapping of str to Series
         What may be read.
-    others : mapping of str to str
-        What else the file holds, in words.
     """
 
     arrays: Mapping[str, Series]
-    others: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.names = tuple(self.arrays)
@@ -98,24 +95,18 @@ class ArrayTable(Table):
             self._series(name)
 
     def scalar(self, name: str) -> float:
-        x = self._array(name)
+        super().require([name])
+        x = self.arrays[name]
         if prod(x.shape) != 1:
             raise InputError(
                 f"{x.shape} values; expected a single number", file=self.file, column=name
             )
         return float(next(x.blocks(1)).reshape(()))
 
-    def _array(self, name: str) -> Series:
-        if name in self.others:
-            raise InputError(
-                f"{self.others[name]}; expected an array of numbers", file=self.file, column=name
-            )
-        check_names([name], self.names, self.file)
-        return self.arrays[name]
-
     def _series(self, name: str) -> Series:
         """The array of that name, if it is one of samples."""
-        x = self._array(name)
+        super().require([name])
+        x = self.arrays[name]
         if len(x.shape) > 2:
             raise InputError(
                 f"shape {x.shape}; expected (N,), (N, k) or (k, N), k columns of N samples",

@@ -5,7 +5,7 @@ asked.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
@@ -98,6 +98,10 @@ class Table(ABC):
         Columns of positions.
     missing : bool
         Whether these may be missing: nan, in a text file an empty field.
+    rows : int
+        Samples of a file whose columns are of one length.
+    others : mapping of str to str
+        What else the file holds under a name, in words.
     """
 
     what: ClassVar[str] = "such a file"
@@ -110,17 +114,28 @@ class Table(ABC):
     digest: str = field(default="", init=False)
     positions: frozenset[str] = field(default=frozenset(), init=False)
     missing: bool = field(default=False, init=False)
+    rows: int = 0
+    others: Mapping[str, str] = field(default_factory=dict)
 
-    @abstractmethod
     def samples(self, groups: Groups) -> int:
         """Length of the named columns."""
+        self.require([name for group in groups for name in group])
+        return self.rows
 
     def note(self, groups: Groups) -> str:
         """What a reader of the named columns should know, a sentence; "" for nothing."""
         return ""
 
     def require(self, names: Sequence[str]) -> None:
-        """Raise InputError unless these columns are there and can be read."""
+        """Raise InputError unless these columns are there and hold numbers."""
+        for name in names:
+            if name in self.others:
+                raise InputError(
+                    f"{self.others[name]}; expected numbers, a time in seconds (or record.rate "
+                    "without columns.t)",
+                    file=self.file,
+                    column=name,
+                )
         check_names(names, self.names, self.file)
 
     def in_any_order(self) -> bool:

@@ -9,7 +9,7 @@ that h5py shows them transposed; they are turned back.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,10 @@ WORDS = {
     "U": "char array",
     "O": "cell array",
 }  # by kind of the dtype that scipy gives
-STRUCT = "a MATLAB struct"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 PLACES = (0, 512)  # where an HDF5 file may begin; MATLAB writes a text of 512 bytes first
 DEEPEST = 4  # structures in one another
+Read = Callable[[Any], np.ndarray | Mapping[str, Any] | str]
 
 
 def open_mat(source: Source) -> ArrayTable:
@@ -61,92 +61,84 @@ def open_mat(source: Source) -> ArrayTable:
                 if classes
                 else None,
             )
-    arrays: dict[str, np.ndarray] = {}
-    for name, x in loaded.items():
-        if isinstance(name, str) and not name.startswith("__") and name not in others:
-            _flatten(name, x, arrays, others)
-    return _table(source, arrays, others)
-
-
-def _flatten(
-    name: str, x: Any, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0
-) -> None:
-    """Put an array of numbers, or those in a structure, among the `arrays`; what cannot be read
-    among the `others`.
-    """
-    dtype = getattr(x, "dtype", None)
-    if isinstance(x, np.ndarray) and is_numeric(x.dtype):
-        arrays[name] = x
-    elif isinstance(x, np.ndarray) and x.dtype.names and x.size == 1 and depth < DEEPEST:
-        others[name] = f"a MATLAB struct of {', '.join(f'{name}.{key}' for key in x.dtype.names)}"
-        for key in x.dtype.names:
-            _flatten(f"{name}.{key}", x[key].flat[0], arrays, others, depth + 1)
-    elif isinstance(x, np.ndarray) and x.dtype.names:
-        others[name] = f"a MATLAB struct array of shape {x.shape}"
-    else:
-        others[name] = f"a MATLAB {WORDS.get(getattr(dtype, 'kind', ''), 'object')}"
+    members = {
+        name: x
+        for name, x in loaded.items()
+        if isinstance(name, str) and not name.startswith("__") and name not in others
+    }
+    return _table(source, members, _of_scipy, others)
 
 
 def _open_hdf5(source: Source) -> ArrayTable:
     import h5py
 
     with h5py.File(source.content(), "r") as archive:
-        arrays: dict[str, np.ndarray] = {}
-        others: dict[str, str] = {}
-        _flatten_hdf5(archive, "", arrays, others)
-        return _table(source, arrays, others)
-
-
-def _flatten_hdf5(
-    group: Any, path: str, arrays: dict[str, np.ndarray], others: dict[str, str], depth: int = 0
-) -> None:
-    for key in group:
-        if key.startswith("#"):
-            continue
-        name = f"{path}{key}"
-        if reason := _unreadable(group, key):
-            others[name] = reason
-            if reason == STRUCT and depth < DEEPEST:
-                others[name] += f" of {', '.join(f'{name}.{own}' for own in group[key])}"
-                _flatten_hdf5(group[key], f"{name}.", arrays, others, depth + 1)
-        else:
-            arrays[name] = _array(group[key])
+        return _table(source, _members(archive), _of_hdf5, {})
 
 
 def _table(
-    source: Source, arrays: Mapping[str, np.ndarray], others: Mapping[str, str]
+    source: Source, members: Mapping[str, Any], read: Read, others: dict[str, str]
 ) -> ArrayTable:
-    return ArrayTable(
-        file=source.file,
-        size=source.size,
-        arrays={name: Held(x) for name, x in arrays.items()},
-        others=others,
-    )
+    arrays: dict[str, np.ndarray] = {}
+    _flatten("", members, read, arrays, others)
+    held = {name: Held(x) for name, x in arrays.items()}
+    return ArrayTable(file=source.file, size=source.size, arrays=held, others=others)
 
 
-def _unreadable(archive: Any, name: str) -> str:
-    """Why a member of a file of version 7.3 is not an array of numbers; "" where it is one. Links
-    to other files are not followed.
+def _flatten(
+    path: str,
+    members: Mapping[str, Any],
+    read: Read,
+    arrays: dict[str, np.ndarray],
+    others: dict[str, str],
+    depth: int = 0,
+) -> None:
+    """Put arrays of numbers, also those in structures, among the `arrays`; what cannot be read
+    among the `others`.
+    """
+    for key, member in members.items():
+        name, x = f"{path}{key}", read(member)
+        if isinstance(x, np.ndarray):
+            arrays[name] = x
+        elif isinstance(x, str):
+            others[name] = x
+        else:
+            others[name] = f"a MATLAB struct of {', '.join(f'{name}.{own}' for own in x)}"
+            if depth < DEEPEST:
+                _flatten(f"{name}.", x, read, arrays, others, depth + 1)
+
+
+def _of_scipy(x: Any) -> np.ndarray | Mapping[str, Any] | str:
+    """The array of numbers, the members of a structure, or what else it is."""
+    if isinstance(x, np.ndarray) and is_numeric(x.dtype):
+        return x
+    if isinstance(x, np.ndarray) and x.dtype.names:
+        if x.size != 1:
+            return f"a MATLAB struct array of shape {x.shape}"
+        return {key: x[key].flat[0] for key in x.dtype.names}
+    return f"a MATLAB {WORDS.get(getattr(getattr(x, 'dtype', None), 'kind', ''), 'object')}"
+
+
+def _members(group: Any) -> dict[str, tuple[Any, str]]:
+    return {key: (group, key) for key in group if not key.startswith("#")}
+
+
+def _of_hdf5(member: tuple[Any, str]) -> np.ndarray | Mapping[str, Any] | str:
+    """The same of a member of a file of version 7.3, as MATLAB shows it. Links to other files are
+    not followed; a mark says where an array is empty and its dimensions are stored in its place.
     """
     import h5py
 
+    archive, name = member
     if not isinstance(archive.get(name, getlink=True), h5py.HardLink):
         return "a link"
     x = archive[name]
-    attributes: Mapping[str, Any] = x.attrs
-    given = attributes.get("MATLAB_class", b"double")
+    given = x.attrs.get("MATLAB_class", b"double")
     kind = given.decode("ascii", "replace") if isinstance(given, bytes) else str(given)
     if isinstance(x, h5py.Group):
-        return "a MATLAB sparse matrix" if "MATLAB_sparse" in attributes else STRUCT
+        return "a MATLAB sparse matrix" if "MATLAB_sparse" in x.attrs else _members(x)
     if kind not in NUMERIC or not is_numeric(x.dtype):
         return f"a MATLAB {kind if kind not in NUMERIC else x.dtype}"
     if x.external is not None or x.is_virtual:
         return "stored in another file"
-    return ""
-
-
-def _array(x: Any) -> np.ndarray:
-    """The numbers as MATLAB shows them; a mark says where an array is empty and its dimensions are
-    stored in its place.
-    """
     return np.empty(0) if "MATLAB_empty" in x.attrs else np.asarray(x[()]).T

@@ -25,7 +25,7 @@ from numpy.lib import format as npy
 from runtime.errors import InputError, first_line
 from runtime.files import require_size
 from runtime.records.formats.arrays import ArrayTable, is_numeric, samples_of, transposed
-from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
+from runtime.records.formats.columns import WIDEST, Array, Source, Table
 
 DAMAGED = (
     *(ValueError, OSError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error, struct.error),
@@ -136,10 +136,6 @@ class MatrixTable(Table):
 
     matrix: Stored
 
-    def samples(self, groups: Groups) -> int:
-        self.require([name for group in groups for name in group])
-        return samples_of(self.matrix.shape)
-
     def parts(
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
     ) -> Iterator[Sequence[Array]]:
@@ -188,7 +184,9 @@ def open_npy(source: Source) -> MatrixTable:
             file=source.file,
         )
     names = tuple(str(i + 1) for i in range(prod(shape) // samples_of(shape)))
-    return MatrixTable(file=source.file, size=source.size, names=names, matrix=matrix)
+    return MatrixTable(
+        file=source.file, size=source.size, names=names, rows=samples_of(shape), matrix=matrix
+    )
 
 
 def archive_of(data: bytes, file: str) -> dict[str, Array]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from runtime.errors import InputError
-from runtime.records.formats.columns import Array, Groups, Source, Table
+from runtime.records.formats.columns import Array, Source, Table
 
 READ = 2**18  # rows read at a time: about one row group of the usual writers
 
@@ -17,27 +16,6 @@ class ParquetTable(Table):
     """Numeric columns of a Parquet file; missing values become nan."""
 
     lazy: Any
-    rows: int
-    others: Mapping[str, str] = field(default_factory=dict)  # columns of other kinds
-
-    def require(self, names: Sequence[str]) -> None:
-        """Raise InputError unless these columns are there and hold numbers."""
-        for name in names:
-            if name in self.others:
-                raise InputError(
-                    (
-                        f"it holds {self.others[name]}, no numbers; write them as numbers, a time "
-                        "in "
-                        "seconds, or give record.rate without columns.t"
-                    ),
-                    file=self.file,
-                    column=name,
-                )
-        super().require(names)
-
-    def samples(self, groups: Groups) -> int:
-        self.require([name for group in groups for name in group])
-        return self.rows
 
     def parts(
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
@@ -61,7 +39,7 @@ def open_parquet(source: Source) -> ParquetTable:
     names = tuple(
         name for name, kind in kinds.items() if kind.is_numeric() or kind == polars.Boolean
     )
-    others = {name: str(kind) for name, kind in kinds.items() if name not in names}
+    others = {name: f"it holds {kind}" for name, kind in kinds.items() if name not in names}
     rows = int(lazy.select(polars.len()).collect().item())
     return ParquetTable(
         file=source.file, size=source.size, names=names, lazy=lazy, rows=rows, others=others
