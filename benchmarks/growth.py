@@ -41,7 +41,7 @@ from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
-from runtime.rows.regressor import DecimatedSignals, distinct_entries
+from runtime.rows.regressor import decimated_signals, distinct_entries
 from runtime.settings.study import CestacSettings, Decimate, Study
 from runtime.signals.filters import States, decimation_plan
 from symgen.description import load_robot, parse_robot
@@ -95,11 +95,9 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
             states = motion(N, len(model.JOINTS))
             found.setdefault(f"regressor, {label}", []).append((N, evaluation(model, states)))
             entries = distinct_entries(model, {})
-            columns = DecimatedSignals(
-                model, entries, {}, decimation_plan(N, 40, Decimate(factor=40))
-            )
+            plan = decimation_plan(N, 40, Decimate(factor=40))
             found.setdefault(f"decimated signals, {label}", []).append(
-                (N, least(lambda: columns(states)))  # noqa: B023
+                (N, least(lambda: decimated_signals(model, entries, {}, plan, states)))  # noqa: B023
             )
     return found
 

@@ -163,32 +163,31 @@ class PieceReader:
     def __init__(self, stream: Stream) -> None:
         self.stream = stream
         self.blocks: Iterator[Block] = iter(())
-        self.held: list[tuple[int, Block]] = []  # with the number of their first sample
-        self.next = len(stream)  # sample that the next block begins with
+        self.held: list[Block] = []
+        self.first = self.next = len(stream)  # samples that `held` and the next block begin with
 
     def read(self, begin: int, end: int) -> Block:
         """t, q, tau and missing samples of [begin, end)."""
         in_any_order = self.stream.in_any_order
-        if in_any_order or begin < (self.held[0][0] if self.held else self.next):
+        if in_any_order or begin < self.first:
             self.blocks = self.stream.blocks(*((begin, end) if in_any_order else ()))
-            self.held, self.next = [], begin if in_any_order else 0
+            self.held, self.first = [], begin if in_any_order else 0
+            self.next = self.first
         while self.next < end:
-            block = next(self.blocks)
-            if self.next + len(block[0]) > begin:
-                self.held.append((self.next, block))
-            self.next += len(block[0])
-        self.held = [(first, x) for first, x in self.held if first + len(x[0]) > begin]
-        shapes = [(end - begin, *x.shape[1:]) for x in self.held[0][1]]
-        whole = [np.empty(s, x.dtype) for s, x in zip(shapes, self.held[0][1], strict=True)]
-        for first, block in self.held:
-            a = max(first, begin)
-            b = max(a, min(first + len(block[0]), end))  # one that is held may lie behind the end
-            for x, part in zip(whole, block, strict=True):
-                x[a - begin : b - begin] = part[a - first : b - first]
+            self.held.append(next(self.blocks))
+            self.next += len(self.held[-1][0])
+            self._forget(begin)
+        self._forget(begin)
+        own = slice(begin - self.first, end - self.first)
+        t, q, tau, missing = (np.concatenate(x)[own] for x in zip(*self.held, strict=True))
         if in_any_order:
             self.held = []
-        t, q, tau, missing = whole
         return t, q, tau, missing
+
+    def _forget(self, begin: int) -> None:
+        """Hold no block that ends before sample `begin`."""
+        while self.held and self.first + len(self.held[0][0]) <= begin:
+            self.first += len(self.held.pop(0)[0])
 
 
 class Queue:

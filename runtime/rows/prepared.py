@@ -167,8 +167,8 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
 
 def decimated_rows(tau: Array, selection: Selection) -> Array:
     """The same of torques behind their median filter."""
-    windowed, plan = np.ascontiguousarray(tau[selection.samples].T), selection.plan
-    return windowed if plan is None else decimate(windowed, plan)
+    windowed = np.ascontiguousarray(tau[selection.samples].T)
+    return windowed if selection.plan is None else decimate(windowed, selection.plan)
 
 
 def observation_from_states(

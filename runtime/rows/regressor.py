@@ -33,6 +33,8 @@ class Entries:
     first met at entry source[s].
 
     row : row of each entry in the wanted store; row = k where every column is wanted.
+    place : row of each signal in what the model evaluates: its store, shape (b n, N), or the
+        signals of a compiled one.
     """
 
     row: Array
@@ -41,6 +43,7 @@ class Entries:
     which: Array
     sign: Array
     source: Array
+    place: Array
 
 
 def decimated_columns(
@@ -61,7 +64,7 @@ def decimated_columns(
         np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
     )
     entries = distinct_entries(model, constants, wanted)
-    signals = DecimatedSignals(model, entries, constants, plan)(states)
+    signals = decimated_signals(model, entries, constants, plan, states)
     store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
     store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
     return store
@@ -73,71 +76,52 @@ class DistinctSignals:
     def __init__(
         self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float]
     ) -> None:
-        self.model, self.constants = model, constants
-        self.rows = (entries.k * len(model.JOINTS) + entries.j)[entries.source]
-        self.numbers = (
-            _numbers(model, entries) if isinstance(model, CompiledSignals) else None
-        )  # in the C file; None: its order, or NumPy
-        self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: store, signals
+        self.model, self.place, self.constants = model, entries.place, constants
+        self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: values, signals
 
     def __call__(self, states: States) -> Array:
         """Signals of the states (B, n), shape (S, B)."""
-        B = len(states)
-        if isinstance(self.model, CompiledSignals):
-            return self._in_c(self.model, states)
+        B, model = len(states), self.model
         if B not in self._room:
-            self._room[B] = self.model.store(B), np.empty((len(self.rows), B))
-        out, signals = self._room[B]
-        try:
-            D = self.model.regressor(states.q, states.qd, states.qdd, out=out, **self.constants)
-        except ValueError as e:  # what an emitted module of a general loop raises
-            raise InputError(
-                f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the "
-                "lengths of the robot file"
-            ) from None
-        return np.take(
-            D.transpose(2, 1, 0).reshape(-1, B), self.rows, axis=0, out=signals, mode="clip"
-        )
-
-    def _in_c(self, model: CompiledSignals, states: States) -> Array:
-        """The same from a compiled model, which gives them without a store."""
-        B = len(states)
-        if B not in self._room:
-            self._room[B] = np.empty((model.signals.count, B)), np.empty((len(self.rows), B))
-        every, signals = self._room[B]
-        model.signal_rows(states.q, states.qd, states.qdd, every, **self.constants)
-        return (
-            every
-            if self.numbers is None
-            else np.take(every, self.numbers, axis=0, out=signals, mode="clip")
-        )
+            compiled = isinstance(model, CompiledSignals)
+            values = np.empty((model.signals.count, B)) if compiled else model.store(B)
+            self._room[B] = values, np.empty((len(self.place), B))
+        values, signals = self._room[B]
+        if isinstance(model, CompiledSignals):  # without a store
+            model.signal_rows(states.q, states.qd, states.qdd, values, **self.constants)
+            if np.array_equal(self.place, np.arange(len(values))):
+                return values
+        else:
+            try:
+                D = model.regressor(states.q, states.qd, states.qdd, out=values, **self.constants)
+            except ValueError as e:  # what an emitted module of a general loop raises
+                raise InputError(
+                    f"{model.NAME}: {e}; look at units and zeros of the positions, and at the "
+                    "lengths of the robot file"
+                ) from None
+            values = D.transpose(2, 1, 0).reshape(-1, B)
+        return np.take(values, self.place, axis=0, out=signals, mode="clip")
 
 
-class DecimatedSignals:
-    """The distinct signals, decimated; room is kept from one call to the next. plan : None keeps
-    every sample.
+def decimated_signals(
+    model: GeneratedModel,
+    entries: Entries,
+    constants: Mapping[str, float],
+    plan: Plan | None,
+    states: States,
+) -> Array:
+    """The distinct signals of the states (N, n) of the window, decimated, shape (S, K).
+
+    plan : None keeps every sample.
     """
-
-    def __init__(
-        self,
-        model: GeneratedModel,
-        entries: Entries,
-        constants: Mapping[str, float],
-        plan: Plan | None,
-    ) -> None:
-        self.signals = DistinctSignals(model, entries, constants)
-        self.decimation = None if plan is None else Decimation(plan, len(entries.source))
-
-    def __call__(self, states: States) -> Array:
-        """Signals of the states (N, n) of the window, shape (S, K)."""
-        if self.decimation is None:
-            blocks = [
-                self.signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, len(states), BLOCK)
-            ]
-            return np.concatenate(blocks, axis=1)
-        for t0, t1 in self.decimation.plan.pieces(BLOCK):
-            self.decimation.take(self.signals(states[t0:t1]), t0)
-        return self.decimation.result()
+    signals = DistinctSignals(model, entries, constants)
+    if plan is None:
+        blocks = [signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, len(states), BLOCK)]
+        return np.concatenate(blocks, axis=1)
+    decimation = Decimation(plan, len(entries.source))
+    for t0, t1 in plan.pieces(BLOCK):
+        decimation.take(signals(states[t0:t1]), t0)
+    return decimation.result()
 
 
 def distinct_entries(
@@ -155,16 +139,17 @@ def distinct_entries(
         return _entries_in_c(model, columns)
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
+    place = k * len(model.JOINTS) + j
     values = _probed(model, constants)[k, j]
     if not np.isfinite(values).all():
         every = np.arange(len(k))
-        return Entries(row, k, j, every, np.ones(len(k)), every)
+        return Entries(row, k, j, every, np.ones(len(k)), every, place)
     sign = np.where(values[:, 0] < 0, -1.0, 1.0)
     _, source, which = np.unique(
         sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True
     )
     which = which.reshape(-1)
-    return Entries(row, k, j, which, sign * sign[source][which], source)
+    return Entries(row, k, j, which, sign * sign[source][which], source, place[source])
 
 
 def _entries_in_c(model: CompiledSignals, columns: Array) -> Entries:
@@ -181,15 +166,8 @@ def _entries_in_c(model: CompiledSignals, columns: Array) -> Entries:
         which.reshape(-1),
         table.sign[wanted].astype(float),
         source,
+        table.signal[wanted][source],
     )
-
-
-def _numbers(model: CompiledSignals, entries: Entries) -> Array | None:
-    """Number of each signal in the C file; None where all of them are wanted, in its order."""
-    table, n = model.signals, len(model.JOINTS)
-    number = dict(zip((table.column * n + table.row).tolist(), table.signal.tolist(), strict=True))
-    numbers = [number[place] for place in (entries.k * n + entries.j)[entries.source].tolist()]
-    return None if numbers == list(range(table.count)) else np.array(numbers, dtype=np.intp)
 
 
 def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:

@@ -26,12 +26,12 @@ from dataclasses import dataclass
 from math import ceil, log2
 
 import numpy as np
-from scipy.signal import butter, cheby1, sosfreqz
+from scipy.signal import cheby1, sosfreqz
 
 from runtime.errors import SettingsError
 from runtime.settings.study import Signals
 from runtime.signals.decimation import CUTOFF, ORDER, RIPPLE
-from runtime.signals.filters import decimation_factor
+from runtime.signals.filters import butterworth, decimation_factor
 
 Array = np.ndarray
 
@@ -82,11 +82,7 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
     low, factor = signals.lowpass, decimation_factor(signals, rate)
     longest = 0.0 if low is None else MEMORY * rate / low.cutoff
     w = np.linspace(0, np.pi, max(FREQUENCIES, 2 ** ceil(log2(max(longest, 1)))) + 1)
-    H = (
-        np.ones_like(w)
-        if low is None
-        else _power(butter(low.order, low.cutoff, fs=rate, output="sos"), w)
-    )
+    H = np.ones_like(w) if low is None else _power(butterworth(rate, low)[0], w)
     on = () if low is None else low.on
     slope = 1j * rate * np.sin(w)
     K1 = H if "q" in on else np.ones_like(w)

@@ -24,8 +24,8 @@ from runtime.rows.factor import factor
 from runtime.rows.observation import stack
 from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.regressor import (
-    DecimatedSignals,
     decimated_columns,
+    decimated_signals,
     distinct_entries,
 )
 from runtime.rows.selection import select_rows
@@ -101,7 +101,7 @@ def test_equal_signals_are_filtered_once():
     assert len(entries.k) == planar.STRUCTURE.sum() == 13
     assert len(entries.source) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
-    signals = DecimatedSignals(planar, entries, {}, None)(states)
+    signals = decimated_signals(planar, entries, {}, None, states)
     D = planar.regressor(states.q, states.qd, states.qdd)
     for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
         np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
@@ -184,7 +184,7 @@ def test_blocks_equal_the_whole(record):
     states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
     np.testing.assert_array_equal(
-        DecimatedSignals(planar, entries, {}, None)(states),
+        decimated_signals(planar, entries, {}, None, states),
         D[entries.k[entries.source], entries.j[entries.source]],
     )
 
