@@ -34,24 +34,15 @@ STORED_NAME = re.compile(r"[\w.+ -]{1,255}")
 
 def open_bag(source: Source) -> JointTable:
     """Table of the messages of a topic."""
+    from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
-    reader: Any
-    decode: Any
-    if source.path.suffix == ".bag":
-        from rosbags import rosbag1
-
-        reader, decode = (
-            rosbag1.Reader(source.path),
-            get_typestore(Stores.ROS1_NOETIC).deserialize_ros1,
-        )
-    else:
-        from rosbags import rosbag2
-
-        reader, decode = (
-            rosbag2.Reader(source.path),
-            get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr,
-        )
+    reader: Any = (rosbag1 if source.path.suffix == ".bag" else rosbag2).Reader(source.path)
+    decode: Any = (
+        get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+        if source.path.suffix == ".bag"
+        else get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
+    )
     with reader:
         topic = _topic(reader.connections, source.topic, source.file)
         messages = list(_messages(reader, topic, decode))

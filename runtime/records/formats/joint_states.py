@@ -135,14 +135,14 @@ class JointTable(Table):
     def _value(self, i: int, joint: str, quantity: str) -> float:
         message = self.messages[i]
         values = getattr(message, quantity)
-        if message.joints.count(joint) == 1 and len(values) == len(message.joints):
-            return float(values[message.joints.index(joint)])
         if joint not in message.joints:
             reason = f"no joint {joint}; it has {', '.join(message.joints) or 'none'}"
         elif len(values) != len(message.joints):
             reason = f"{len(values)} values of {quantity} for {len(message.joints)} joints"
-        else:
+        elif message.joints.count(joint) > 1:
             reason = f"joint {joint} more than once"
+        else:
+            return float(values[message.joints.index(joint)])
         raise InputError(
             f"{reason}; expected every message to hold what the record names",
             file=self.file,
@@ -205,15 +205,10 @@ def _numbered(table: Table) -> tuple[str, ...]:
     """Joints called alike but for a number, 1, 2 ... or 0, 1 ..., in this order."""
     joints = table.joints or ()
     parts = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
-    numbers = sorted(
-        (int(part[2]), joint) for part, joint in zip(parts, joints, strict=True) if part
-    )
-    alike = len({part[1] for part in parts if part}) == 1 and len(numbers) == len(joints)
-    if (
-        not alike
-        or [k for k, _ in numbers] != list(range(numbers[0][0], numbers[0][0] + len(numbers)))
-        or numbers[0][0] > 1
-    ):
+    numbers = sorted((part[1], int(part[2]), part[0]) for part in parts if part)
+    first = min(numbers, default=("", 2, ""))
+    expected = [(first[0], k) for k in range(first[1], first[1] + len(joints))]
+    if first[1] > 1 or [(stem, k) for stem, k, _ in numbers] != expected:
         raise InputError(
             (
                 f"{table.topic} has the joints {', '.join(joints) or '(none)'}; name those of the "
@@ -221,4 +216,4 @@ def _numbered(table: Table) -> tuple[str, ...]:
             ),
             file=table.file,
         )
-    return tuple(name for _, name in numbers)
+    return tuple(joint for *_, joint in numbers)

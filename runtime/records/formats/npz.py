@@ -67,12 +67,16 @@ class Stored:
         Whether columns follow each other.
     dtype : dtype
         Of the numbers.
+    what, file : str
+        What the file should be, and its name, in messages.
     """
 
     open: Callable[[], IO[bytes]]
     shape: tuple[int, ...]
     fortran: bool
     dtype: np.dtype
+    what: str
+    file: str
 
     def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Array]:
         """Consecutive samples of [start, stop), shape (B, k)."""
@@ -97,14 +101,15 @@ class Stored:
                 handle.close()
 
     def _opened(self, offset: int) -> IO[bytes]:
-        handle = self.open()
-        _header(handle)
-        handle.seek(offset, 1)
-        return handle
+        with refused(self.what, self.file):
+            handle = self.open()
+            _header(handle)
+            handle.seek(offset, 1)
+            return handle
 
     def _read(self, handle: IO[bytes], count: int) -> Array:
-        data = handle.read(count * self.dtype.itemsize)
-        return np.frombuffer(data, self.dtype, count)  # ValueError where the file ends early
+        with refused(self.what, self.file):  # also where the file ends early
+            return np.frombuffer(handle.read(count * self.dtype.itemsize), self.dtype, count)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -119,16 +124,6 @@ class ArchiveTable(ArrayTable):
     def in_any_order(self) -> bool:
         return not self.compressed
 
-    def parts(
-        self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
-    ) -> Iterator[Sequence[Array]]:
-        with refused(ARCHIVE, self.file):
-            yield from super().parts(names, size, start, stop)
-
-    def scalar(self, name: str) -> float:
-        with refused(ARCHIVE, self.file):
-            return super().scalar(name)
-
 
 @dataclass(eq=False, kw_only=True)
 class MatrixTable(Table):
@@ -139,9 +134,8 @@ class MatrixTable(Table):
     def parts(
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
     ) -> Iterator[Sequence[Array]]:
-        with refused(SINGLE, self.file):
-            for x in self.matrix.blocks(size, start, stop):
-                yield [x[:, int(name) - 1] for name in names]
+        for x in self.matrix.blocks(size, start, stop):
+            yield [x[:, int(name) - 1] for name in names]
 
 
 ARCHIVE, SINGLE = "an archive of plain arrays", "a file of one plain array"
@@ -156,7 +150,8 @@ def open_npz(source: Source) -> ArchiveTable:
                 member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()
             )
         stored = {
-            name: _stored(partial(_member, source, member)) for name, member in members.items()
+            name: _stored(partial(_member, source, member), ARCHIVE, source.file)
+            for name, member in members.items()
         }
         if objects := [name for name, x in stored.items() if x.dtype.hasobject]:
             raise TypeError(f"{objects[0]} holds pickled objects")
@@ -167,7 +162,7 @@ def open_npz(source: Source) -> ArchiveTable:
 def open_npy(source: Source) -> MatrixTable:
     """Table of a .npy file."""
     with refused(SINGLE, source.file):
-        matrix = _stored(source.open)
+        matrix = _stored(source.open, SINGLE, source.file)
     shape = matrix.shape
     if (
         not is_numeric(matrix.dtype)
@@ -226,10 +221,9 @@ def _header(handle: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
     return (npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0)(handle)
 
 
-def _stored(open_bytes: Callable[[], IO[bytes]]) -> Stored:
-    with open_bytes() as handle:
+def _stored(opened: Callable[[], IO[bytes]], what: str, file: str) -> Stored:
+    with opened() as handle:
         shape, fortran, dtype = _header(handle)
     turned = transposed(shape)  # (k, N) by rows is (N, k) by columns
-    return Stored(
-        open_bytes, shape[::-1] if turned else shape, fortran != turned and len(shape) > 1, dtype
-    )
+    by_columns = fortran != turned and len(shape) > 1
+    return Stored(opened, shape[::-1] if turned else shape, by_columns, dtype, what, file)
