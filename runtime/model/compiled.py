@@ -33,7 +33,7 @@ from runtime.model.compile_cache import (
     NotCompiledError,
     shared_object,
 )
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, check_states, constants_of
 from runtime.model.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
 from runtime.model.narrowing import narrowed_source
 
@@ -50,7 +50,11 @@ STATES = {
 
 
 def compiled_model(
-    model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None
+    model: GeneratedModel,
+    *,
+    source: Path | None = None,
+    cache: Path | None = None,
+    signals: bool = False,
 ) -> GeneratedModel:
     """`model` with its functions in C, or `model` itself, with a FallbackWarning saying why, where
     that cannot be had.
@@ -62,22 +66,10 @@ def compiled_model(
         The C file; default: beside the file of the model, .c for .py.
     cache : Path, optional
         Folder of the compiled objects; default: `loading.cache_folder`.
+    signals : bool
+        Compile the distinct signals of the regressor alone, all else in NumPy: half the time.
     """
-    return _compiled(CompiledModel, model, source, cache)
-
-
-def compiled_signals(
-    model: GeneratedModel, *, source: Path | None = None, cache: Path | None = None
-) -> GeneratedModel:
-    """`model` with the distinct signals of its regressor in C, all else in NumPy: half the time of
-    compiling. Otherwise as `compiled_model`.
-    """
-    return _compiled(CompiledSignals, model, source, cache)
-
-
-def _compiled(
-    kind: type[CompiledSignals], model: GeneratedModel, source: Path | None, cache: Path | None
-) -> GeneratedModel:
+    kind = CompiledSignals if signals else CompiledModel
     try:
         path = source or _beside(model)
         text, folder = _text(path), cache or cache_folder()
@@ -90,7 +82,7 @@ def _compiled(
         compiled.check()
         return cast(GeneratedModel, compiled)
     except (NotCompiledError, OSError) as e:
-        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=3)
+        warnings.warn(f"{model.NAME}: NumPy in place of C: {e}", FallbackWarning, stacklevel=2)
         return model
 
 
@@ -184,7 +176,7 @@ class CompiledSignals:
                 "order"
             )
         inputs = [ctypes.c_void_p(x.ctypes.data) for x in states]
-        values, length = self._constants("signals", constants), ctypes.c_int64(N)
+        values, length = self.constant_values(constants), ctypes.c_int64(N)
         others = ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data)
         if status := getattr(self._library, f"{self.module.NAME}_signals")(
             length, *inputs, length, *others, length
@@ -217,23 +209,13 @@ class CompiledSignals:
         states = tuple(
             np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in given
         )
-        for label, x in zip(STATES[name], states, strict=True):
-            if x.ndim != 2 or x.shape[1] != self._n or x.shape != states[0].shape:
-                raise InputError(
-                    f"{self.module.NAME}: {label} has shape {x.shape}, q {states[0].shape}; "
-                    f"expected (N, {self._n}), the same for all"
-                )
+        check_states(self.module, **dict(zip(STATES[name], states, strict=True)))
         return states
 
-    def _constants(self, name: str, constants: Mapping[str, float]) -> Array:
+    def constant_values(self, constants: Mapping[str, float]) -> Array:
         """Values of CONSTANTS in their order, those given in place of the robot file's."""
-        unknown = set(constants) - set(self.module.CONSTANTS)
-        if unknown:
-            raise TypeError(
-                f"{name}() got unexpected keywords {sorted(unknown)}; constants are "
-                f"{', '.join(self.module.CONSTANTS) or 'none'}"
-            )
-        return np.array([*{**self.module.CONSTANTS, **constants}.values()] or [0.0], dtype=float)
+        values = [*constants_of(self.module, constants).values()]
+        return np.array(values or [0.0], dtype=float)
 
 
 class CompiledModel(CompiledSignals):
@@ -327,7 +309,7 @@ class CompiledModel(CompiledSignals):
     def _call(
         self, name: str, inputs: Sequence[Array], constants: Mapping[str, float], result: Array
     ) -> None:
-        values = self._constants(name, constants)
+        values = self.constant_values(constants)
         if not (
             result.flags.c_contiguous
             and result.flags.aligned

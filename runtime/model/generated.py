@@ -335,17 +335,18 @@ def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
         )
 
 
-def check_states(model: GeneratedModel, q: Array, qd: Array, qdd: Array) -> None:
-    """Raise ValueError unless q, qd, qdd are real arrays of one shape (N, n), n the joints of the
-    model.
+def check_states(model: GeneratedModel, **states: Array) -> None:
+    """Raise ValueError unless the states, by name, are real arrays of one shape (N, n) or (n,), n
+    the joints of the model.
     """
     n = len(model.JOINTS)
-    for name, x in (("q", q), ("qd", qd), ("qdd", qdd)):
+    first, shape = next((name, np.shape(x)) for name, x in states.items())
+    for name, x in states.items():
         x = np.asarray(x)
-        if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != np.shape(q):
+        if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != shape:
             raise InputError(
-                f"{model.NAME}: {name} has shape {x.shape}, q {np.shape(q)}; expected (N, {n}) or "
-                f"({n},), the same for q, qd and qdd"
+                f"{model.NAME}: {name} has shape {x.shape}, {first} {shape}; expected (N, {n}) or "
+                f"({n},), the same for {', '.join(states)}"
             )
         if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
             raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")

@@ -209,7 +209,7 @@ def rows_of(
     constants: Mapping[str, float] | None = None,
 ) -> Observation:
     """The same of a part of a record, which may be without rows."""
-    check_states(model, states.q, states.qd, states.qdd)
+    check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
     n, K = selection.mask.shape
     if torque.shape != (n, K) or len(model.JOINTS) != n:
         raise InputError(

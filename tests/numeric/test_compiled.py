@@ -129,7 +129,7 @@ def test_stores_and_constants(model: GeneratedModel, warm: Path) -> None:
     for wrong in (np.zeros(out.shape), out[:], c.store(69)):
         with pytest.raises(ValueError, match=r"expected store\(70\)"):
             c.regressor(*given, out=wrong)
-    with pytest.raises(TypeError, match="unknown"):
+    with pytest.raises(InputError, match="no constant unknown"):
         c.regressor(*given, unknown=1.0)
 
 

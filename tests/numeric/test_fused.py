@@ -26,7 +26,6 @@ from runtime.resolution.c.kernels import (
     Positions,
     Room,
     SignalEntries,
-    constant_values,
     decimated,
 )
 from runtime.resolution.c.least_squares import KeptRows, least_squares
@@ -152,7 +151,7 @@ def test_decimated_signals_are_those_of_scipy(N, factor, phase, padding, planar)
     )
     states = filtered(q, PLAIN, room)
     entries = SignalEntries(planar, planar.BASE_PARAMETERS)
-    y = decimated(entries, states, samples, factor, settings, constant_values(planar, {}), room)
+    y = decimated(entries, states, samples, factor, settings, planar.constant_values({}), room)
     expected = filtered_states(q, RATE, PLAIN)[samples]
     D = planar.module.regressor(expected.q, expected.qd, expected.qdd).transpose(2, 1, 0)
     right = scipy_decimate(np.ascontiguousarray(D), factor, phase, padding)
@@ -184,7 +183,7 @@ def test_random_robots_entry_by_entry(seed, tmp_path):
             samples,
             factor,
             Decimate(factor=factor),
-            constant_values(model, changed),
+            model.constant_values(changed),
             room,
         )
         right = D if factor == 1 else scipy_decimate(D, factor, "first", "scipy")
@@ -256,7 +255,7 @@ def test_refusals(planar):
     room, q = Room(), walk(20, 2)
     with pytest.raises(InputError, match="20 samples"):
         decimated(SignalEntries(planar, planar.BASE_PARAMETERS), filtered(q, PLAIN, room), slice(0, 20), 2, Decimate(factor=2),
-                  constant_values(planar, {}), room)  # fmt: skip
+                  planar.constant_values({}), room)  # fmt: skip
     with pytest.raises(InputError, match="12 samples"):
         filtered(q[:12], Signals(median=1), room)
     with pytest.raises(InputError, match=r"signals\.lowpass\.cutoff"):
@@ -268,7 +267,7 @@ def test_refusals(planar):
     with pytest.raises(InputError, match="no column nothing"):
         SignalEntries(planar, ("nothing",))
     with pytest.raises(InputError, match="no constant nothing"):
-        constant_values(planar, {"nothing": 1.0})
+        planar.constant_values({"nothing": 1.0})
 
 
 def test_another_interface_is_refused(tmp_path):

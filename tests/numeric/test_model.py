@@ -87,14 +87,14 @@ def test_not_a_model():
 
 def test_states_at_the_border():
     good = np.zeros((5, 1))
-    check_states(emps_model, good, good, good)
-    check_states(emps_model, good[0], good[0], good[0])
+    check_states(emps_model, q=good, qd=good, qdd=good)
+    check_states(emps_model, q=good[0], qd=good[0], qdd=good[0])
     with pytest.raises(ValueError, match=r"qd has shape \(4, 1\), q \(5, 1\); expected \(N, 1\)"):
-        check_states(emps_model, good, good[:4], good)
+        check_states(emps_model, q=good, qd=good[:4], qdd=good)
     with pytest.raises(ValueError, match=r"q has shape \(5, 2\)"):
-        check_states(emps_model, np.zeros((5, 2)), good, good)
+        check_states(emps_model, q=np.zeros((5, 2)), qd=good, qdd=good)
     with pytest.raises(ValueError, match="real numbers"):
-        check_states(emps_model, good.astype(complex), good, good)
+        check_states(emps_model, q=good.astype(complex), qd=good, qdd=good)
 
 
 def test_a_file_that_fails_says_so(tmp_path):

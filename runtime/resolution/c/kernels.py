@@ -19,10 +19,10 @@ thread.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.signal import sosfilt_zi
@@ -30,7 +30,6 @@ from scipy.signal import sosfilt_zi
 from runtime.errors import InputError
 from runtime.model.compile_cache import FLAGS, NotCompiledError, shared_object
 from runtime.model.compiled import CompiledSignals
-from runtime.model.generated import GeneratedModel, constants_of
 from runtime.model.loading import cache_folder
 from runtime.resolution.c.folding import STATE, folding_of
 from runtime.settings.study import Decimate, Lowpass
@@ -335,13 +334,6 @@ class SignalEntries:
         )
 
 
-def constant_values(model: CompiledSignals, constants: Mapping[str, float]) -> Array:
-    """Geometry and gravity in the order of CONSTANTS, some of them in place of the robot file's."""
-    return np.array(
-        [*constants_of(cast(GeneratedModel, model), constants).values()] or [0.0], dtype=float
-    )
-
-
 def decimated(
     entries: SignalEntries,
     states: FilteredStates,
@@ -353,7 +345,7 @@ def decimated(
 ) -> Array:
     """The kept samples of the wanted signals, shape (S, K): row i is signal entries.wanted[i].
 
-    samples : those used of the states.   constants : of `constant_values`.
+    samples : those used of the states.   constants : of `CompiledSignals.constant_values`.
             The result is one of `room`.
     """
     p = decimation_plan(samples.stop - samples.start, factor, settings)

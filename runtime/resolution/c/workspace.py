@@ -17,7 +17,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.normal_equations import LeastSquares
 from runtime.model.compile_cache import FallbackWarning
-from runtime.model.compiled import CompiledSignals, compiled_signals
+from runtime.model.compiled import CompiledSignals, compiled_model
 from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import kernels
 from runtime.resolution.c.least_squares import KeptRows, least_squares
@@ -53,7 +53,7 @@ def model_of_runs(model: GeneratedModel, source: Path) -> GeneratedModel:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FallbackWarning)
-        return usable(compiled_signals(model, source=source))
+        return usable(compiled_model(model, source=source, signals=True))
 
 
 class CompiledWorkspace:
@@ -65,7 +65,7 @@ class CompiledWorkspace:
             model,
             kernels.SignalEntries(model, task.names),
         )
-        self.constants = kernels.constant_values(model, task.constants)
+        self.constants = model.constant_values(task.constants)
         self.room = kernels.Room()
         self.records = [
             (record, self._positions(record, record.q, kernels.Room()), kernels.Room())
