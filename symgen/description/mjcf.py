@@ -22,10 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from symgen.description.expression import ZERO, Expression
 from symgen.description.fields import located
 from symgen.description.mjcf_text import Mjcf, reduced
 from symgen.description.robot import Robot
-from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Relation, Tree
+from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Tree
 from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
 from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST
@@ -33,9 +34,6 @@ from symgen.errors import DescriptionError
 
 FREE_JOINT, BALL, SLIDE_JOINT, HINGE = range(4)  # mjtJoint
 JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
-
-_Row = dict[int, Fraction]  # {joint: coefficient}
-_Solved = tuple[_Row, Fraction]  # a row and a constant
 
 
 def read_mjcf(
@@ -311,53 +309,31 @@ def _left_out(model: Any) -> list[str]:
 # --- relations ---
 
 
-def _relations(growing: _Growing) -> dict[str, Relation]:
+def _relations(growing: _Growing) -> dict[str, Expression]:
     """The joints that linear relations determine, by the others: exact elimination of joints that
     no actuator drives.
     """
-    model, names, driven = growing.model, growing.names, growing.mjcf.driven
-    relations: dict[int, _Solved] = {}
+    model, names = growing.model, growing.names
+    relations: dict[str, Expression] = {}
     for e in range(model.neq):
-        row, right = _equation(model, e)
-        for k in sorted(row.keys() & relations.keys()):
-            row, right = _without(row, right, k, relations[k])
-        free = [k for k in sorted(row) if names[k] not in driven]
+        equation = _equation(model, names, e).substitute(relations)
+        free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
         if not free:
             raise DescriptionError(
                 f"equality {model.equality(e).name!r}: it ties driven joints, or says what others "
                 "say already"
             )
-        first = int(model.eq_obj1id[e])
-        pivot = first if int(model.eq_type[e]) == JOINT_RELATION and first in free else free[-1]
-        own = row.pop(pivot)
-        solved = ({k: -c / own for k, c in row.items()}, right / own)
-        relations = {
-            k: (_with(leaders, offset, pivot, solved) if pivot in leaders else (leaders, offset))
-            for k, (leaders, offset) in relations.items()
-        }
+        of_joint = int(model.eq_type[e]) == JOINT_RELATION
+        first = names[int(model.eq_obj1id[e])] if of_joint else ""
+        pivot = first if first in free else free[-1]
+        solved = Expression.symbol(pivot) - equation * equation.coefficient(pivot).inverse()
+        relations = {name: x.substitute({pivot: solved}) for name, x in relations.items()}
         relations[pivot] = solved
-    return {
-        names[k]: Relation({names[i]: c for i, c in leaders.items()}, offset)
-        for k, (leaders, offset) in sorted(relations.items())
-    }
+    return {name: relations[name] for name in names if name in relations}
 
 
-def _with(row: _Row, offset: Fraction, k: int, solved: _Solved) -> _Solved:
-    """sum of c_i q_i + offset with q_k put in."""
-    factor, (leaders, shift) = row[k], solved
-    indices = (row.keys() | leaders.keys()) - {k}
-    new = {i: row.get(i, Fraction(0)) + factor * leaders.get(i, Fraction(0)) for i in indices}
-    return {i: c for i, c in sorted(new.items()) if c}, offset + factor * shift
-
-
-def _without(row: _Row, right: Fraction, k: int, solved: _Solved) -> _Solved:
-    """sum of c_i q_i = right with q_k put in."""
-    left, moved = _with(row, Fraction(0), k, solved)
-    return left, right - moved
-
-
-def _equation(model: Any, e: int) -> _Solved:
-    """Relation e as sum of c_k q_k = c:  y1 - y1_0 = a0 + a1 (y2 - y2_0), y a joint position or the
+def _equation(model: Any, names: list[str], e: int) -> Expression:
+    """What is zero by relation e:  y1 - y1_0 - a0 - a1 (y2 - y2_0), y a joint position or the
     length of a fixed tendon.
     """
     kind, name = int(model.eq_type[e]), model.equality(e).name
@@ -367,31 +343,22 @@ def _equation(model: Any, e: int) -> _Solved:
             f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear "
             "relations are read: a0 + a1 y"
         )
-    row, right = _length(model, kind, int(model.eq_obj1id[e]))
-    right += a0
-    if int(model.eq_obj2id[e]) >= 0:
-        other, reference = _length(model, kind, int(model.eq_obj2id[e]))
-        row = {
-            k: c
-            for k in sorted(row.keys() | other.keys())
-            if (c := row.get(k, Fraction(0)) - a1 * other.get(k, Fraction(0)))
-        }
-        right -= a1 * reference
-    return row, right
+    first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+    other = _deflection(model, names, kind, second) if second >= 0 else ZERO
+    return _deflection(model, names, kind, first) - a0 - other * a1
 
 
-def _length(model: Any, kind: int, k: int) -> _Solved:
-    """A joint position, or the length of a fixed tendon, as {joint: coefficient}, and its value at
-    ref.
-    """
-    reference = [Fraction(repr(float(model.qpos0[int(i)]))) for i in model.jnt_qposadr]
+def _deflection(model: Any, names: list[str], kind: int, k: int) -> Expression:
+    """A joint position, or the length of a fixed tendon, less its value at ref."""
     if kind == JOINT_RELATION:
-        return {k: Fraction(1)}, reference[k]
+        reference = Expression.number(repr(float(model.qpos0[int(model.jnt_qposadr[k])])))
+        return Expression.symbol(names[k]) - reference
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
-    row = {
+    coefficients = {
         int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w])))
         for w in range(first, first + count)
     }
-    return {i: c for i, c in row.items() if c}, sum(
-        (c * reference[i] for i, c in row.items()), start=Fraction(0)
+    deflections = (
+        _deflection(model, names, JOINT_RELATION, i) * c for i, c in coefficients.items()
     )
+    return sum(deflections, start=ZERO)

@@ -7,9 +7,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 import numpy as np
+
+from symgen.description.expression import Expression
 
 Array = np.ndarray
 MAX_JOINTS = 200
@@ -77,16 +78,6 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Relation:
-    """q = sum of factor times q of the leaders + offset, the leaders by name and independent of
-    each other.
-    """
-
-    leaders: Mapping[str, Fraction]
-    offset: Fraction
-
-
-@dataclass(frozen=True)
 class Tree:
     """Links and joints of a robot, in the order of the file.
 
@@ -101,7 +92,8 @@ class Tree:
     root : str
         The link that has no parent.
     relations : mapping
-        Relations of the joints that follow others, by name.
+        Positions of the joints that follow others, by name: linear in those of joints that follow
+        none, whose names are the symbols.
     bare : frozenset of str
         Links between the joints of one body, which have no mass.
     gravity : tuple of float, m/s^2
@@ -119,7 +111,7 @@ class Tree:
     links: Mapping[str, Inertial | None]
     joints: tuple[Joint, ...]
     root: str
-    relations: Mapping[str, Relation] = field(default_factory=dict)
+    relations: Mapping[str, Expression] = field(default_factory=dict)
     bare: frozenset[str] = frozenset()
     gravity: tuple[float, float, float] = (0.0, 0.0, -EARTH)
     notes: tuple[str, ...] = ()

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 
 import numpy as np
 
 from symgen.description.angles import SHOWN
-from symgen.description.tree import FIXED_TYPE, Array, Joint, Relation, Tree, turn
+from symgen.description.expression import Expression
+from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
 from symgen.errors import DescriptionError
 
 
@@ -70,36 +70,25 @@ def _require_independent(tree: Tree, name: str) -> None:
             f"{_names(moving)}"
         )
     if name in tree.relations:
-        raise DescriptionError(
-            f"joint {name!a:.60} to lock follows others; lock "
-            f"{_names(list(tree.relations[name].leaders))}"
-        )
+        leaders = [leader for leader in kinds if leader in tree.relations[name].atoms]
+        raise DescriptionError(f"joint {name!a:.60} to lock follows others; lock {_names(leaders)}")
 
 
 def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
     """The tree with joints held at `positions`, and with them the joints that follow no other."""
-    relations: dict[str, Relation] = {}
-    fixed = dict(positions)
-    for name, relation in tree.relations.items():
-        offset = relation.offset + sum(
-            c * Fraction(repr(fixed[leader]))
-            for leader, c in relation.leaders.items()
-            if leader in positions
-        )
-        leaders = {leader: c for leader, c in relation.leaders.items() if leader not in positions}
-        if name in positions:
-            continue
-        if leaders:
-            relations[name] = Relation(leaders, offset)
-        else:
-            fixed[name] = float(offset)
+    exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
+    relations = {
+        name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions
+    }
+    fixed = {**positions, **{name: float(e) for name, e in relations.items() if not e.atoms}}
     joints = tuple(
         replace(j, kind=FIXED_TYPE, pose=j.pose @ _motion(j, fixed[j.name]), limits={})
         if j.name in fixed
         else j
         for j in tree.joints
     )
-    return replace(tree, joints=joints, relations=relations)
+    following = {name: e for name, e in relations.items() if e.atoms}
+    return replace(tree, joints=joints, relations=following)
 
 
 def _motion(joint: Joint, q: float) -> Array:
@@ -177,7 +166,7 @@ def _zero(tree: Tree, name: str) -> float:
     """Position of a joint that is held at zero, or of one that follows where its leaders are at
     zero.
     """
-    return float(tree.relations[name].offset) if name in tree.relations else 0.0
+    return float(tree.relations[name].terms.get((), 0.0)) if name in tree.relations else 0.0
 
 
 def _path(holding: Mapping[str, Joint], link: str, root: str) -> list[Joint] | None:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
@@ -134,17 +133,13 @@ def _gravity(
 
 def _constraints(table: Table) -> dict[int, Expression]:
     """q_j of the joints that follow others."""
-    number = {joint.name: j for j, joint in table.joint.items()}
-    constraints: dict[int, Expression] = {}
-    for name, relation in table.tree.relations.items():
-        constraints[number[name]] = sum(
-            (
-                Expression.symbol(f"q{number[leader]}") * factor
-                for leader, factor in relation.leaders.items()
-            ),
-            start=Expression.number(Fraction(relation.offset)),
-        )
-    return dict(sorted(constraints.items()))
+    positions = {joint.name: Expression.symbol(f"q{j}") for j, joint in table.joint.items()}
+    relations = table.tree.relations
+    return {
+        j: relations[joint.name].substitute(positions)
+        for j, joint in sorted(table.joint.items())
+        if joint.name in relations
+    }
 
 
 def _keys(table: Table, family: str, actuated: list[int]) -> list[int]:

@@ -13,12 +13,11 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from fractions import Fraction
 
 import numpy as np
 
 from symgen.description.angles import SNAP, Rounding, reaches, report_angles
-from symgen.description.expression import twelfths
+from symgen.description.expression import Expression, twelfths
 from symgen.description.fields import located
 from symgen.description.robot import Robot
 from symgen.description.tree import (
@@ -27,7 +26,6 @@ from symgen.description.tree import (
     MOVING,
     Inertial,
     Joint,
-    Relation,
     Tree,
     turn,
 )
@@ -37,7 +35,7 @@ from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST, Array, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
-Mimic = tuple[str, float, float]  # joint, multiplier, offset
+Mimic = tuple[str, Expression]  # joint that is followed, and the position by its own
 SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
 # children of an element that are read, and <material>, which says nothing that is left out
 READ = {
@@ -102,11 +100,12 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         elif e.tag == "joint":
             joints.append(_joint(e, nearly))
             if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
-                mimics[joints[-1].name] = (
-                    mimic.text("joint"),
-                    mimic.number("multiplier", "1"),
-                    mimic.number("offset", "0"),
+                leader = mimic.text("joint")
+                factor, offset = (
+                    Expression.number(repr(mimic.number(key, default)))
+                    for key, default in (("multiplier", "1"), ("offset", "0"))
                 )
+                mimics[joints[-1].name] = leader, factor * Expression.symbol(leader) + offset
     if len(joints) > MAX_JOINTS:
         raise DescriptionError(
             f"{len(joints)} joints; at most {MAX_JOINTS} are read", line=root.line
@@ -176,16 +175,16 @@ def _length(joint: Joint) -> float:
     return float(np.linalg.norm(joint.pose[:3, 3])) + slide
 
 
-def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relation]:
+def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
     """q = multiplier q_leader + offset of the joints that mimic another, through any that follow
     each other.
     """
     moving = {joint.name for joint in joints if joint.kind != FIXED_TYPE}
-    relations: dict[str, Relation] = {}
+    relations: dict[str, Expression] = {}
     for joint in (joint for joint in joints if joint.name in mimics):
-        leader, multiplier, offset, followed = joint.name, Fraction(1), Fraction(0), {joint.name}
+        leader, position, followed = joint.name, Expression.symbol(joint.name), {joint.name}
         while leader in mimics:
-            leader, factor, shift = mimics[leader]
+            follower, (leader, own) = leader, mimics[leader]
             if leader in followed or leader not in moving:
                 what = (
                     "joints follow each other in a circle"
@@ -194,9 +193,8 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Relat
                 )
                 raise DescriptionError(f"joint {joint.name!r}: {what}", line=joint.line)
             followed.add(leader)
-            offset += multiplier * Fraction(repr(shift))
-            multiplier *= Fraction(repr(factor))
-        relations[joint.name] = Relation({leader: multiplier}, offset)
+            position = position.substitute({follower: own})
+        relations[joint.name] = position
     return relations
 
 
