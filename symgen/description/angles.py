@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from symgen.description.expression import PI, twelfths
@@ -18,7 +19,7 @@ from symgen.description.expression import PI, twelfths
 SNAP = 1e-4  # rad: angles of a URDF this close to a multiple of pi/12 are taken as that
 SHOWN = 20  # angles, or names, in a message
 
-Rounding = tuple[str, float, str]  # joint, angle and line; rad in the file; frame that it turns
+ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
 
 
 class AngleWarning(UserWarning):
@@ -38,31 +39,52 @@ def reaches(edges: Iterable[tuple[str, str, float]], root: str) -> dict[str, flo
     return reach
 
 
-def report_angles(
-    file: str, roundings: Sequence[Rounding], reach: Mapping[str, float], *, exact: bool
-) -> tuple[str, tuple[str, ...]]:
-    """How the angles of a file were read, for headers, and a note for each that is changed; an
-    AngleWarning tells them too. An angle that turns no frame turns an inertia alone.
+@dataclass
+class Angles:
+    """Angles of one file as they are read.
+
+    Attributes
+    ----------
+    exact : bool
+        Whether all stay as they are written.
+    near : list of tuple
+        Of each that differs from a multiple of pi/12 by less than SNAP and more than ALL_DIGITS:
+        joint, angle and line; rad in the file; k of the multiple k pi/12; frame that it turns.
     """
-    near = f"{len(roundings)} angle{'s' * (len(roundings) > 1)} near multiples of pi/12"
-    if exact or not roundings:
-        return f"{near} are those of {file}" if roundings else "", ()
-    notes, moved = [], 0.0
-    for name, angle, frame in roundings:
-        k = twelfths(angle, SNAP) or 0
-        change = k * (math.pi / 12) - angle
-        shift = abs(change) * reach.get(frame, 0.0)
-        tool = f", the tool by up to {shift:.1e} m" if shift else ""
-        notes.append(
-            f"{name} from {angle:.12g} to {PI * Fraction(k, 12)}, by {change:.1e} rad{tool}"
+
+    exact: bool
+    near: list[tuple[str, float, int, str]] = field(default_factory=list)
+
+    def twelfths(self, angle: float, name: str, frame: str) -> int | None:
+        """k of the multiple k pi/12 that `angle` is taken as; None where it stays."""
+        k = twelfths(angle, SNAP)
+        if k is None or abs(k * (math.pi / 12) - angle) <= ALL_DIGITS:
+            return k
+        self.near.append((name, angle, k, frame))
+        return None if self.exact else k
+
+    def report(self, file: str, reach: Mapping[str, float]) -> tuple[str, tuple[str, ...]]:
+        """How the angles were read, for headers, and a note for each that is changed; an
+        AngleWarning tells them too. An angle that turns no frame turns an inertia alone.
+        """
+        near = f"{len(self.near)} angle{'s' * (len(self.near) > 1)} near multiples of pi/12"
+        if self.exact or not self.near:
+            return f"{near} are those of {file}" if self.near else "", ()
+        notes, moved = [], 0.0
+        for name, angle, k, frame in self.near:
+            change = k * (math.pi / 12) - angle
+            shift = abs(change) * reach.get(frame, 0.0)
+            tool = f", the tool by up to {shift:.1e} m" if shift else ""
+            notes.append(
+                f"{name} from {angle:.12g} to {PI * Fraction(k, 12)}, by {change:.1e} rad{tool}"
+            )
+            moved += shift
+        way = f", which moves the tool by up to {moved:.1e} m" if moved else ""
+        text = f"{near} taken as these{way}"
+        shown = [*notes[:SHOWN], *[f"and {len(notes) - SHOWN} more"] * (len(notes) > SHOWN)]
+        warnings.warn(
+            f"{file}: {text}; exact=True or --exact keeps them: {'; '.join(shown)}",
+            AngleWarning,
+            stacklevel=6,
         )
-        moved += shift
-    way = f", which moves the tool by up to {moved:.1e} m" if moved else ""
-    text = f"{near} taken as these{way}"
-    more = [f"and {len(notes) - SHOWN} more"] * (len(notes) > SHOWN)
-    warnings.warn(
-        f"{file}: {text}; exact=True or --exact keeps them: {'; '.join([*notes[:SHOWN], *more])}",
-        AngleWarning,
-        stacklevel=6,
-    )
-    return text, tuple(notes)
+        return text, tuple(notes)

@@ -41,7 +41,7 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
         (`.xml`, `.mjcf`; extra `mjcf`).
     keep_fixed : bool
         Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by
-        `read_urdf`.
+        `read_tree`.
     exact : bool
         Of a URDF or `.par` file: angles are those of the file, as a calibrated one needs it. Else
         angles within 1e-4 rad of a multiple of pi/12 are taken as that, and an AngleWarning tells
@@ -107,15 +107,10 @@ def read_robot(
         return read_par(content, path.name, constants, exact=exact)
     if suffix in TREES:
         from symgen.description.tree_parts import TreePart  # numpy, which robot files do without
+        from symgen.description.tree_robot import read_tree
 
         part = TreePart(lock or {}, chain)
-        if suffix == ".urdf":
-            from symgen.description.urdf import read_urdf
-
-            return read_urdf(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
-        from symgen.description.mjcf import read_mjcf  # mujoco, an extra
-
-        return read_mjcf(content, path.name, keep_fixed=keep_fixed, part=part)
+        return read_tree(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
     return parse_robot(content, path.name), ()
 
 

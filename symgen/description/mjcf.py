@@ -15,7 +15,6 @@ names no file (`mjcf_text`).
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -23,47 +22,13 @@ from typing import Any
 import numpy as np
 
 from symgen.description.expression import ZERO, Expression
-from symgen.description.fields import located
 from symgen.description.mjcf_text import Mjcf, reduced
-from symgen.description.robot import Robot
 from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Tree
-from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
-from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST
 from symgen.errors import DescriptionError
 
 FREE_JOINT, BALL, SLIDE_JOINT, HINGE = range(4)  # mjtJoint
 JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
-
-
-def read_mjcf(
-    content: bytes, file: str, *, keep_fixed: bool = False, part: TreePart = WHOLE_TREE
-) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of an MJCF file, and notes: which joint is which q, which body or site is which
-    kept frame, and what was not read.
-
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    file : str
-        Its name.
-    keep_fixed : bool
-        Bodies without joints, and sites, are fixed frames (sigma 2) without parameters, for
-        frame_poses and jacobian; else such bodies are
-        only part of the body that holds them, and sites are left out. Their inertia belongs to that
-        body either way.
-    part : TreePart
-        Joints held at a position, and the chain that is kept.
-
-    Raises
-    ------
-    DescriptionError
-        No MJCF, or no tree of hinges and slides on a resting base; the message names file and line.
-    """
-    with located(file):
-        tree = part_of(parse_mjcf(content, sites=keep_fixed), part)
-        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
 
 
 def parse_mjcf(content: bytes, *, sites: bool = False) -> Tree:

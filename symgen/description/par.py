@@ -20,13 +20,12 @@ W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, R
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from symgen.description.angles import SNAP, Rounding, reaches, report_angles
+from symgen.description.angles import SNAP, Angles, reaches
 from symgen.description.expression import ONE, PI, Expression, twelfths
 from symgen.description.fields import located
 from symgen.description.grammar import parse
@@ -45,7 +44,6 @@ from symgen.description.robot import (
 from symgen.errors import DescriptionError, ExpressionError
 
 MAX_BYTES, MAX_FRAMES = 200_000, 200
-ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
 
 GEOMETRIC = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
 COUNTS = ("NF", "NL", "NJ", "Type", "is_mobile")
@@ -96,18 +94,16 @@ class _Par:
         Tables of the comments: constants, values, start 1, ...
     notes : list of str
         What was read otherwise than written.
-    roundings : list
+    angles : Angles
         Angles near multiples of pi/12.
-    exact : bool
-        Whether they stay as they are.
     """
+
+    angles: Angles
 
     name: str = ""
     lists: dict[str, list[tuple[str, int]]] = field(default_factory=dict)
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    roundings: list[Rounding] = field(default_factory=list)
-    exact: bool = False
 
     def line(self, path: Path) -> int:
         """Line of the entry nearest to the path of a field of the Robot."""
@@ -139,7 +135,7 @@ def read_par(
     DescriptionError
         No `.par` file, no robot, or a symbol without value; the message names file and line.
     """
-    par = _Par(exact=exact)
+    par = _Par(Angles(exact))
     with located(file, par.line):
         _scan(_text(content), par)
         robot = _robot(par, dict(constants or {}), file, hashlib.sha256(content).hexdigest())
@@ -147,7 +143,7 @@ def read_par(
         (str(f.ant), str(f.j), sum(abs(x.value(robot.constants)) for x in (f.b, f.d, f.r0)))
         for f in robot.frames
     ]
-    angles, notes = report_angles(file, par.roundings, reaches(edges, "0"), exact=exact)
+    angles, notes = par.angles.report(file, reaches(edges, "0"))
     return replace(robot, angles=angles), (*par.notes, *notes)
 
 
@@ -400,13 +396,10 @@ def _variable(e: Expression, j: int, key: str, line: int) -> str:
 def _rounded(e: Expression, name: str, frame: str, par: _Par) -> Expression:
     """Decimal approximations of multiples of pi/12, as programs write them, become exact."""
     c = e.terms.get(())
-    k = None if c is None or len(e.terms) > 2 else twelfths(float(c), SNAP)
-    if not k or c is None:
+    if c is None or len(e.terms) > 2 or not twelfths(float(c), SNAP):
         return e
-    written = abs(k * (math.pi / 12) - float(c)) > ALL_DIGITS
-    if written:
-        par.roundings.append((name, float(c), frame))
-    return e if par.exact and written else e - c + PI * Fraction(k, 12)
+    k = par.angles.twelfths(float(c), name, frame)
+    return e if k is None else e - c + PI * Fraction(k, 12)
 
 
 def _parameters(

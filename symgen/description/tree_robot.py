@@ -1,5 +1,5 @@
-"""The Robot of a tree: its Khalil frames, its joints as elements and limits, its inertials as
-standard parameters.
+"""The Robot of a URDF or MJCF, by its tree of links and joints: its Khalil frames, its joints as
+elements and limits, its inertials as standard parameters.
 
 With pose jX of a link in frame j, centre of mass c and rotation R = jR of the inertia I of the
 file:
@@ -11,6 +11,7 @@ are tensor elements about the origin of frame j, summed over the links of a body
 
 from __future__ import annotations
 
+import hashlib
 import keyword
 import re
 from collections.abc import Callable
@@ -18,10 +19,14 @@ from collections.abc import Callable
 import numpy as np
 
 from symgen.description.expression import ONE, ZERO, Expression
+from symgen.description.fields import located
+from symgen.description.mjcf import parse_mjcf
 from symgen.description.naming import is_label
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
 from symgen.description.tree import Array, Inertial, Joint, Tree
 from symgen.description.tree_frames import Body, Table, placed
+from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
+from symgen.description.urdf import parse_urdf
 from symgen.errors import DescriptionError
 
 JOINT_TERMS: tuple[
@@ -33,6 +38,52 @@ JOINT_TERMS: tuple[
     ("OFFSET", "offset", lambda joint: -joint.stiffness * joint.rest + 0.0),
     ("K", "stiffness", lambda joint: joint.stiffness),
 )
+
+
+def read_tree(
+    content: bytes,
+    file: str,
+    *,
+    exact: bool = False,
+    keep_fixed: bool = False,
+    part: TreePart = WHOLE_TREE,
+) -> tuple[Robot, tuple[str, ...]]:
+    """The robot of a URDF or MJCF, and notes: which joint is which q, which link, body or site is
+    which kept frame, which angle was changed, what was not read.
+
+    Parameters
+    ----------
+    content : bytes
+        Of the file.
+    file : str
+        Its name; its suffix names the format.
+    exact : bool
+        Angles of a URDF are those of the file; else those within SNAP of a multiple of pi/12 are
+        taken as that, since files say 1.5708, and an AngleWarning lists them.
+    keep_fixed : bool
+        Links held by fixed joints (tool0, flange), bodies without joints, and sites, are fixed
+        frames (sigma 2) without parameters, for frame_poses and jacobian; else such links and
+        bodies are only part of the body that holds them, and sites are left out. Their inertia
+        belongs to that body either way.
+    part : TreePart
+        Joints held at a position, and the chain that is kept.
+
+    Raises
+    ------
+    DescriptionError
+        No URDF or MJCF, or no tree of hinges and slides on a resting base; the message names file
+        and line.
+    """
+    with located(file):
+        tree = part_of(parse_tree(content, file, exact=exact, sites=keep_fixed), part)
+        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
+
+
+def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
+    """Links and joints of a URDF or MJCF file, by its suffix; `sites` of an MJCF are links too."""
+    if file.lower().endswith(".urdf"):
+        return parse_urdf(content, file, exact=exact)
+    return parse_mjcf(content, sites=sites)
 
 
 def robot_of_tree(

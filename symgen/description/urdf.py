@@ -8,7 +8,6 @@ entities (`xml_text` reads neither). Every error names its line.
 
 from __future__ import annotations
 
-import hashlib
 import math
 import sys
 from collections import Counter
@@ -16,10 +15,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from symgen.description.angles import SNAP, Rounding, reaches, report_angles
-from symgen.description.expression import Expression, twelfths
-from symgen.description.fields import located
-from symgen.description.robot import Robot
+from symgen.description.angles import Angles, reaches
+from symgen.description.expression import Expression
 from symgen.description.tree import (
     FIXED_TYPE,
     MAX_JOINTS,
@@ -29,9 +26,6 @@ from symgen.description.tree import (
     Tree,
     turn,
 )
-from symgen.description.tree_frames import SAME
-from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
-from symgen.description.tree_robot import robot_of_tree
 from symgen.description.xml_text import LARGEST, Array, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
@@ -45,47 +39,9 @@ READ = {
 }
 
 
-def read_urdf(
-    content: bytes,
-    file: str,
-    *,
-    exact: bool = False,
-    keep_fixed: bool = False,
-    part: TreePart = WHOLE_TREE,
-) -> tuple[Robot, tuple[str, ...]]:
-    """The robot of a URDF, and notes: which joint is which q, which link is which kept frame, which
-    angle was changed, what was not read.
-
-    Parameters
-    ----------
-    content : bytes
-        Of the file.
-    file : str
-        Its name.
-    exact : bool
-        Angles are those of the file; else those within SNAP of a multiple of pi/12 are taken as
-        that, since files say 1.5708, and an AngleWarning lists them.
-    keep_fixed : bool
-        Links held by fixed joints (tool0, flange) are fixed frames (sigma 2) without parameters,
-        for frame_poses and jacobian; else they
-        are only part of the body that holds them. Their inertia belongs to that body either way.
-    part : TreePart
-        Joints held at a position, and the chain that is kept.
-
-    Raises
-    ------
-    DescriptionError
-        No URDF, or no tree of revolute, prismatic and fixed joints; the message names file and
-        line.
-    """
-    with located(file):
-        tree = part_of(parse_urdf(content, file, exact=exact), part)
-        return robot_of_tree(tree, file, hashlib.sha256(content).hexdigest(), keep_fixed=keep_fixed)
-
-
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
-    """Links and joints of a URDF file; roll, pitch and yaw as of `read_urdf`."""
-    nearly = 0.0 if exact else SNAP
+    """Links and joints of a URDF file; `exact` as of `read_tree`."""
+    angles = Angles(exact)
     root = read_elements(content)
     if root.tag != "robot":
         raise DescriptionError(f"roots_text <{root.tag[:40]}>; expected <robot>", line=root.line)
@@ -96,9 +52,9 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         if e.tag == "link":
             if (name := e.text("name")) in links:
                 raise DescriptionError(f"link {name!r} is given twice; keep one", line=e.line)
-            links[name] = _inertial(e, nearly)
+            links[name] = _inertial(e, angles)
         elif e.tag == "joint":
-            joints.append(_joint(e, nearly))
+            joints.append(_joint(e, angles))
             if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
                 leader = mimic.text("joint")
                 factor, offset = (
@@ -124,7 +80,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
             f"links {', '.join(lost[:5])} do not hang on {base!r}; their joints form a cycle",
             line=root.line,
         )
-    angles, changes = report_angles(file, [*_near(root)], reach, exact=exact)
+    angles_text, changes = angles.report(file, reach)
     notes += tuple(f"{SNAPPED} {change}" for change in changes)
     points = [
         e.text("name")
@@ -143,7 +99,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         base,
         _relations(joints, mimics),
         notes=notes,
-        angles=angles,
+        angles=angles_text,
     )
 
 
@@ -153,19 +109,6 @@ def _left_out(root: XmlElement) -> Iterator[str]:
         yield from (
             child.tag for child in e.children if e.tag in READ and child.tag not in READ[e.tag]
         )
-
-
-def _near(root: XmlElement) -> Iterator[Rounding]:
-    """Angles that differ from a multiple of pi/12 by more than rounding and less than SNAP."""
-    for e in root.children:
-        holder, child = e.first("inertial") if e.tag == "link" else e, e.first("child")
-        origin = holder.first("origin") if holder and e.tag in ("link", "joint") else None
-        angles = origin.numbers("rpy", 3, "0 0 0") if origin else ()
-        for name, x in zip(("roll", "pitch", "yaw"), angles, strict=False):
-            k = twelfths(x, SNAP)
-            if k is not None and abs(k * (math.pi / 12) - x) > SAME:
-                place = f"{name} of {e.tag} {e.text('name')!a:.60} (line {(origin or e).line})"
-                yield place, x, "" if e.tag == "link" or child is None else child.text("link")
 
 
 def _length(joint: Joint) -> float:
@@ -198,23 +141,23 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expre
     return relations
 
 
-def _pose(e: XmlElement | None, nearly: float) -> Array:
-    """(4, 4) of an <origin>: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    T = np.eye(4)
-    if e is not None:
-        roll, pitch, yaw = (_angle(x, nearly) for x in e.numbers("rpy", 3, "0 0 0"))
-        T[:3, :3] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
-        T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
+def _pose(holder: XmlElement, what: str, frame: str, angles: Angles) -> Array:
+    """(4, 4) of the <origin> of a link or joint: R = Rz(yaw) Ry(pitch) Rx(roll); `frame`: the link
+    that it turns.
+    """
+    T, e = np.eye(4), holder.first("origin")
+    if e is None:
+        return T
+    row = []
+    for name, x in zip(("roll", "pitch", "yaw"), e.numbers("rpy", 3, "0 0 0"), strict=True):
+        k = angles.twelfths(float(x), f"{name} of {what} (line {e.line})", frame)
+        row.append(float(x) if k is None else k * (math.pi / 12))
+    T[:3, :3] = turn(2, row[2]) @ turn(1, row[1]) @ turn(0, row[0])
+    T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
     return T
 
 
-def _angle(x: float, nearly: float) -> float:
-    """x, or the multiple of pi/12 within `nearly` of it."""
-    k = twelfths(x, nearly)
-    return x if k is None else k * (math.pi / 12)
-
-
-def _inertial(link: XmlElement, nearly: float) -> Inertial | None:
+def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     e = link.first("inertial")
     if e is None:
         return None
@@ -224,17 +167,16 @@ def _inertial(link: XmlElement, nearly: float) -> Inertial | None:
     M = mass.number("value")
     if M < 0:
         raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
+    pose = _pose(e, f"link {link.text('name')!a:.60}", "", angles)
     if inertia is None:  # a point mass: programs that read URDF say so and go on
-        return Inertial(M, _pose(e.first("origin"), nearly), np.zeros((3, 3)))
+        return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (
         inertia.number(name) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
-    return Inertial(
-        M, _pose(e.first("origin"), nearly), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    )
+    return Inertial(M, pose, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def _joint(e: XmlElement, nearly: float) -> Joint:
+def _joint(e: XmlElement, angles: Angles) -> Joint:
     kind, name = e.text("type"), e.text("name")
     if kind not in (*MOVING, FIXED_TYPE):
         raise DescriptionError(
@@ -274,7 +216,7 @@ def _joint(e: XmlElement, nearly: float) -> Joint:
     )
     axis = axis if abs(length - 1) < 1e-15 else axis / length
     links = (ends["parent"].text("link"), ends["child"].text("link"))
-    pose = _pose(e.first("origin"), nearly)
+    pose = _pose(e, f"joint {name!a:.60}", links[1], angles)
     return Joint(name, kind, *links, pose, axis, e.line, limits, damping, friction)
 
 

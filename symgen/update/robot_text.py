@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from symgen.description.fields import located
+from symgen.description.files import TREES
 from symgen.description.robot import FIXED, Frame, Robot
 from symgen.description.tree import Array, Tree
 from symgen.description.tree_frames import Table, placed
 from symgen.description.tree_parts import TreePart, part_of
-from symgen.description.tree_robot import JOINT_TERMS, robot_of_tree, ten_of
-from symgen.description.urdf import parse_urdf
+from symgen.description.tree_robot import JOINT_TERMS, parse_tree, robot_of_tree, ten_of
 from symgen.errors import DescriptionError
 from symgen.update.nearest import FileLink
 from symgen.update.places import MJCF, URDF, LinkPlace, Places
@@ -82,17 +82,13 @@ def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotT
         No URDF or MJCF; the message names file and line.
     """
     with located(path.name):
-        if path.suffix.lower() == ".urdf":
-            whole, attributes = parse_urdf(content, path.name, exact=exact), URDF
-        elif path.suffix.lower() in (".xml", ".mjcf"):
-            from symgen.description.mjcf import parse_mjcf  # mujoco, an extra
-
-            whole, attributes = parse_mjcf(content), MJCF
-        else:
+        if (suffix := path.suffix.lower()) not in TREES:
             raise DescriptionError(
                 "values go back into a URDF (.urdf) or an MJCF (.xml, .mjcf); a robot file takes "
                 "them by `symgen convert --estimate`"
             )
+        whole = parse_tree(content, path.name, exact=exact)
+        attributes = URDF if suffix == ".urdf" else MJCF
         tree = part_of(whole, part)
         robot = robot_of_tree(tree, path.name, "")[0]
         places = Places(content, whole, attributes)

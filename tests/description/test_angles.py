@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from symgen.certify.importing import imported
 from symgen.cli.main import app
 from symgen.description import AngleWarning, load_robot
-from symgen.description.urdf import read_urdf
+from symgen.description.tree_robot import read_tree
 from symgen.emit.generate import generate_module
 
 LINK = (
@@ -59,7 +59,7 @@ def test_load_robot_tells_each_angle_and_the_way_of_the_tool(tmp_path):
 def test_angles_that_are_multiples_are_not_told():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        robot, _ = read_urdf(arm(1.5707963267948966, 0.3, 0), "arm.urdf")
+        robot, _ = read_tree(arm(1.5707963267948966, 0.3, 0), "arm.urdf")
     assert robot.angles == ""
 
 
@@ -73,8 +73,8 @@ def test_the_tool_moves_by_no_more_than_is_told(tmp_path):
     """Over random positions of the joints, by no more than told and by more than a fifth of it."""
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (2000, 3))
     with pytest.warns(AngleWarning):
-        robot = read_urdf(ROUNDED, "a.urdf", keep_fixed=True)[0]
-    exact = read_urdf(ROUNDED, "a.urdf", keep_fixed=True, exact=True)[0]
+        robot = read_tree(ROUNDED, "a.urdf", keep_fixed=True)[0]
+    exact = read_tree(ROUNDED, "a.urdf", keep_fixed=True, exact=True)[0]
     moved = np.linalg.norm(tool(robot, q, tmp_path) - tool(exact, q, tmp_path), axis=1).max()
     limit = float(robot.angles.split()[-2])
     assert 0.2 * limit < moved < 1.05 * limit  # two digits are told

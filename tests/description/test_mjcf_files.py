@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 from oracles.mjcf_robots import ARM, GRIPPER
 from symgen.cli.main import app
 from symgen.description import load_robot
-from symgen.description.mjcf import read_mjcf
 from symgen.description.mjcf_text import reduced
+from symgen.description.tree_robot import read_tree
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
 
@@ -32,7 +32,7 @@ SMALL = """\
 
 def error_of(text):
     with pytest.raises(DescriptionError) as caught:
-        read_mjcf(
+        read_tree(
             text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"), "arm.xml"
         )
     assert caught.value.file == "arm.xml" and caught.value.line is not None
@@ -143,7 +143,7 @@ HOSTILE = {
 def test_hostile_files_are_refused(kind):
     start = time.process_time()
     if kind == "nested bodies":  # deep, and a mechanism all the same
-        assert read_mjcf(HOSTILE[kind].encode(), "arm.xml")[0].joints == (1, 2)
+        assert read_tree(HOSTILE[kind].encode(), "arm.xml")[0].joints == (1, 2)
     else:
         error_of(HOSTILE[kind])
     assert time.process_time() - start < 5  # the contract of issue 6: no hang above 5 s
@@ -158,11 +158,11 @@ def test_no_file_reaches_mujoco(monkeypatch):
     )
     kept = reduced(text.encode()).text
     assert not re.search(r"file|mesh|asset|memory|numeric|shell.stl|sensor|light ", kept)
-    read_mjcf(SMALL.encode(), "small.xml")  # what MuJoCo opens when it loads
+    read_tree(SMALL.encode(), "small.xml")  # what MuJoCo opens when it loads
     opened = []
     real = builtins.open
     monkeypatch.setattr(builtins, "open", lambda *a, **k: opened.append(a) or real(*a, **k))
-    read_mjcf(text.encode(), "arm.xml")
+    read_tree(text.encode(), "arm.xml")
     assert opened == []
 
 
@@ -171,7 +171,7 @@ def test_what_is_left_out_is_said():
         WORLD,
         '<option gravity="0 0 -9"><flag gravity="disable" contact="disable"/></option><worldbody>',
     )
-    robot, notes = read_mjcf(text.encode(), "small.xml")
+    robot, notes = read_tree(text.encode(), "small.xml")
     assert (
         "not read: flag contact" in notes
         and "gravcomp not read: 'b'" in notes
@@ -179,7 +179,7 @@ def test_what_is_left_out_is_said():
     )
     polynomial = SMALL.replace('axis="0 1 0"', 'axis="0 1 0" damping="1 0.5"')
     try:
-        said = read_mjcf(polynomial.encode(), "small.xml")[1]
+        said = read_tree(polynomial.encode(), "small.xml")[1]
     except DescriptionError as error:  # MuJoCo before 4 knows one damping
         assert "MuJoCo refuses" in error.message
     else:
@@ -211,7 +211,7 @@ def test_mangled_files_raise_nothing_else(data):
             + text[at + length :]
         )
     try:
-        read_mjcf(text.encode("utf-8", "surrogatepass"), "arm.xml")
+        read_tree(text.encode("utf-8", "surrogatepass"), "arm.xml")
     except DescriptionError as error:
         assert re.search(r"\(arm\.xml, line \d+\)$", str(error))
 
@@ -226,5 +226,5 @@ def test_nothing_is_said_or_written_beside_the_result(tmp_path, monkeypatch, cap
         '1"/></body></worldbody></mujoco>'
     )
     monkeypatch.chdir(tmp_path)
-    assert read_mjcf(text.encode(), "a.xml")[0].joints == (1, 2)
+    assert read_tree(text.encode(), "a.xml")[0].joints == (1, 2)
     assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")

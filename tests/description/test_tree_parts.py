@@ -11,7 +11,7 @@ from symgen.derive.lagrange import Lagrange
 from symgen.description import parse_robot
 from symgen.description.robot import INERTIAL
 from symgen.description.tree_parts import TreePart
-from symgen.description.urdf import read_urdf
+from symgen.description.tree_robot import read_tree
 from symgen.description.yaml import write_yaml
 from symgen.errors import DescriptionError
 
@@ -64,7 +64,7 @@ WHOLE = ("lift", "head", "shoulder", "elbow", "finger", "twin")
     ],
 )
 def test_the_rest_stands_still(part, moving, at):
-    found, notes = read_urdf(TEXT.encode(), "arms.urdf", part=part)
+    found, notes = read_tree(TEXT.encode(), "arms.urdf", part=part)
     names = legend(notes)
     assert list(names.values()) == moving and dict(found.labels) == names
     if found.constraints:
@@ -97,14 +97,14 @@ def test_the_rest_stands_still(part, moving, at):
 )
 def test_what_cannot_be_held_is_refused(part, words):
     with pytest.raises(DescriptionError, match=words):
-        read_urdf(TEXT.encode(), "arms.urdf", part=part)
+        read_tree(TEXT.encode(), "arms.urdf", part=part)
 
 
 def test_labels_are_those_of_the_file():
-    found, _ = read_urdf(TEXT.encode(), "arms.urdf", keep_fixed=True)
+    found, _ = read_tree(TEXT.encode(), "arms.urdf", keep_fixed=True)
     assert dict(parse_robot(write_yaml(found).encode(), "arms.yaml").labels) == dict(found.labels)
     strange = TEXT.replace('"head"', '"the &quot;head&quot;"')
-    found, notes = read_urdf(strange.encode(), "arms.urdf")
+    found, notes = read_tree(strange.encode(), "arms.urdf")
     assert 2 not in found.labels and any("no label" in note and "head" in note for note in notes)
 
 
@@ -118,7 +118,7 @@ def test_labels_are_those_of_the_file():
     ],
 )
 def test_labels_that_name_nothing_are_refused(labels, words):
-    found, _ = read_urdf(TEXT.encode(), "arms.urdf")
+    found, _ = read_tree(TEXT.encode(), "arms.urdf")
     text = write_yaml(found).split("labels:")[0] + f"labels: {labels}\n"
     with pytest.raises(DescriptionError, match=words):
         parse_robot(text.encode(), "arms.yaml")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from oracles.urdf_robots import panda, ur5
 from symgen.description import Robot, load_robot, parse
-from symgen.description.urdf import read_urdf
+from symgen.description.tree_robot import read_tree
 from symgen.description.urdf_write import write_urdf
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
@@ -33,13 +33,13 @@ ARM = """\
 
 def error_of(text):
     with pytest.raises(DescriptionError) as caught:
-        read_urdf(text if isinstance(text, bytes) else text.encode(), "arm.urdf")
+        read_tree(text if isinstance(text, bytes) else text.encode(), "arm.urdf")
     assert caught.value.file == "arm.urdf" and caught.value.line is not None
     return caught.value
 
 
 def test_what_is_not_read_is_noted():
-    robot, notes = read_urdf(ARM.encode(), "arm.urdf")
+    robot, notes = read_tree(ARM.encode(), "arm.urdf")
     assert robot.name == "my_arm" and [f.sigma for f in robot.frames] == [0, 1]
     assert (
         notes[0] == "joints: q1 = 's', q2 = 'e'"
@@ -99,7 +99,7 @@ def test_what_makers_leave_out():
         '<joint name="f" type="fixed"><parent link="b"/><child link="c"/><axis xyz="0 0 '
         '0"/></joint></robot>'
     )
-    robot, notes = read_urdf(text.replace("</robot>", fixed).encode(), "arm.urdf")
+    robot, notes = read_tree(text.replace("</robot>", fixed).encode(), "arm.urdf")
     assert (
         robot.values["ZZ1"] == 2 * 0.5**2
         and "point masses: 'a'" in " ".join(notes)
@@ -146,20 +146,20 @@ def test_hostile_files_are_refused(kind):
 def test_hostile_names_become_an_identifier():
     for name in ("1;import os", "class", "é'\\\"*/", "x" * 500, ""):
         text = ARM.replace("my arm", name.replace('"', "&quot;"))
-        robot, notes = read_urdf(text.encode(), "arm.urdf")
+        robot, notes = read_tree(text.encode(), "arm.urdf")
         assert re.fullmatch(r"[A-Za-z]\w{0,39}", robot.name, re.ASCII) and "\n" not in "".join(
             notes
         )
 
 
 def test_mimic_becomes_a_relation():
-    robot, _ = read_urdf(panda().encode(), "panda.urdf")
+    robot, _ = read_tree(panda().encode(), "panda.urdf")
     assert {j: str(e) for j, e in robot.constraints.items()} == {9: "q8"} and 9 not in robot.joints
     assert '<mimic joint="q8" multiplier="1.0" offset="0.0"/>' in write_urdf(robot)[0]
 
 
 def test_serial_arms_have_no_gamma_nor_b():
-    robot, _ = read_urdf(ur5().encode(), "ur5.urdf")
+    robot, _ = read_tree(ur5().encode(), "ur5.urdf")
     assert all(not f.gamma and not f.b for f in robot.frames[1:]) and robot.frames[1].alpha in (
         parse("pi/2"),
         parse("-pi/2"),
@@ -174,7 +174,7 @@ def test_export_needs_masses():
 
 
 def test_equal_lengths_are_one_constant():
-    robot: Robot = read_urdf(panda().encode(), "panda.urdf")[0]
+    robot: Robot = read_tree(panda().encode(), "panda.urdf")[0]
     assert str(robot.frame(4).d).lstrip("-") == str(robot.frame(5).d).lstrip("-") == "D4"
 
 
@@ -190,6 +190,6 @@ def test_mangled_files_raise_nothing_else(data):
             + text[at + length :]
         )
     try:
-        read_urdf(text.encode("utf-8", "surrogatepass"), "arm.urdf")
+        read_tree(text.encode("utf-8", "surrogatepass"), "arm.urdf")
     except DescriptionError as error:
         assert re.search(r"\(arm\.urdf, line \d+\)$", str(error))

@@ -25,7 +25,7 @@ from typer.testing import CliRunner
 
 from symgen.cli.main import app
 from symgen.description import load_robot, parse_robot, read_par, write_yaml
-from symgen.description.urdf import read_urdf
+from symgen.description.tree_robot import read_tree
 from symgen.description.urdf_write import write_urdf
 from symgen.emit.generate import generate_files
 from symgen.errors import SymgenError
@@ -360,10 +360,10 @@ def test_names_of_a_urdf_and_a_par_file(text):
         expat.ParserCreate().Parse(content, True)
     except expat.ExpatError:
         with pytest.raises(SymgenError):
-            read_urdf(content, "a.urdf")
+            read_tree(content, "a.urdf")
     else:
         for keep in (False, True):
-            given, notes = read_urdf(content, "a.urdf", keep_fixed=keep)
+            given, notes = read_tree(content, "a.urdf", keep_fixed=keep)
             assert all("\n" not in note and note.isprintable() for note in notes)
             assert (
                 parse_robot(write_yaml(given, comments=notes).encode(), "a.urdf").frames

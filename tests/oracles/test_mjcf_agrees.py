@@ -15,8 +15,8 @@ from symgen.derive.kinematics import frame_poses
 from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close
 from symgen.description import Robot
-from symgen.description.mjcf import read_mjcf
 from symgen.description.robot import PRISMATIC
+from symgen.description.tree_robot import read_tree
 
 from oracles.test_urdf_agrees import kept_frames, legend, loaded  # isort: skip
 
@@ -119,7 +119,7 @@ def pose_difference(text: str, robot: Robot, notes: tuple[str, ...]) -> float:
 @pytest.mark.parametrize("name", NAMED)
 @pytest.mark.parametrize("keep_fixed", [False, True])
 def test_torques(name, keep_fixed):
-    robot, notes = read_mjcf(NAMED[name].encode(), f"{name}.xml", keep_fixed=keep_fixed)
+    robot, notes = read_tree(NAMED[name].encode(), f"{name}.xml", keep_fixed=keep_fixed)
     assert difference(NAMED[name], robot, notes, 1) < TOLERANCE
     assert pose_difference(NAMED[name], robot, notes) < 1e-11
     assert (len(kept_frames(notes)) > 0) == (keep_fixed and name == "arm")
@@ -129,7 +129,7 @@ def test_random_trees():
     several = 0
     for seed in range(25):
         text = random_tree(seed)
-        robot, notes = read_mjcf(text.encode(), "tree.xml", keep_fixed=bool(seed % 2))
+        robot, notes = read_tree(text.encode(), "tree.xml", keep_fixed=bool(seed % 2))
         several += "_1" in notes[0]
         assert difference(text, robot, notes, seed) < TOLERANCE, seed
         assert pose_difference(text, robot, notes) < 1e-11, seed
@@ -137,7 +137,7 @@ def test_random_trees():
 
 
 def test_values_and_limits_of_an_arm():
-    robot, notes = read_mjcf(ARM.encode(), "arm.xml")
+    robot, notes = read_tree(ARM.encode(), "arm.xml")
     assert (
         robot.name == "bent_arm"
         and [f.sigma for f in robot.frames] == [0, 0, 0, 1]
@@ -160,7 +160,7 @@ def test_relations_of_joints_and_tendons():
     """q4 = 0.01 + 0.002 + 1.5 q3;  2 q1 - 0.5 (q2 - 0.2) = 0.1, solved for the joint that no motor
     drives: MuJoCo finds them met.
     """
-    robot, _ = read_mjcf(GRIPPER.encode(), "gripper.xml")
+    robot, _ = read_tree(GRIPPER.encode(), "gripper.xml")
     assert robot.joints == (1, 3) and {j: str(e) for j, e in robot.constraints.items()} == {
         2: "4*q1",
         4: "3*q3/2 + 0.012",

@@ -13,7 +13,8 @@ import pytest
 from oracles.test_urdf_agrees import kept_frames, legend, pose_difference
 from oracles.urdf_table import FOUND, difference, snapped_text
 from symgen.certify.modules import certify
-from symgen.description.urdf import SNAPPED, parse_urdf, read_urdf
+from symgen.description.tree_robot import read_tree
+from symgen.description.urdf import SNAPPED, parse_urdf
 from symgen.description.urdf_write import write_urdf
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import regroup
@@ -33,10 +34,10 @@ def test_torques_frames_and_round_trip(path: Path) -> None:
     content = path.read_bytes()
     if path.stem in REFUSED:
         with pytest.raises(DescriptionError, match=REFUSED[path.stem]):
-            read_urdf(content, path.name, exact=True)
+            read_tree(content, path.name, exact=True)
         return
-    robot, notes = read_urdf(content, path.name, exact=True)
-    kept, said = read_urdf(content, path.name, exact=True, keep_fixed=True)
+    robot, notes = read_tree(content, path.name, exact=True)
+    kept, said = read_tree(content, path.name, exact=True, keep_fixed=True)
     assert kept.joints == robot.joints and pose_difference(content.decode(), kept, said, 1) < POSE
     assert len(kept_frames(said)) == sum(
         joint.kind == "fixed" for joint in parse_urdf(content, path.name, exact=True).joints
@@ -47,7 +48,7 @@ def test_torques_frames_and_round_trip(path: Path) -> None:
         assert difference(content.decode(), found, names) < 1e-10
         again = write_urdf(found)[0]
         assert difference(again, found, {j: f"q{j}" for j in found.moving}) < 1e-10
-        back, of = read_urdf(again.encode(), "again.urdf", exact=True)
+        back, of = read_tree(again.encode(), "again.urdf", exact=True)
         assert difference(again, back, legend(of)) < 1e-10
 
 
@@ -59,16 +60,16 @@ def test_torques_with_snapped_angles(path: Path) -> None:
     if path.stem in REFUSED:
         pytest.skip(REFUSED[path.stem])
     text = path.read_text("utf-8")
-    robot, notes = read_urdf(text.encode(), path.name)
+    robot, notes = read_tree(text.encode(), path.name)
     assert (
         any(note.startswith(SNAPPED) for note in notes)
-        or robot.frames == read_urdf(text.encode(), path.name, exact=True)[0].frames
+        or robot.frames == read_tree(text.encode(), path.name, exact=True)[0].frames
     )
     assert not robot.values or difference(snapped_text(text), robot, legend(notes)) < 1e-9
 
 
 def certified(path: Path) -> None:
-    certificate = certify(regroup(read_urdf(path.read_bytes(), path.name)[0]))
+    certificate = certify(regroup(read_tree(path.read_bytes(), path.name)[0]))
     assert certificate.valid, str(certificate)
 
 

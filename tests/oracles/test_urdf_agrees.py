@@ -17,7 +17,7 @@ from symgen.derive.lagrange import Lagrange
 from symgen.derive.loops import close
 from symgen.description import Robot
 from symgen.description.robot import FIXED, PRISMATIC
-from symgen.description.urdf import read_urdf
+from symgen.description.tree_robot import read_tree
 from symgen.description.urdf_write import write_urdf
 from symgen.emit.generate import generate_module
 
@@ -121,13 +121,13 @@ def difference(text: str, robot: Robot, names: dict[int, str], seed: int) -> flo
 @pytest.mark.parametrize("make", NAMED, ids=lambda make: make.__name__)
 def test_torques_of_published_robots(make) -> None:
     text = make()
-    robot, notes = read_urdf(text.encode(), f"{make.__name__}.urdf", exact=True)
+    robot, notes = read_tree(text.encode(), f"{make.__name__}.urdf", exact=True)
     assert difference(text, robot, legend(notes), 1) < TOLERANCE
     again, said = write_urdf(robot)
     assert any("formulas" in note for note in said)
     names = {j: f"q{j}" for j in robot.moving}
     assert difference(again, robot, names, 2) < TOLERANCE
-    back, notes = read_urdf(again.encode(), "again.urdf", exact=True)
+    back, notes = read_tree(again.encode(), "again.urdf", exact=True)
     assert difference(again, back, legend(notes), 3) < TOLERANCE and len(back.frames) == len(
         robot.frames
     )
@@ -137,11 +137,11 @@ def test_random_trees() -> None:
     aside = 0
     for seed in range(20):
         text = random_tree(seed)
-        robot, notes = read_urdf(text.encode(), "tree.urdf", exact=True)
+        robot, notes = read_tree(text.encode(), "tree.urdf", exact=True)
         aside += any(f.sigma == FIXED for f in robot.frames)
         assert difference(text, robot, legend(notes), seed) < TOLERANCE, seed
         again, _ = write_urdf(robot)
-        back, notes = read_urdf(again.encode(), "again.urdf", exact=True)
+        back, notes = read_tree(again.encode(), "again.urdf", exact=True)
         assert difference(again, back, legend(notes), seed) < TOLERANCE, seed
         assert difference(again, robot, {j: f"q{j}" for j in robot.moving}, seed) < TOLERANCE, seed
     assert aside > 3  # nearly parallel axes took part
@@ -185,8 +185,8 @@ def test_kept_frames_of_published_robots(make) -> None:
     that move are the same.
     """
     text = make()
-    merged, _ = read_urdf(text.encode(), "arm.urdf")
-    robot, notes = read_urdf(text.encode(), "arm.urdf", keep_fixed=True)
+    merged, _ = read_tree(text.encode(), "arm.urdf")
+    robot, notes = read_tree(text.encode(), "arm.urdf", keep_fixed=True)
     assert (
         robot.frames[: len(merged.frames)] == merged.frames
         and robot.parameters == merged.parameters
@@ -208,7 +208,7 @@ def test_kept_frames_of_random_trees() -> None:
     for seed in range(40):
         text = random_tree(seed)
         if 'type="fixed"' in text:
-            robot, notes = read_urdf(text.encode(), "tree.urdf", exact=True, keep_fixed=True)
+            robot, notes = read_tree(text.encode(), "tree.urdf", exact=True, keep_fixed=True)
             kept += len(kept_frames(notes))
             assert pose_difference(text, robot, notes, seed) < 1e-12, seed
             assert difference(text, robot, legend(notes), seed) < TOLERANCE, seed

@@ -23,7 +23,8 @@ from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.description import Robot
 from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
-from symgen.description.urdf import SNAPPED, read_urdf
+from symgen.description.tree_robot import read_tree
+from symgen.description.urdf import SNAPPED
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
 
@@ -89,11 +90,11 @@ def row(path: Path) -> str:
     """One line of the table, or why the file is refused."""
     text, start = path.read_text("utf-8"), time.process_time()
     try:
-        robot, notes = read_urdf(text.encode(), path.name)
+        robot, notes = read_tree(text.encode(), path.name)
         regrouping = regroup(robot)
         certificate = certify(regrouping)
         seconds = time.process_time() - start
-        as_it_is, said = read_urdf(text.encode(), path.name, exact=True)
+        as_it_is, said = read_tree(text.encode(), path.name, exact=True)
     except SymgenError as error:
         return f"| `{path.stem}` | | | | refused: {str(error).partition(' (')[0]} | | | |"
     angles = sum(note.startswith(SNAPPED) for note in notes)
