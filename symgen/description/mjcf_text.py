@@ -39,16 +39,32 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {  # element: its attributes that matte
     "geom": ("name", "class", "type", "size", "fromto", "mass", "density", "shellinertia",
              "group", *_POSE),
     "site": ("name", "type", "size", "fromto", *_POSE),
+    "equality": (),
+    "tendon": (),
+    "fixed": ("name", "stiffness", "damping", "frictionloss", "armature", "springlength"),
 }  # fmt: skip
-RELATIONS: dict[str, tuple[str, ...]] = {
-    "joint": ("name", "joint1", "joint2", "polycoef", "active"),
-    "tendon": ("name", "tendon1", "tendon2", "polycoef", "active"),
+# of elements whose attributes are others where they stand
+ATTRIBUTES_IN: dict[tuple[str, str], tuple[str, ...]] = {
+    ("equality", "joint"): ("name", "joint1", "joint2", "polycoef", "active"),
+    ("equality", "tendon"): ("name", "tendon1", "tendon2", "polycoef", "active"),
+    ("fixed", "joint"): ("joint", "coef"),
+    **{
+        ("default", tag): tuple(key for key in ATTRIBUTES[tag] if key not in ("name", "class"))
+        for tag in ("joint", "geom")
+    },
 }
 TEXTS = ("name", "class", "childclass", "joint", "joint1", "joint2", "tendon1", "tendon2", "model")
-FIXED_TENDON = ("name", "stiffness", "damping", "frictionloss", "armature", "springlength")
 MULTIPLIED = (
     "replicate", "composite", "flexcomp", "flex", "attach", "include", "plugin", "extension",
 )  # fmt: skip
+BODIES = ("worldbody", "body", "frame")
+INSIDE = {  # element: what of its content matters
+    "default": ("default", "joint", "geom"),
+    **dict.fromkeys(BODIES, ("body", "frame", "joint", "freejoint", "inertial", "site", "geom")),
+    "equality": ("joint", "tendon"),
+    "tendon": ("fixed",),
+    "fixed": ("joint",),
+}
 SECTIONS = ("compiler", "option", "default", "worldbody", "equality", "tendon")
 IGNORED = (
     "actuator",
@@ -74,6 +90,8 @@ class Mjcf:
         Of the model, and the reduced file.
     weightless : bool
         Whether gravity is switched off.
+    from_geoms : bool
+        Whether geoms tell the mass of every body that moves, of those with an <inertial> too.
     joints : list of int
         Line of each joint, in the order of the file.
     bodies : int
@@ -87,6 +105,7 @@ class Mjcf:
     name: str
     text: str = ""
     weightless: bool = False
+    from_geoms: bool = False
     joints: list[int] = field(default_factory=list)
     bodies: int = 0
     driven: frozenset[str] = frozenset()
@@ -114,25 +133,12 @@ def reduced(content: bytes) -> Mjcf:
                 line=e.line,
             )
     mjcf = Mjcf(root.attributes.get("model", ""))
-    always = any(
+    mjcf.from_geoms = any(
         e.attributes.get("inertiafromgeom") == "true" for e in root.children if e.tag == "compiler"
     )
     parts = [_open(root, ATTRIBUTES["mujoco"])]
-    for e in (e for section in SECTIONS for e in root.children if e.tag == section):
-        if e.tag == "worldbody":
-            parts += [
-                "<worldbody>",
-                *_inside(e, mjcf, moves=False, weighed=False, always=always),
-                "</worldbody>",
-            ]
-        elif e.tag == "equality":
-            parts += ["<equality>", *_relations(e), "</equality>"]
-        elif e.tag == "tendon":
-            parts += ["<tendon>", *_tendons(e), "</tendon>"]
-        elif e.tag == "default":
-            parts += _default(e)
-        else:
-            parts.append(_open(e, ATTRIBUTES[e.tag], end="/"))
+    for section in SECTIONS:
+        parts += (text for e in root.own(section) for text in _copied(e, "mujoco", mjcf))
     mjcf.text = "".join([*parts, "</mujoco>"])
     flags = {
         key: value
@@ -176,88 +182,51 @@ def _open(e: XmlElement, attributes: Iterable[str], end: str = "") -> str:
     return f"<{e.tag}{''.join(f' {key}={quoteattr(value)}' for key, value in own.items())}{end}>"
 
 
-def _default(e: XmlElement) -> list[str]:
-    parts = [_open(e, ATTRIBUTES["default"])]
-    for child in e.children:
-        if child.tag == "default":
-            parts += _default(child)
-        elif child.tag in ("joint", "geom"):
-            parts.append(
-                _open(
-                    child,
-                    [key for key in ATTRIBUTES[child.tag] if key not in ("name", "class")],
-                    end="/",
-                )
-            )
-    return [*parts, "</default>"]
-
-
-def _inside(e: XmlElement, mjcf: Mjcf, *, moves: bool, weighed: bool, always: bool) -> list[str]:
-    """What stands in a body, a frame or the world; `weighed`: its geoms tell its mass, `always`:
-    those of every body that moves.
+def _copied(
+    e: XmlElement, holder: str, mjcf: Mjcf, *, moves: bool = False, weighed: bool = False
+) -> Iterator[str]:
+    """Text of an element in a `holder`, with what of its content matters; `moves`: it belongs to a
+    body that does, `weighed`: geoms tell the mass of its body.
     """
-    parts: list[str] = []
+    if e.tag == "body":
+        mjcf.bodies += 1
+        if mjcf.bodies > MAX_BODIES:
+            raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
+        tags = {child.tag for child in e.own("joint", "freejoint", "inertial")}
+        moves = moves or bool(tags - {"inertial"})
+        weighed = moves and (mjcf.from_geoms or "inertial" not in tags)
+    own = ATTRIBUTES_IN.get((holder, e.tag), ATTRIBUTES[e.tag])
+    if e.tag not in INSIDE:
+        yield _open(e, own, end="/")
+        return
+    yield _open(e, own)
     for child in e.children:
-        if child.tag == "body":
-            parts += _body(child, mjcf, moves=moves, always=always)
-        elif child.tag == "frame":
-            parts += [
-                _open(child, ATTRIBUTES["frame"]),
-                *_inside(child, mjcf, moves=moves, weighed=weighed, always=always),
-                "</frame>",
-            ]
-        elif child.tag in ("joint", "freejoint"):
-            mjcf.joints.append(child.line)
-            parts.append(_open(child, ATTRIBUTES[child.tag], end="/"))
-        elif child.tag in ("inertial", "site") or (child.tag == "geom" and weighed):
-            if child.tag == "geom" and any(key in child.attributes for key in ("mesh", "hfield")):
-                raise DescriptionError(
-                    (
-                        "the mass of this body would come from a mesh, which is not read; add "
-                        "<inertial>"
-                    ),
-                    line=child.line,
-                )
-            parts.append(_open(child, ATTRIBUTES[child.tag], end="/"))
-    return parts
+        if _matters(child, e.tag, weighed=weighed):
+            if e.tag in BODIES and child.tag in ("joint", "freejoint"):
+                mjcf.joints.append(child.line)
+            yield from _copied(child, e.tag, mjcf, moves=moves, weighed=weighed)
+    yield f"</{e.tag}>"
 
 
-def _body(e: XmlElement, mjcf: Mjcf, *, moves: bool, always: bool) -> list[str]:
-    mjcf.bodies += 1
-    if mjcf.bodies > MAX_BODIES:
-        raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
-    tags = {child.tag for child in e.own("joint", "freejoint", "inertial")}
-    moves = moves or bool(tags - {"inertial"})
-    inside = _inside(
-        e, mjcf, moves=moves, weighed=moves and (always or "inertial" not in tags), always=always
-    )
-    return [_open(e, ATTRIBUTES["body"]), *inside, "</body>"]
-
-
-def _relations(e: XmlElement) -> list[str]:
-    parts = []
-    for child in e.children:
-        if child.attributes.get("active") == "false":
-            continue
-        if child.tag not in RELATIONS:
-            name = child.attributes.get("name", "")
+def _matters(child: XmlElement, holder: str, *, weighed: bool) -> bool:
+    """Whether an element in a `holder` says something of the mechanism; DescriptionError where it
+    does, and is not read.
+    """
+    if holder == "equality" and child.attributes.get("active") == "false":
+        return False
+    if holder == "equality" and child.tag not in INSIDE[holder]:
+        name = child.attributes.get("name", "")
+        raise DescriptionError(
+            f"<{child.tag[:30]}> {name[:40]!r} in <equality>: joint and tendon relations are "
+            "read, closed loops and ties between bodies not; "
+            "describe the loop by cut and twin in a robot file",
+            line=child.line,
+        )
+    if holder in BODIES and child.tag == "geom":
+        if weighed and any(key in child.attributes for key in ("mesh", "hfield")):
             raise DescriptionError(
-                f"<{child.tag[:30]}> {name[:40]!r} in <equality>: joint and tendon relations are "
-                "read, closed loops and ties between bodies not; "
-                "describe the loop by cut and twin in a robot file",
+                "the mass of this body would come from a mesh, which is not read; add <inertial>",
                 line=child.line,
             )
-        parts.append(_open(child, RELATIONS[child.tag], end="/"))
-    return parts
-
-
-def _tendons(e: XmlElement) -> list[str]:
-    """Fixed tendons: sums of joint positions, which relations may tie."""
-    parts = []
-    for child in (child for child in e.children if child.tag == "fixed"):
-        parts += [
-            _open(child, FIXED_TENDON),
-            *(_open(x, ("joint", "coef"), end="/") for x in child.children if x.tag == "joint"),
-            "</fixed>",
-        ]
-    return parts
+        return weighed
+    return child.tag in INSIDE[holder]
