@@ -85,6 +85,6 @@ class Angles:
         warnings.warn(
             f"{file}: {text}; exact=True or --exact keeps them: {'; '.join(shown)}",
             AngleWarning,
-            stacklevel=6,
+            stacklevel=7,
         )
         return text, tuple(notes)

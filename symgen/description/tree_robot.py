@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import keyword
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -261,6 +261,16 @@ def _standard(table: Table, body: Body) -> Array:
     """XX XY XZ YY YZ ZZ MX MY MZ M of a body in its frame, shape (10,)."""
     links = [(table.tree.links[name], X) for name, X in body.links.items()]
     return sum((ten_of(own, X) for own, X in links if own is not None), start=np.zeros(10))
+
+
+def inertial_of(ten: Sequence[float]) -> Inertial:
+    """Mass, centre and tensor about it, axes of the frame, of XX XY XZ YY YZ ZZ MX MY MZ M."""
+    *J, mx, my, mz, M = (float(x) for x in ten)
+    c, I, pose = np.array([mx, my, mz]) / M if M else np.zeros(3), np.zeros((3, 3)), np.eye(4)
+    I[np.triu_indices(3)] = J
+    I = I + I.T - np.diag(np.diag(I)) - M * (c @ c * np.eye(3) - np.outer(c, c))
+    pose[:3, 3] = c
+    return Inertial(M, pose, I)
 
 
 def ten_of(inertial: Inertial, X: Array) -> Array:

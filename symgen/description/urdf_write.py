@@ -26,6 +26,8 @@ from symgen.description.robot import (
     parameter,
 )
 from symgen.description.tree import Array, transform, turn
+from symgen.description.tree_robot import inertial_of
+from symgen.description.urdf import TENSOR
 from symgen.errors import DescriptionError
 
 NO_LIMIT = 1e9  # where a URDF asks for a limit that the robot does not have
@@ -83,23 +85,18 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
     standard = [values[parameter(p, j)] for p in INERTIAL] if j in robot.links else []
     if not any(standard):
         return [f'  <link name="link{j}"/>']
-    *J, mx, my, mz, M = standard
+    *_, mx, my, mz, M = standard
     if M < 0 or (M == 0 and (mx, my, mz) != (0, 0, 0)):
         raise DescriptionError(
             f"{robot.name}: M{j} = {M} with other moments; no mass has these. Export a physically "
             "feasible estimate"
         )
-    c = np.array([mx, my, mz]) / M if M else np.zeros(3)
-    I = np.zeros((3, 3))
-    I[np.triu_indices(3)] = J
-    I -= M * (c @ c * np.eye(3) - np.outer(c, c))
-    inertia = dict(
-        zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), I[np.triu_indices(3)], strict=True)
-    )
+    own = inertial_of(standard)
+    inertia = dict(zip(TENSOR, own.I[np.triu_indices(3)], strict=True))
     return [
         f'  <link name="link{j}">',
         "    <inertial>",
-        f'      <origin xyz="{_numbers(c)}" rpy="0 0 0"/>',
+        f'      <origin xyz="{_numbers(own.pose[:3, 3])}" rpy="0 0 0"/>',
         f"      <mass {_attributes(value=M)}/>",
         f"      <inertia {_attributes(**inertia)}/>",
         "    </inertial>",

@@ -23,6 +23,7 @@ import numpy as np
 
 from symgen.description.mjcf_text import DEEPEST, ORIENTATION
 from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree
+from symgen.description.tree_robot import inertial_of
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 from symgen.update.xml_edits import XmlEdits, numbers, same
@@ -123,19 +124,14 @@ class LinkPlace:
 
     def numbers(self, ten: Array) -> Array:
         """NUMBERS, shape (10,), that the file states for ten parameters in frame j."""
-        *J, mx, my, mz, M = (float(x) for x in ten)
-        if M <= 0:
-            if np.any(ten):
-                raise DescriptionError(f"a mass of {M:.4g} kg comes out; no link has it")
+        if not np.any(ten):
             return np.zeros(10)
-        c, I = np.array([mx, my, mz]) / M, np.zeros((3, 3))
-        I[np.triu_indices(3)] = J
-        I = I + I.T - np.diag(np.diag(I)) - M * (c @ c * np.eye(3) - np.outer(c, c))
-        turned = self.X[:3, :3] @ (
-            self.axes if self.principal or self.attributes is URDF else np.eye(3)
-        )
-        tensor = (turned.T @ I @ turned)[np.triu_indices(3)]
-        return np.array([M, *(self.X[:3, :3].T @ (c - self.X[:3, 3])), *tensor])
+        if ten[-1] <= 0:
+            raise DescriptionError(f"a mass of {ten[-1]:.4g} kg comes out; no link has it")
+        own, R = inertial_of(ten), self.X[:3, :3]
+        turned = R @ (self.axes if self.principal or self.attributes is URDF else np.eye(3))
+        tensor = (turned.T @ own.I @ turned)[np.triu_indices(3)]
+        return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
     def write(self, edits: XmlEdits, ten: Array) -> None:
         """The edits that make the file state `ten`."""
