@@ -30,7 +30,7 @@ from symgen.description.xml_text import LARGEST, Array, XmlElement, read_element
 from symgen.errors import DescriptionError
 
 Mimic = tuple[str, Expression]  # joint that is followed, and the position by its own
-INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
 # children of an element that are read, and <material>, which says nothing that is left out
 READ = {
@@ -171,7 +171,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     pose = _pose(e, f"link {link.text('name')!a:.60}", "", angles)
     if inertia is None:  # a point mass: programs that read URDF say so and go on
         return Inertial(M, pose, np.zeros((3, 3)))
-    xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in INERTIA)
+    xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
     return Inertial(M, pose, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 

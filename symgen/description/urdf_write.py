@@ -27,7 +27,7 @@ from symgen.description.robot import (
 )
 from symgen.description.tree import Array, transform, turn
 from symgen.description.tree_robot import inertial_of
-from symgen.description.urdf import INERTIA
+from symgen.description.urdf import MOMENTS
 from symgen.errors import DescriptionError
 
 NO_LIMIT = 1e9  # where a URDF asks for a limit that the robot does not have
@@ -92,7 +92,7 @@ def _link(robot: Robot, j: int, values: Mapping[str, float]) -> list[str]:
             "feasible estimate"
         )
     own = inertial_of(standard)
-    inertia = dict(zip(INERTIA, own.I[np.triu_indices(3)], strict=True))
+    inertia = dict(zip(MOMENTS, own.I[np.triu_indices(3)], strict=True))
     return [
         f'  <link name="link{j}">',
         "    <inertial>",
