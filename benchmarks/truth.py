@@ -1,0 +1,697 @@
+"""Is what identify, its intervals, its verdict and the reader of counts say true? Asked of robots of
+known bodies by simulators of another make (`benchmarks/truth_simulator.py`).
+
+    python benchmarks/truth.py --question coverage --records 60 --seeds first --workers 1
+
+prints one table as Markdown and writes truth_NAME_SEEDS.json. Record k of a question always has the
+seed BASE[seeds] + k, whatever the number of records: `first` is for tuning, `second` has other
+robots and is run once at the end. The code that is judged is called by its public interface alone.
+
+    coverage       intervals of the sets of parameters against the truth; their errors on unseen motion
+    ends           records without noise: what the ends of the filters leave
+    homogeneity    pairs of one robot said to differ; pairs that differ by 3 % on one link
+    verdict        the word beside the true error on unseen motion
+    causes         causes told of right studies; wrong studies told by name
+    counts         the reader of counts beside the best low-pass of a grid, and with faults
+    counts_random  random readings: which contradict their counts, which are refused
+    physics        feasibility of right records, and what bounds by reach cut off
+
+Truth of base parameters: least squares of pinocchio's torques in random states on the emitted
+regressor, which must leave less than 1e-9. The true error of an estimate is
+100 ||tau - D X||/||tau||, tau without noise, on two motions that it has not seen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import pi, sqrt
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import truth_simulator as world
+from scipy.stats import spearmanr
+from truth_counts import counts, counts_random, counts_random_table, counts_table
+from truth_shared import (
+    LEVEL,
+    Array,
+    Row,
+    Unseen,
+    among,
+    deviations,
+    emitted,
+    markdown,
+    middle,
+    percent,
+    record_of,
+    robots_of,
+    study,
+    true_parameters,
+)
+from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
+
+import runtime
+
+BASE = {"first": 1_000_000, "second": 2_000_000}
+"""Seeds: record k has BASE + k."""
+NOISES = list(world.NOISES)
+
+
+# (1) Intervals ------------------------------------------------------------------------------------
+
+MOVES = ("fourier", "chirp", "points")
+SHARE = 0.02  # deviation of the noise over the rms torque of the joint
+
+
+def coverage(k: int, seed: int, seeds: str) -> list[Row]:
+    """One record: parameters of each set inside their 95 % intervals, and errors on unseen motion.
+
+    The feasible set is fitted with its bootstrap in every fourth record of each noise, which costs 30 fits.
+    """
+    robots = robots_of(seeds)
+    kind, robot = NOISES[k % 4], robots[(k // 4) % len(robots)]
+    motion = MOVES[(k // 4 // len(robots)) % len(MOVES)]
+    truth = Truth(robot, seed)
+    X, move, model = (
+        true_parameters(truth),
+        world.MOTIONS[motion](robot, seed),
+        emitted(robot.name)[0],
+    )
+    tau = truth.torque(move)
+    record = record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed))
+    settings = study(robot, motion)
+    result = runtime.identify(model, record, settings)
+    fits = dict(result.sets) or {"all": result.estimate}
+    if (k // 4) % 4 == 0:
+        own = study(robot, motion, estimate={"method": "feasible"})
+        fits["feasible"] = runtime.estimate(model, record, own)
+    unseen = Unseen(truth, seed)
+    rows = []
+    for name, fit in (
+        *fits.items(),
+        ("printed first", fits.get(result.model_columns, result.estimate)),
+    ):
+        s = deviations(fit)
+        at = [model.BASE_PARAMETERS.index(p) for p in fit.names]
+        known = np.isfinite(s) & (s > 0)
+        z = np.abs(fit.X - X[at])[known] / s[known]
+        total, worst = unseen.errors(fit.names, fit.X)
+        removed = [
+            abs(X[model.BASE_PARAMETERS.index(p)]) / d
+            for p, d in zip(fits["all"].names, deviations(fits["all"]), strict=True)
+            if p not in fit.names
+        ]
+        rows.append(
+            {"noise": kind, "robot": robot.name, "motion": motion, "set": name, "count": len(z), "inside": int((z < LEVEL).sum()),
+             "largest": float(z.max(initial=0.0)), "worst": fit.names[int(np.flatnonzero(known)[z.argmax()])] if len(z) else "",
+             "error": total, "error of a joint": worst, "removed": max(removed, default=0.0), "chosen": result.model_columns}
+        )  # fmt: skip
+    return rows
+
+
+def coverage_table(rows: list[Row]) -> str:
+    lines = []
+    for kind in NOISES:
+        for name in ("printed first", "essential", "all", "feasible"):
+            own = among(rows, noise=kind, set=name)
+            stated = [r for r in own if r["count"]]
+            count, inside = sum(r["count"] for r in stated), sum(r["inside"] for r in stated)
+            worst = [
+                100 * sum(r["inside"] for r in part) / sum(r["count"] for r in part)
+                for motion in MOVES
+                if (part := among(stated, motion=motion))
+            ]
+            lines.append(
+                (kind, name, len(own), len(stated), f"{percent(inside, count)} ({count})", f"{min(worst):.0f}" if worst else "-",
+                 f"{max((r['largest'] for r in stated), default=0.0):.1f}", middle([r["error"] for r in own]), middle([r["error of a joint"] for r in own]))
+            )  # fmt: skip
+    head = ("noise", "set", "records", "with intervals", "inside 95 %, % (values)", "worst motion, %", "largest error, deviations",
+            "true error, median %", "of the worst joint, median %")  # fmt: skip
+    pairs = [
+        (e["error"], a["error"])
+        for e, a in zip(among(rows, set="essential"), among(rows, set="all"), strict=True)
+    ]
+    removed = [r["removed"] for r in among(rows, set="essential")]
+    return (
+        markdown(head, lines)
+        + f"\n\nAll parameters predict unseen motion better than the essential ones in {sum(a < e for e, a in pairs)} of {len(pairs)} records; "
+        f"the largest parameter that was removed is {middle(removed)} of its deviations (median), {max(removed, default=0):.0f} (largest)."
+    )
+
+
+# (2) Ends of records ------------------------------------------------------------------------------
+
+
+def ends(k: int, seed: int, seeds: str) -> list[Row]:
+    """One record without noise, all parameters, by cut-off and by what is left out at the ends."""
+    robots = robots_of(seeds)
+    robot, motion = robots[k % len(robots)], ("fourier", "chirp")[(k // len(robots)) % 2]
+    truth, rows = Truth(robot, seed), []
+    X, move, model = (
+        true_parameters(truth),
+        world.MOTIONS[motion](robot, seed),
+        emitted(robot.name)[0],
+    )
+    record, unseen = record_of(move, truth.torque(move)), Unseen(truth, seed)
+    for cutoff in (20.0, 50.0):
+        factor = max(int(0.8 * world.RATE / 2 / cutoff), 1)
+        cases: dict[str, dict[str, Any]] = {
+            "default": {},
+            "2/cutoff + 27 samples": {"rows": {"trim": 27 + int(2 * world.RATE / cutoff / factor)}},
+        }
+        for label, more in cases.items():
+            settings = study(robot, motion, signals={"lowpass": {"cutoff": cutoff}}, **more)
+            fit = runtime.estimate(model, record, settings)
+            z = np.abs(fit.X - X) / deviations(fit)
+            rows.append({"robot": robot.name, "motion": motion, "cutoff": cutoff, "ends": label, "left": fit.relative_error,
+                         "error": unseen.errors(fit.names, fit.X)[0], "largest": float(z.max()), "inside": float((z < LEVEL).mean())})  # fmt: skip
+    return rows
+
+
+def ends_table(rows: list[Row]) -> str:
+    lines = []
+    for cutoff in (20.0, 50.0):
+        for label in dict.fromkeys(r["ends"] for r in rows):
+            own = among(rows, cutoff=cutoff, ends=label)
+            left = [r["left"] for r in own]
+            lines.append((f"{cutoff:g}", label, len(own), middle(left), f"{max(left):.2f}", middle([r["error"] for r in own]),
+                          f"{max(r['error'] for r in own):.2f}", f"{100 * np.mean([r['inside'] for r in own]):.0f}"))  # fmt: skip
+    head = (
+        "cut-off, Hz",
+        "left out at each end",
+        "records",
+        "unexplained, median %",
+        "largest %",
+        "true error, median %",
+        "largest %",
+        "inside 95 %, %",
+    )
+    return markdown(head, lines)
+
+
+# (3) Homogeneity ----------------------------------------------------------------------------------
+
+
+def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
+    """One pair of records of one robot; every fourth pair one link of the second is 3 % heavier."""
+    kind, different = NOISES[:3][k % 3], (k // 3) % 4 == 3
+    robots = robots_of(seeds)[:3]
+    robot = robots[(k // 3) % len(robots)]
+    motion = MOVES[(k // 9) % 3]
+    truth, records = Truth(robot, seed), []
+    for i in range(2):
+        own = truth.changed(0.03, seed) if different and i else truth
+        move = world.MOTIONS[motion](robot, seed + 250_000 * i)
+        tau = own.torque(move)
+        records.append(record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed + i)))
+    agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).homogeneity
+    assert agree is not None
+    tested = len(agree.records) > 1
+    return [{"noise": kind, "robot": robot.name, "motion": motion, "different": different, "tested": tested,
+             "said": bool(tested and not agree.agree), "largest": float(agree.largest) if tested else None}]  # fmt: skip
+
+
+def homogeneity_table(rows: list[Row]) -> str:
+    lines = []
+    for kind in (*NOISES[:3], "all"):
+        for different in (False, True):
+            own = [
+                r
+                for r in rows
+                if kind in (r["noise"], "all") and r["different"] == different and r["tested"]
+            ]
+            said, N = sum(r["said"] for r in own), len(own)
+            p = said / N if N else 0.0
+            lines.append(
+                (
+                    kind,
+                    "3 % on one link" if different else "one robot",
+                    N,
+                    said,
+                    percent(said, N),
+                    f"{100 * sqrt(p * (1 - p) / max(N, 1)):.0f}",
+                )
+            )
+    return markdown(
+        ("noise", "pairs of", "pairs", "said to differ", "%", "its deviation, %"), lines
+    )
+
+
+# (4) Verdict --------------------------------------------------------------------------------------
+
+LEVELS = (0.005, 0.02, 0.05, 0.15)
+STUDIES = (
+    "right",
+    "right",
+    "one joint hardly moves",
+    "encoder",
+    "right",
+    "short",
+    "slow",
+    "unmodelled friction",
+    "right",
+    "two joints as one",
+)
+
+
+def study_of(
+    kind: str, robot: Robot, seed: int, k: int
+) -> tuple[Truth, str, Motion, Array, Array, float]:
+    """Truth, motion's name, motion, positions and torques of a record that is right in unit, sign and time."""
+    rng, truth = np.random.default_rng([seed, 53]), Truth(robot, seed)
+    motion = "slow" if kind == "slow" else MOVES[(k // 2) % 3]
+    seconds, share = (
+        (3.0 if kind == "short" else 10.0),
+        float(LEVELS[int(rng.integers(len(LEVELS)))]),
+    )
+    move = world.MOTIONS[motion](robot, seed, seconds=seconds)
+    j = int(rng.integers(robot.n))
+    if kind == "one joint hardly moves":
+        scale = np.where(np.arange(robot.n) == j, 0.003, 1.0)
+        move = Motion(move.t, move.q * scale, move.qd * scale, move.qdd * scale)
+    if kind == "two joints as one":
+        other = (j + 1) % robot.n
+        move = Motion(move.t, *(_alike(x, j, other) for x in (move.q, move.qd, move.qdd)))
+    tau = truth.torque(move)
+    if kind == "unmodelled friction":
+        slow = np.array([0.1 * joint.speed for joint in robot.joints])
+        tau = tau + 1.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2))
+    q = (
+        encoded(robot, move, Encoder(2 * pi / float(rng.choice([500, 2000, 8000, 20000]))), seed)
+        if kind == "encoder"
+        else move.q
+    )
+    return (
+        truth,
+        motion,
+        move,
+        q,
+        tau + noise(tau, float(rng.choice([0.0, 0.9, 0.99])), share, seed),
+        share,
+    )
+
+
+def _alike(x: Array, j: int, other: int) -> Array:
+    x = x.copy()
+    x[:, other] = 0.8 * x[:, j]
+    return x
+
+
+def verdict(k: int, seed: int, seeds: str) -> list[Row]:
+    """One study as `symgen identify` does it: word, doubts, error that it states, true error."""
+    robots = robots_of(seeds)
+    kind, robot = STUDIES[k % len(STUDIES)], robots[(k // len(STUDIES) + k) % len(robots)]
+    truth, motion, move, q, tau, share = study_of(kind, robot, seed, k)
+    model, variants = emitted(robot.name)
+    result = runtime.identify(
+        model, record_of(move, tau, q), study(robot, motion), variants=variants
+    )
+    checks = result.checklist.checks
+    total, worst = Unseen(truth, seed).errors(result.model_estimate.names, result.model_estimate.X)
+    if not result.determined:  # no values are printed
+        total = worst = float("inf")
+    grade = getattr(result.checklist, "grade", None)
+    return [{"kind": kind, "robot": robot.name, "motion": motion, "noise": share, "state": result.checklist.state, "grade": grade,
+             "doubts": sum({"doubtful": 1, "no": 2}.get(c.state, 0) for c in checks), "questions": [c.question for c in checks if c.state in ("doubtful", "no")],
+             "stated": result.prediction_error, "error": total, "error of a joint": worst}]  # fmt: skip
+
+
+WORDS = {"good": 0, "doubtful": 1, "no": 2}
+CLASSES = ((0.0, 3.0), (3.0, 5.0), (5.0, 20.0), (20.0, np.inf))
+
+
+def verdict_table(rows: list[Row]) -> str:
+    lines = []
+    for low, high in CLASSES:
+        own = [
+            r for r in rows if low <= r["error"] < high or (high == np.inf and r["error"] == np.inf)
+        ]
+        label = (
+            f"{low:g} to {high:g} %" if np.isfinite(high) else f"above {low:g} %, or not determined"
+        )
+        lines.append((label, len(own), *(sum(r["state"] == state for r in own) for state in WORDS)))
+    text = [markdown(("true error on unseen motion", "studies", "Yes", "With care", "No"), lines)]
+    error = [min(r["error"], 1e6) for r in rows]
+    tell = "Can the values be told apart?"
+    without = [
+        max((WORDS["doubtful"] for q in r["questions"] if q != tell), default=0)
+        if r["state"] != "no"
+        else 2
+        for r in rows
+    ]
+    stated = [
+        (r["stated"], e) for r, e in zip(rows, error, strict=True) if np.isfinite(r["stated"])
+    ]
+    ranks = {
+        "the word": rank([WORDS[r["state"]] for r in rows], error),
+        f'the word without "{tell}"': rank(without, error),
+        "the number of doubts (no: two)": rank([r["doubts"] for r in rows], error),
+        "the stated error on unseen data": rank(*zip(*stated, strict=True)) if stated else np.nan,
+    }
+    if all(r["grade"] is not None for r in rows):
+        ranks["the grade"] = rank([r["grade"] for r in rows], error)
+    text.append(
+        markdown(
+            ("rank correlation with the true error", "Spearman"),
+            [(a, f"{b:.2f}") for a, b in ranks.items()],
+        )
+    )
+    asked: dict[str, list[float]] = {}
+    for r in rows:
+        for q in r["questions"] if r["error"] < 3 else ():
+            asked.setdefault(q, []).append(r["error"])
+    text.append(
+        markdown(
+            ("doubts where the true error is below 3 %", "studies"),
+            sorted(((q, len(v)) for q, v in asked.items()), key=lambda x: -x[1]),
+        )
+    )
+    return "\n\n".join(text)
+
+
+def rank(a: Sequence[float], b: Sequence[float]) -> float:
+    return float(spearmanr(a, b).statistic)
+
+
+# (5) Wrong causes ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What is wrong with a study: `spoil` takes truth, motion, positions, torques, a joint and random
+    numbers; `name` is a pattern that a finding which names it matches, {j} the joint, {i} the one
+    after it.
+    """
+
+    label: str
+    name: str
+    spoil: Callable[[Truth, Motion, Array, Array, int, np.random.Generator], tuple[Array, Array]]
+
+
+def _column(x: Array, j: int, values: Array) -> Array:
+    x = x.copy()
+    x[:, j] = values
+    return x
+
+
+def _late(
+    truth: Truth, move: Motion, q: Array, tau: Array, j: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    by = int(0.02 * world.RATE)
+    return q, _column(tau, j, np.concatenate([np.repeat(tau[:1, j], by), tau[:-by, j]]))
+
+
+def _frozen(
+    truth: Truth, move: Motion, q: Array, tau: Array, j: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    a = int(len(q) * rng.uniform(0.2, 0.5))
+    held = q[:, j].copy()
+    held[a : a + len(q) // 6] = held[a]
+    return _column(q, j, held), tau
+
+
+def _lost(
+    truth: Truth, move: Motion, q: Array, tau: Array, j: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    a = int(len(q) * rng.uniform(0.3, 0.7))
+    left = np.r_[0:a, a + 50 : len(q)]
+    return q[left], tau[left]
+
+
+def _swapped(x: Array, i: int, j: int) -> Array:
+    x = x.copy()
+    x[:, [i, j]] = x[:, [j, i]]
+    return x
+
+
+WRONG = (
+    Wrong("torque of a joint 20 ms late", r"late|delay|same instants|shift", _late),
+    Wrong("zero of a joint off by 15 degrees", r"zero of joint {j}|theta of (joint|frame) {j}", lambda w, m, q, y, j, r: (_column(q, j, q[:, j] + pi / 12), y)),
+    Wrong("torque coupling of two joints", r"coupling of joints ({j} and {i}|{i} and {j})", lambda w, m, q, y, j, r: (q, _column(y, j, y[:, j] + y[:, (j + 1) % y.shape[1]]))),
+    Wrong("frozen encoder", r"froze|frozen|holds|does not move|dropped|jumps", _frozen),
+    Wrong("50 samples lost", r"missing|lost|jump|two records", _lost),
+    Wrong("sign of a torque", r"torque of joint {j} has the wrong sign", lambda w, m, q, y, j, r: (q, _column(y, j, -y[:, j]))),
+    Wrong("sign of a ratio", r"joint {j} counts in the other sense|position of joint {j} has the wrong sign", lambda w, m, q, y, j, r: (_column(q, j, -q[:, j]), _column(y, j, -y[:, j]))),
+    Wrong("two torque columns exchanged", r"torque columns of joints ({j} and {i}|{i} and {j})", lambda w, m, q, y, j, r: (q, _swapped(y, j, (j + 1) % y.shape[1]))),
+    Wrong("ratio of a joint 1.4 times", r"torque of joint {j} is", lambda w, m, q, y, j, r: (q, _column(y, j, 1.4 * y[:, j]))),
+    Wrong("all torques 10 ms late", r"late|delay|same instants|shift", lambda w, m, q, y, j, r: (q, np.concatenate([np.repeat(y[:1], 10, axis=0), y[:-10]]))),
+)  # fmt: skip
+ONE_OF = 3
+"""Every third study of `causes` is wrong."""
+
+
+def causes(k: int, seed: int, seeds: str) -> list[Row]:
+    """One study: right, or with one of WRONG; the findings that are not good, and causes that are named."""
+    robots = robots_of(seeds)
+    rng, robot = np.random.default_rng([seed, 59]), robots[(k // 2) % len(robots)]
+    wrong = WRONG[(k // ONE_OF) % len(WRONG)] if k % ONE_OF == ONE_OF - 1 else None
+    motion, kind = MOVES[int(rng.integers(3))], NOISES[int(rng.integers(3))]
+    truth = Truth(robot, seed)
+    move, seconds = world.MOTIONS[motion](robot, seed), 10.0
+    tau = truth.torque(move)
+    q, tau = (
+        move.q,
+        tau + noise(tau, world.NOISES[kind], float(rng.choice([0.005, 0.01, 0.03])), seed),
+    )
+    j = int(
+        rng.integers(1, robot.n)
+    )  # the zero and the sign of the first joint can often not be told
+    if wrong is not None:
+        q, tau = wrong.spoil(truth, move, q, tau, j, rng)
+    model, variants = emitted(robot.name)
+    record = runtime.Record(np.arange(len(q)) / world.RATE, q, tau)
+    found = runtime.plausibility(model, record, study(robot, motion), variants=variants)
+    texts = [f"{c.question} {c.finding}" for c in found.checks if c.state in ("doubtful", "no")]
+    texts += [one["cause"] for one in found.named_causes]
+    pattern = wrong and wrong.name.format(j=j + 1, i=(j + 1) % robot.n + 1)
+    return [{"wrong": wrong.label if wrong else "", "robot": robot.name, "motion": motion, "noise": kind, "seconds": seconds, "joint": j + 1, "texts": texts,
+             "causes": [one["cause"] for one in found.named_causes], "states": [c.state for c in found.checks if c.state in ("doubtful", "no")],
+             "named": bool(pattern and any(re.search(pattern, text) for text in texts)), "equivalent": list(found.equivalent)}]  # fmt: skip
+
+
+def causes_table(rows: list[Row]) -> str:
+    lines = []
+    for label in ("", *(w.label for w in WRONG)):
+        own = among(rows, wrong=label)
+        told = sum(bool(r["texts"]) for r in own)
+        lines.append((label or "nothing (right studies)", len(own), sum(r["named"] for r in own) if label else "-",
+                      sum(bool(r["causes"]) and not r["named"] for r in own), told))  # fmt: skip
+    right: dict[str, int] = {}
+    for r in among(rows, wrong=""):
+        for text in r["texts"]:
+            key = re.sub(r"[-+]?\d[\d.]*", "#", text.split("?")[0] + "?" if "?" in text else text)
+            right[key] = right.get(key, 0) + 1
+    head = (
+        "what is wrong",
+        "studies",
+        "told by name",
+        "another cause named",
+        "any finding that is not good",
+    )
+    return (
+        markdown(head, lines)
+        + "\n\n"
+        + markdown(("told of right studies", "times"), sorted(right.items(), key=lambda x: -x[1]))
+    )
+
+
+# (8) Physics --------------------------------------------------------------------------------------
+
+PHYSICAL = ("pan_tilt", "gantry", "planar", "anthropomorphic", "finger", "one joint at rest")
+
+
+def physics(k: int, seed: int, seeds: str) -> list[Row]:
+    """One right record with 0.5 % of noise: said to be feasible? masses and parameters of the feasible fit."""
+    label = PHYSICAL[k % len(PHYSICAL)]
+    robot = finger() if label == "finger" else world.ROBOTS.get(label, world.ROBOTS["wrist"])
+    truth = Truth(robot, seed)
+    X, move, (model, _) = true_parameters(truth), world.fourier(robot, seed), emitted(robot.name)
+    if label == "one joint at rest":
+        still = np.where(np.arange(robot.n) == 3, 0.0, 1.0)
+        move = Motion(move.t, move.q * still, move.qd * still, move.qdd * still)
+    tau = truth.torque(move)
+    record = record_of(move, tau + noise(tau, 0.0, 0.005, seed))
+    row: Row = {
+        "robot": label,
+        "feasible": None,
+        "margin": None,
+        "blocking": [],
+        "masses": None,
+        "off": None,
+        "error": None,
+        "error free": None,
+        "said": "",
+    }
+    try:
+        result = runtime.identify(model, record, study(robot, "fourier"), physical=True)
+    except (runtime.InputError, ValueError) as e:
+        return [row | {"said": str(e)}]
+    row["said"] = "; ".join(result.missing) if label == "one joint at rest" else ""
+    if result.feasibility is not None:
+        row |= {
+            "feasible": bool(result.feasibility.feasible),
+            "margin": float(result.feasibility.margin),
+            "blocking": [c for c, _ in result.feasibility.blocking],
+        }
+    own = study(robot, "fourier", estimate={"method": "feasible", "options": {"bootstrap": 0}})
+    try:
+        fit = runtime.estimate(model, record, own)
+    except (runtime.InputError, ValueError) as e:
+        return [row | {"said": f"{row['said']} feasible: {e}"}]
+    unseen, standard = Unseen(truth, seed), dict(fit.details.get("standard", {}))
+    masses = {name: value for name, value in standard.items() if re.fullmatch(r"M\d+", name)}
+    free = result.sets.get("all")
+    scale = np.maximum(np.abs(X), 1e-12)
+    return [row | {"masses": masses, "true masses": truth.bodies.mass.tolist(), "off": float(100 * np.median(np.abs(fit.X - X) / scale)) if len(fit.X) == len(X) else None,
+                   "message": fit.message, "error": unseen.errors(fit.names, fit.X)[0], "error free": unseen.errors(free.names, free.X)[0] if free is not None else None}]  # fmt: skip
+
+
+@cache
+def finger() -> Robot:
+    """The planar arm at a tenth of its lengths and a five-hundredth of its masses."""
+    joints = tuple(
+        replace(
+            j,
+            xyz=tuple(0.1 * x for x in j.xyz),
+            mass=j.mass / 500,
+            box=tuple(0.1 * x for x in j.box),
+            centre=tuple(0.1 * x for x in j.centre),
+        )
+        for j in world.ROBOTS["planar"].joints
+    )
+    robot = Light("finger", joints)
+    world.ROBOTS[robot.name] = robot  # type: ignore[index]
+    return robot
+
+
+class Light(Robot):
+    """A robot of grams, whose friction is small beside its own weight."""
+
+    @property
+    def nominal(self) -> world.Bodies:
+        own = Robot(self.name, self.joints).nominal
+        return replace(own, viscous=1e-2 * own.viscous, dry=1e-2 * own.dry)
+
+
+def physics_table(rows: list[Row]) -> str:
+    lines = []
+    for label in PHYSICAL:
+        own = among(rows, robot=label)
+        asked = [r for r in own if r["feasible"] is not None]
+        blocked = sorted({b for r in asked for b in r["blocking"] if not r["feasible"]})
+        low = [
+            min(m / t for m, t in zip(r["masses"].values(), r["true masses"], strict=False))
+            for r in own
+            if r["masses"]
+        ]
+        high = [
+            max(m / t for m, t in zip(r["masses"].values(), r["true masses"], strict=False))
+            for r in own
+            if r["masses"]
+        ]
+        said = dict.fromkeys(r["said"].strip() for r in own if r["said"].strip())
+        lines.append((label, len(own), len(asked), sum(not r["feasible"] for r in asked), ", ".join(blocked[:4]), middle([r["error free"] for r in own]), middle([r["error"] for r in own]),
+                      middle(low), middle(high), "; ".join(text[:120] for text in list(said)[:2])))  # fmt: skip
+    head = ("robot", "records", "judged", "said not to be physical", "by", "true error of all, median %", "of the feasible, median %",
+            "mass over true mass: smallest link", "largest link", "what is said")  # fmt: skip
+    return markdown(head, lines)
+
+
+# Running ------------------------------------------------------------------------------------------
+
+QUESTIONS: dict[
+    str, tuple[Callable[[int, int, str], list[Row]], Callable[[list[Row]], str], int]
+] = {
+    "coverage": (coverage, coverage_table, 400),
+    "ends": (ends, ends_table, 20),
+    "homogeneity": (homogeneity, homogeneity_table, 400),
+    "verdict": (verdict, verdict_table, 200),
+    "causes": (causes, causes_table, 300),
+    "counts": (counts, counts_table, 600),
+    "counts_random": (counts_random, counts_random_table, 10_000),
+    "physics": (physics, physics_table, 60),
+}
+
+
+def one(task: tuple[str, int, str]) -> tuple[int, list[Row]]:
+    """Rows of record k; what breaks is a row with its text."""
+    question, k, seeds = task
+    try:
+        with np.errstate(all="ignore"):
+            return k, QUESTIONS[question][0](k, BASE[seeds] + k, seeds)
+    except Exception as e:
+        return k, [{"broke": f"{type(e).__name__}: {e}"}]
+
+
+def asked(
+    question: str, records: int, seeds: str, workers: int = 1, minutes: float = np.inf
+) -> list[Row]:
+    """Rows of the first records, in their order; fewer where the time ends before."""
+    began, results = time.monotonic(), []
+    for k, rows in done([(question, k, seeds) for k in range(records)], workers):
+        results.append((k, rows))
+        if time.monotonic() - began > 60 * minutes:
+            break
+    return [row | {"record": k} for k, rows in results for row in rows]
+
+
+def done(tasks: Sequence[tuple[str, int, str]], workers: int) -> Iterator[tuple[int, list[Row]]]:
+    if workers == 1:
+        yield from map(one, tasks)
+        return
+    with Pool(workers) as pool:
+        yield from pool.imap(one, tasks)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--question", choices=[*QUESTIONS, "all"], required=True)
+    parser.add_argument("--records", type=int, help="default: as many as the page is to have")
+    parser.add_argument("--seeds", choices=list(BASE), default="first")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument(
+        "--minutes", type=float, default=np.inf, help="start no record after this time"
+    )
+    parser.add_argument("--folder", type=Path, default=Path())
+    given = parser.parse_args()
+    for question in QUESTIONS if given.question == "all" else [given.question]:
+        _, table, usual = QUESTIONS[question]
+        began = time.monotonic()
+        rows = asked(question, given.records or usual, given.seeds, given.workers, given.minutes)
+        count = len({row["record"] for row in rows})
+        broke = [row for row in rows if "broke" in row]
+        print(
+            f"\n**{question}**, seeds {given.seeds}, {count} records, {time.monotonic() - began:.0f} s",
+            flush=True,
+        )
+        print(
+            *(f"\nrecord {row['record']} ended with {row['broke'][:300]}" for row in broke), sep=""
+        )
+        print(table([row for row in rows if "broke" not in row]) + "\n", flush=True)
+        file = given.folder / f"truth_{question}_{given.seeds}.json"
+        file.write_text(
+            json.dumps(
+                {
+                    "question": question,
+                    "seeds": given.seeds,
+                    "base": BASE[given.seeds],
+                    "records": count,
+                    "rows": rows,
+                },
+                indent=1,
+                default=float,
+            )
+        )
+
+
+if __name__ == "__main__":
+    main()
