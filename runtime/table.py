@@ -4,8 +4,11 @@ the page of a report.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from io import StringIO
+from typing import Any
 
 from runtime.markup import Markup, element, symbol, unit
 
@@ -102,6 +105,13 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
         ]
         text.append("  ".join(cells).rstrip())
     return "\n".join(text)
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Comma separated values under a header; a number as Python reads it back, None empty."""
+    stream = StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([header, *rows])
+    return stream.getvalue()
 
 
 def notebook(paragraphs: Sequence[str], *tables: Table) -> Markup:

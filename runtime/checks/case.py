@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from runtime.checks.delay import Delay, delay
+from runtime.checks.fits import Grams
 from runtime.checks.gravity import Gravity, gravity_direction
 from runtime.checks.known import KnownValues, known_values
 from runtime.checks.samples import Samples
@@ -64,6 +65,11 @@ class Case:
         """Units of the positions, by joint."""
         return list(joint_units(self.model))
 
+    def grams(self, mask: Array) -> Grams:
+        """Normal equations of the samples of a mask, bool (K, n)."""
+        tau = self.samples.tau
+        return Grams.of(self.D, tau - self.samples.tau_known, mask, tau)
+
     @property
     def turning(self) -> Array:
         """Whether each joint turns, (n,)."""
@@ -79,11 +85,10 @@ class Case:
         return ", ".join(str(self.model.JOINTS[j]) for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
-        """Values of the joints of a mask, with their units."""
-        return ", ".join(
-            f"{values[j]:.3g} {units[j]} (joint {self.model.JOINTS[j]})"
-            for j in np.flatnonzero(chosen)[:4]
-        )
+        """They reach these values, with their units: the joints of a mask, or else the largest."""
+        shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
+        each = (f"{values[j]:.3g} {units[j]} (joint {self.model.JOINTS[j]})" for j in shown)
+        return f"They reach {', '.join(each)}"
 
     @cached_property
     def observation(self) -> Observation | None:

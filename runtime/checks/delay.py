@@ -26,12 +26,13 @@ from runtime.checks.samples import motion_cutoff, moved
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
+from runtime.markup import number
 from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
 from runtime.signals.filters import Lowpass, lowpass_filtered, median_filtered
-from runtime.table import aligned
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -60,16 +61,23 @@ class Delay(Result):
     before: Array
     after: Array
 
-    def to_table(self) -> str:
+    def table(self) -> Table:
         """One line per joint, ms and %."""
-        lines = [("joint", "torque late by ms", "deviation ms", "error % without", "with")]
-        rows = zip(self.joints, self.shift, self.sigma, self.before, self.after, strict=True)
-        lines += [
-            (j, f"{1e3 * d:.2f}", f"{1e3 * s:.2f}", f"{a:.2f}", f"{b:.2f}")
-            for j, d, s, a, b in rows
-        ]
-        return aligned(
-            [*lines, ("all", f"{1e3 * self.common:.2f}", f"{1e3 * self.sigma_common:.2f}", "", "")]
+        columns = (1e3 * self.shift, 1e3 * self.sigma, self.before, self.after)
+        return Table(
+            "Delay of the torques against the positions",
+            ("joint", "torque late by, ms", "deviation, ms", "error without, %", "with, %"),
+            [
+                (joint, *(number(x, ".2f") for x in row))
+                for joint, *row in zip(self.joints, *columns, strict=True)
+            ],
+        )
+
+    def to_table(self) -> str:
+        """The table, and the mean over the joints."""
+        return (
+            f"{self.table().to_text()}\nall joints: {1e3 * self.common:.2f} ms, deviation "
+            f"{1e3 * self.sigma_common:.2f} ms"
         )
 
 

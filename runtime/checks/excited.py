@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from runtime.checks.case import Case
-from runtime.checks.check import Check
+from runtime.checks.check import Answer, Question, named
 from runtime.errors import InputError
 from runtime.excitation.criteria import Weights, kept_correlation
 from runtime.limits import LIMIT
@@ -23,14 +23,21 @@ from runtime.rows.observation import Observation
 from runtime.settings.study import Signals
 
 
-def motion_excites(case: Case) -> Check | None:
+@Question(
+    "Does the motion excite every parameter?",
+    f"predicted deviation below {LIMIT.UNEXCITED:g} % of the largest possible value, with "
+    f"{100 * LIMIT.TORQUE_NOISE:g} % of torque noise",
+    "move the joints behind these parameters more, further or faster (symgen excite finds "
+    "a motion), or leave them out (estimate.columns)",
+)
+def motion_excites(case: Case) -> Answer | None:
     """Parameters that the motion cannot tell; None where the study has no rows."""
     if case.observation is None:
         return None
     return excited(case.observation, case.study.signals, case.records[0].rate)
 
 
-def excited(observation: Observation, signals: Signals, rate: float) -> Check | None:
+def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
     """Parameters that the motion cannot tell; None where W has no full rank, which the fit itself
     says by name.
     """
@@ -38,36 +45,15 @@ def excited(observation: Observation, signals: Signals, rate: float) -> Check | 
         shares = unexcited_shares(observation, signals, rate)
     except (InputError, np.linalg.LinAlgError):
         return None
-    question, limit = (
-        "Does the motion excite every parameter?",
-        (
-            f"predicted deviation below {LIMIT.UNEXCITED:g} % of the largest possible value, with "
-            f"{100 * LIMIT.TORQUE_NOISE:g} % of torque noise"
-        ),
-    )
     order = sorted(shares, key=lambda name: -shares[name])
     unseen = [name for name in order if shares[name] > LIMIT.UNEXCITED]
-    if not unseen:
-        weak = [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]
-        text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %" + (
-            f"; above {LIMIT.LARGE_DEVIATION:g} %: {', '.join(weak[: LIMIT.PARAMETERS_NAMED])}"
-            if weak
-            else ""
-        )
-        return Check(question, "good", text, limit)
-    named = ", ".join(unseen[: LIMIT.PARAMETERS_NAMED]) + (
-        f" and {len(unseen) - LIMIT.PARAMETERS_NAMED} more"
-        if len(unseen) > LIMIT.PARAMETERS_NAMED
-        else ""
-    )
-    remedy = (
-        "move the joints behind these parameters more, further or faster (symgen excite "
-        "finds "
-        "a motion), or leave them out (estimate.columns)"
-    )
-    return Check(
-        question, "doubtful", f"It cannot tell {named}, whatever their values", limit, remedy
-    )
+    if unseen:
+        return Answer("doubtful", f"It cannot tell {named(unseen)}, whatever their values")
+    text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %"
+    if weak := [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]:
+        listed = ", ".join(weak[: LIMIT.PARAMETERS_NAMED])
+        text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {listed}"
+    return Answer("good", text, "")
 
 
 def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:

@@ -17,8 +17,10 @@ import numpy as np
 from runtime.checks.trials import Problem
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
+from runtime.markup import number
 from runtime.model.generated import elements_of
 from runtime.model.inertia import INERTIAL
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -43,6 +45,20 @@ class KnownValues(Result):
     inertia: Array
     error: Array
     complete: bool
+
+    def table(self) -> Table:
+        """One line per joint."""
+        rows = zip(self.joints, self.gravity, self.inertia, self.error, strict=True)
+        return Table(
+            "Values of the robot file against the record, friction fitted",
+            (
+                "joint",
+                "gravity torque, measured over computed",
+                "inertia torque, measured over computed",
+                "error of the values, %",
+            ),
+            [(j, number(g, ".2f"), number(a, ".2f"), number(e, ".1f")) for j, g, a, e in rows],
+        )
 
     @property
     def off(self) -> tuple[str, ...]:

@@ -133,6 +133,12 @@ class Plausibility(
             lines or ["Record, study and robot file suit each other, as far as judged."]
         )
 
+    def tables(self) -> list[Table]:
+        """Alternatives, delays and values of the robot file, as far as they were judged."""
+        judged = (self.delay, self.robot_values)
+        tried = [self.table()] if any(trial.fit is not None for trial in self.trials) else []
+        return [*tried, *(own.table() for own in judged if own is not None)]
+
     def table(self) -> Table:
         """The alternatives that come nearest, errors by joint in %."""
         rows = [
@@ -140,10 +146,8 @@ class Plausibility(
             for t in self.trials
             if t.fit is not None
         ]
-        joints = (
-            len(self.trials[0].fit.errors) if self.trials and self.trials[0].fit is not None else 0
-        )
-        header = ("changed", "gain, nats", *(f"joint {j + 1} %" for j in range(joints)))
+        joints = range(1, max(map(len, rows), default=2) - 1)
+        header = ("changed", "gain, nats", *(f"joint {j} %" for j in joints))
         return Table(
             "What would explain the record better (gain above 0), or as well",
             header,
@@ -231,7 +235,14 @@ def _case(
     try:
         D = np.asarray(model.regressor(samples.q, samples.qd, samples.qdd))
     except ValueError as e:
-        return closure(str(e))
+        return Check(
+            "Do the loops close in the positions of the record?",
+            "no",
+            f"No: {e}",
+            "every instant",
+            "look at sign, zero and order of the positions, at their unit, and at the lengths and "
+            "the start of the loop",
+        )
     return Case(model, own, straight, study, samples, D, variants)
 
 
@@ -255,22 +266,6 @@ def _ranked(trials: Sequence[Trial]) -> list[Trial]:
         cause = f"the sampling rate is {times_of(alike)} the stated one"
         kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
     return sorted(kept, key=lambda trial: -trial.gain)
-
-
-def closure(message: str) -> Check:
-    """The loops of the robot file do not close in the positions of the record."""
-    remedy = (
-        "look at sign, zero and order of the positions, at their unit, and at the lengths "
-        "and "
-        "the start of the loop"
-    )
-    return Check(
-        "Do the loops close in the positions of the record?",
-        "no",
-        f"No: {message}",
-        "every instant",
-        remedy,
-    )
 
 
 def _sentence(text: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from runtime.checks.case import Case
-from runtime.checks.check import Check, State
+from runtime.checks.check import Answer, Question, State
 from runtime.checks.samples import Samples
 from runtime.errors import InputError
 from runtime.limits import LIMIT
@@ -19,17 +19,19 @@ from runtime.settings.study import EstimateSettings, Study
 Array = np.ndarray
 
 
-def rest(case: Case) -> Check:
+@Question(
+    "Do the joints move while they are used?",
+    f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
+)
+def rest(case: Case) -> Answer:
     """Share of the instants at which a joint stands, and what leaving them out changes."""
     model, study = case.model, case.study
-    question = "Do the joints move while they are used?"
-    limit = f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used"
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
     text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
     proposed = low_speed_of_rest(case.samples, study)
     if proposed is None:
-        return Check(question, "good", text, limit)
+        return Answer("good", text)
     stated = list(proposed) if isinstance(proposed, tuple) else proposed
     remedy = (
         f"set rows.low_speed: {stated} ({case.units[worst]}/s), or cut the record (rows.window)"
@@ -40,14 +42,14 @@ def rest(case: Case) -> Check:
     except InputError:
         without = None
     if case.observation is None or without is None:
-        return Check(question, "doubtful", text, limit, remedy)
+        return Answer("doubtful", text, remedy)
     before, after = (
         estimate_of(rows, EstimateSettings(), model=model).relative_error
         for rows in (case.observation, without)
     )
     text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
     state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
-    return Check(question, state, text, limit, remedy)
+    return Answer(state, text, remedy)
 
 
 def standing_share(samples: Samples, study: Study) -> Array:

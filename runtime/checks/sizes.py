@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from runtime.checks.case import Case
-from runtime.checks.check import Check, State
+from runtime.checks.check import Answer, Question, State
 from runtime.estimators.physical import frame_origins
 from runtime.limits import LIMIT
 from runtime.model.inertia import PhysicalModel
@@ -21,23 +21,26 @@ from runtime.records.stream import Stream
 Array = np.ndarray
 
 
-def times(records: Sequence[Record | Stream]) -> Check:
+@Question(
+    "Are the times those of a log?",
+    f"{LIMIT.LOG_RATES[0]:g} Hz to {LIMIT.LOG_RATES[1] / 1e3:g} kHz",
+    "look at the unit of the time column (record.units.t: ms, us) and at record.rate",
+)
+def times(records: Sequence[Record | Stream]) -> Answer:
     """Sampling rate and duration of the records."""
-    question, limit = (
-        "Are the times those of a log?",
-        f"{LIMIT.LOG_RATES[0]:g} Hz to {LIMIT.LOG_RATES[1] / 1e3:g} kHz",
-    )
     record = min(records, key=lambda one: one.rate)
-    duration = len(record) / record.rate
-    text = f"{record.rate:.4g} Hz over {duration:.4g} s"
+    text = f"{record.rate:.4g} Hz over {len(record) / record.rate:.4g} s"
     wrong = any(not LIMIT.LOG_RATES[0] <= one.rate <= LIMIT.LOG_RATES[1] for one in records)
-    remedy = "look at the unit of the time column (record.units.t: ms, us) and at record.rate"
-    return Check(question, "no" if wrong else "good", text, limit, remedy)
+    return Answer("no" if wrong else "good", text)
 
 
-def positions(case: Case) -> Check:
+@Question(
+    "Are the positions those of this robot?",
+    remedy="look at zero and sign of these joints (theta, drives.offset, ratio), the order of "
+    "the columns, the unit and the side of the positions",
+)
+def positions(case: Case) -> Answer:
     """Largest |q| against limits.q, else against a turn or two."""
-    question = "Are the positions those of this robot?"
     q, turning = case.samples.q, case.turning
     low, high = q.min(axis=0), q.max(axis=0)
     largest = np.maximum(-low, high)
@@ -53,107 +56,103 @@ def positions(case: Case) -> Check:
         limit = f"{angle[0]:.3g} rad, {travel[0]:g} m (no limits.q in the robot file)"
     rests = case.samples.still()
     if not out.any() and rests.any() and len(rests) > 1:
-        several = int(np.count_nonzero(rests)) > 1
-        text = f"Joint{'s' * several} {case.joints(rests)} {'stand' if several else 'stands'} still"
+        stand = f"Joint {case.joints(rests)} stands"
+        if np.count_nonzero(rests) > 1:
+            stand = f"Joints {case.joints(rests)} stand"
         remedy = "look at the columns of these positions; their parameters cannot be identified"
-        return Check(question, "doubtful", f"{text} in the whole record", limit, remedy)
-    shown = out if out.any() else np.arange(len(out)) == np.argmax(largest)
-    text = f"They reach {case.reaching(largest, case.units, shown)}"
+        return Answer("doubtful", f"{stand} still in the whole record", remedy, limit)
+    text = case.reaching(largest, case.units, out)
     if not out.any():
-        return Check(question, "good", text, limit)
+        return Answer("good", text, "", limit)
     turns = largest[turning]
-    degrees = (
-        bool((out & turning).any())
+    if (
+        (out & turning).any()
         and float(np.median(turns)) * np.pi / 180 < 2 * np.pi
         and float(turns.max()) > 2 * LIMIT.LARGEST_ANGLE[0]
-    )
-    remedy = (
-        "degrees read as rad? set record.units.q: deg; or motor side read as joint side "
-        "(record.side)"
-        if degrees
-        else "look at zero and sign of these joints (theta, drives.offset, ratio), the order of "
-        "the columns, the unit and the side of the positions"
-    )
-    return Check(question, "no" if far.any() or degrees else "doubtful", text, limit, remedy)
+    ):
+        remedy = (
+            "degrees read as rad? set record.units.q: deg; or motor side read as joint side "
+            "(record.side)"
+        )
+        return Answer("no", text, remedy, limit)
+    return Answer("no" if far.any() else "doubtful", text, limit=limit)
 
 
-def _against(
-    case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]], unit: str
-) -> tuple[State, str, str]:
-    units = [f"{one}/{unit}" for one in case.units]
+def _against(case: Case, key: str, values: Array, sane: dict[str, tuple[float, float]]) -> Answer:
+    """Largest speeds or accelerations against the limits of the robot file, else sane ones."""
+    unit = {"qd": "s", "qdd": "s^2"}[key]
     limits = case.limits(key)
     if limits is not None:
-        out, far, limit = (
-            values > 1.5 * limits,
-            values > 4 * limits,
-            f"limits.{key} of the robot file",
-        )
+        out, far = values > 1.5 * limits, values > 4 * limits
+        limit = f"limits.{key} of the robot file"
     else:
-        bounds = np.array([sane[one] for one in case.units])
-        out, far = values > bounds.T
+        out, far = values > np.array([sane[one] for one in case.units]).T
         limit = f"{sane['rad'][0]:g} rad/{unit}, {sane['m'][0]:g} m/{unit}"
-    shown = out if out.any() else np.arange(len(out)) == int(np.argmax(values))
     state: State = "no" if far.any() else "doubtful" if out.any() else "good"
-    return state, f"They reach {case.reaching(values, units, shown)}", limit
+    units = [f"{one}/{unit}" for one in case.units]
+    return Answer(state, case.reaching(values, units, out), limit=limit)
 
 
-def speeds(case: Case) -> Check:
+@Question(
+    "Are the speeds those of this robot?",
+    remedy="look at the sampling rate and the unit of time (record.rate, units.t), then at the "
+    "unit and the side of the positions",
+)
+def speeds(case: Case) -> Answer:
     """Largest speed of every joint; one that is far too slow too."""
     largest = np.abs(case.samples.qd).max(axis=0)
-    state, text, limit = _against(case, "qd", largest, LIMIT.LARGEST_SPEED, "s")
-    remedy = (
-        "look at the sampling rate and the unit of time (record.rate, units.t), then at the "
-        "unit and the side of the positions"
-    )
+    answer = _against(case, "qd", largest, LIMIT.LARGEST_SPEED)
     if float(largest.max()) < LIMIT.NOTHING_MOVES:
-        state, text = "no", f"{text}: nothing moves"
-    return Check("Are the speeds those of this robot?", state, text, limit, remedy)
+        return answer._replace(state="no", finding=f"{answer.finding}: nothing moves")
+    return answer
 
 
-def accelerations(case: Case) -> Check:
+@Question(
+    "Are the accelerations those of this robot?",
+    remedy="look at the sampling rate and the unit of time; noise of the positions asks for a "
+    "lower signals.lowpass.cutoff",
+)
+def accelerations(case: Case) -> Answer:
     """Largest acceleration of every joint."""
     largest = np.abs(case.samples.qdd).max(axis=0)
-    state, text, limit = _against(case, "qdd", largest, LIMIT.LARGEST_ACCELERATION, "s^2")
-    remedy = (
-        "look at the sampling rate and the unit of time; noise of the positions asks for a "
-        "lower signals.lowpass.cutoff"
-    )
-    state = "doubtful" if state == "no" and limit.startswith("limits") else state
-    return Check("Are the accelerations those of this robot?", state, text, limit, remedy)
+    answer = _against(case, "qdd", largest, LIMIT.LARGEST_ACCELERATION)
+    mild = answer.state == "no" and case.limits("qdd") is not None
+    return answer._replace(state="doubtful") if mild else answer
 
 
-def torques(case: Case) -> Check:
+@Question(
+    "Are the torques those of this robot?",
+    "limits.tau of the robot file",
+    "look at the unit, the side and the columns of the torques (record.units.tau, "
+    "torque_side, columns.tau)",
+)
+def torques(case: Case) -> Answer:
     """Largest torque against limits.tau, where the robot file gives them; torques that never
     change.
     """
-    question = "Are the torques those of this robot?"
-    remedy = (
-        "look at the unit, the side and the columns of the torques (record.units.tau, "
-        "torque_side, columns.tau)"
-    )
-    limits, limit = case.limits("tau"), "limits.tau of the robot file"
+    limits = case.limits("tau")
     if (flat := case.samples.constant()).any():
         text = f"The torque of joint {case.joints(flat)} is constant"
-        return Check(question, "no", text, "torques that change", remedy)
+        return Answer("no", text, limit="torques that change")
     if limits is None:
-        text = "They change on every joint; the robot file gives no limits.tau"
-        return Check(question, "good", text, limit)
+        return Answer("good", "They change on every joint; the robot file gives no limits.tau", "")
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
         units = np.where(case.turning, "N m", "N").tolist()
-        return Check(
-            question, "no", f"They reach {case.reaching(largest, units, out)}", limit, remedy
-        )
+        return Answer("no", case.reaching(largest, units, out))
     share = 100 * float((largest / limits).max())
     if share < 1:
-        text = f"They reach {share:.2g} % of limits.tau at most"
-        return Check(question, "doubtful", text, limit, remedy)
-    return Check(question, "good", f"They reach {share:.0f} % of limits.tau", limit)
+        return Answer("doubtful", f"They reach {share:.2g} % of limits.tau at most")
+    return Answer("good", f"They reach {share:.0f} % of limits.tau", "")
 
 
-def lengths(case: Case) -> Check | None:
+@Question(
+    "Are the lengths those of an arm?",
+    f"links up to {LIMIT.LONGEST_LINK:g} m, none {LIMIT.LOPSIDED:g} times the others",
+    "give d and r of the robot file in m",
+)
+def lengths(case: Case) -> Answer | None:
     """Reach and the longest link of the robot file, in the positions of the record."""
-    limit = f"links up to {LIMIT.LONGEST_LINK:g} m, none {LIMIT.LOPSIDED:g} times the others"
     P = frame_origins(case.model, case.samples.q[:: max(1, len(case.samples) // 32)])
     if P is None or not P.shape[1]:
         return None
@@ -162,33 +161,30 @@ def lengths(case: Case) -> Check | None:
     spans = np.where(np.isfinite(spans), spans, 0.0)
     worst, longest, whole = int(np.argmax(spans)), float(spans.max()), float(spans.sum())
     text = f"The longest link ends at frame {worst + 1}: {longest:.4g} m of {whole:.4g} m in all"
-    lopsided = longest > LIMIT.LOPSIDED * max(whole - longest, 1e-9)
-    state: State = "doubtful" if lopsided and np.count_nonzero(spans > 1e-9) > 1 else "good"
     if longest > LIMIT.LONGEST_LINK or 0 < whole < LIMIT.SHORTEST_REACH:
-        state = "no"
-    remedy = "" if state == "good" else "give d and r of the robot file in m"
-    return Check("Are the lengths those of an arm?", state, text, limit, remedy)
+        return Answer("no", text)
+    lopsided = longest > LIMIT.LOPSIDED * max(whole - longest, 1e-9)
+    if lopsided and np.count_nonzero(spans > 1e-9) > 1:
+        return Answer("doubtful", text)
+    return Answer("good", text, "")
 
 
-def inertias(case: Case) -> Check | None:
+@Question(
+    "Can bodies have the values of the robot file?",
+    "pseudo-inertia of every link not negative; inertia about the origin of the link frame",
+    "give inertias about the origin of the link frame, not about the centre of mass; XY = "
+    "-integral x y dm; kg m^2",
+)
+def inertias(case: Case) -> Answer | None:
     """Whether the values of the robot file are those of bodies: every pseudo-inertia positive
     semidefinite.
     """
     if case.physical is None or not case.physical.values:
         return None
-    question = "Can bodies have the values of the robot file?"
-    limit = "pseudo-inertia of every link not negative; inertia about the origin of the link frame"
     wrong = list(_wrong_links(case.physical))
     if not wrong:
-        return Check(question, "good", "Every link with ten values can exist", limit)
-    remedy = (
-        "give inertias about the origin of the link frame, not about the centre of mass; XY "
-        "= "
-        "-integral x y dm; kg m^2"
-    )
-    return Check(
-        question, "doubtful", f"No body has those of link {', '.join(wrong)}", limit, remedy
-    )
+        return Answer("good", "Every link with ten values can exist", "")
+    return Answer("doubtful", f"No body has those of link {', '.join(wrong)}")
 
 
 def _wrong_links(physical: PhysicalModel) -> Iterator[str]:

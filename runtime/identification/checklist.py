@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.checks.check import WORST, Check, State, worst_of
+from runtime.checks.check import WORST, Answer, Check, Question, State, named, worst_of
 from runtime.estimators.estimate import Estimate
 from runtime.identification.homogeneity import Homogeneity
 from runtime.json_documents import Result
@@ -186,94 +186,70 @@ def checklist_of(
         differ = homogeneity is not None and homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE
         checks += [
             explained(fit),
-            *explained_by_joint(estimate, fit),
+            explained_by_joint(estimate, fit),
             predicted(fit, prediction_error, halves, differ=differ),
-        ]
-        checks += [] if homogeneity is None else [agreeing(homogeneity)]
-        checks += [signs(negative), certain(fit, bootstrap), separate(fit), *last]
-        checks += [
+            None if homogeneity is None else agreeing(homogeneity),
+            signs(negative),
+            certain(fit, bootstrap),
+            separate(fit),
+            *last,
             physical(fit if "standard" in fit.details else estimate, feasibility),
             resolved(advice),
         ]
-    return Checklist(tuple(checks), use)
+    return Checklist(tuple(check for check in checks if check is not None), use)
 
 
-def determined(estimate: Estimate, fit: Estimate) -> Check:
+@Question(
+    "Does the record determine the parameters?",
+    f"full rank, condition number below {LIMIT.CONDITION:g} with unit columns",
+    "record a motion that moves the joints in more combinations (symgen excite), or use "
+    "fewer parameters (essential.threshold)",
+)
+def determined(estimate: Estimate, fit: Estimate) -> Answer:
     """Rank and condition of W with all columns (`estimate`) and with those of the model (`fit`)."""
-    question, limit = (
-        "Does the record determine the parameters?",
-        f"full rank, condition number below {LIMIT.CONDITION:g} with unit columns",
-    )
-    failed = next((one for one in (estimate, fit) if one.status != "ok"), None)
-    if failed is not None and failed.status == "rank-deficient":
-        groups = "; ".join(", ".join(group) for group in failed.groups)
-        remedy = (
-            "record a motion that excites these parameters (symgen excite), or leave them "
-            "out "
-            "(estimate: columns)"
-        )
-        return Check(
-            question,
-            "no",
-            f"No: rank {failed.rank} for {len(failed.names)} parameters, not told apart: {groups}",
-            limit,
-            remedy,
-        )
-    if failed is not None:
-        return Check(
-            question,
-            "no",
-            f"No: {failed.status}, {failed.message.rstrip('.')}",
-            limit,
-            "see the message of the estimator",
-        )
-    cond = fit.cond_unit
-    text = f"All {len(fit.names)}, condition number {rounded(cond)} with unit columns"
-    if cond <= LIMIT.CONDITION:
-        return Check(question, "good", text, limit)
-    remedy = (
-        "record a motion that moves the joints in more combinations (symgen excite), or use "
-        "fewer parameters (essential.threshold)"
-    )
-    return Check(
-        question, "doubtful", f"{text}: some of their combinations it hardly does", limit, remedy
-    )
+    for one in (estimate, fit):
+        if one.status == "rank-deficient":
+            groups = "; ".join(", ".join(group) for group in one.groups)
+            return Answer(
+                "no",
+                f"No: rank {one.rank} for {len(one.names)} parameters, not told apart: {groups}",
+                "record a motion that excites these parameters (symgen excite), or leave them out "
+                "(estimate: columns)",
+            )
+        if one.status != "ok":
+            text = f"No: {one.status}, {one.message.rstrip('.')}"
+            return Answer("no", text, "see the message of the estimator")
+    text = f"All {len(fit.names)}, condition number {rounded(fit.cond_unit)} with unit columns"
+    if fit.cond_unit <= LIMIT.CONDITION:
+        return Answer("good", text, "")
+    return Answer("doubtful", f"{text}: some of their combinations it hardly does")
 
 
-def explained(fit: Estimate) -> Check:
+@Question(
+    "Does the model explain the torques?",
+    f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
+    "look at the joints below: units, signs and ratios of the drives first, then friction "
+    "(--friction)",
+)
+def explained(fit: Estimate) -> Answer:
     """Error of the fit in total."""
-    return Check(
-        "Does the model explain the torques?",
-        _state(fit.relative_error, *LIMIT.TOTAL_ERROR),
-        f"{fit.relative_error:.1f} % of them stay unexplained",
-        f"{LIMIT.TOTAL_ERROR[0]:g} % (usable to {LIMIT.TOTAL_ERROR[1]:g} %)",
-        (
-            "look at the joints below: units, signs and ratios of the drives first, then friction "
-            "(--friction)"
-        ),
-    )
+    text = f"{fit.relative_error:.1f} % of them stay unexplained"
+    return Answer(_state(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
 
-def explained_by_joint(estimate: Estimate, fit: Estimate) -> list[Check]:
+@Question("On every joint?", f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)")
+def explained_by_joint(estimate: Estimate, fit: Estimate) -> Answer | None:
     """Error of the worst joint, which a total hides; no check of a single joint."""
-    joints = fit.per_joint
-    if len(joints) < 2:
-        return []
-    worst = max(joints, key=lambda joint: joint.relative_error)
-    text = f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained"
-    remedy = lost_joints(estimate, fit) or (
-        f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
-        "time shift between position and torque"
+    if len(fit.per_joint) < 2:
+        return None
+    worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+    return Answer(
+        _state(worst.relative_error, *LIMIT.JOINT_ERROR),
+        f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained",
+        lost_joints(estimate, fit)
+        or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
+        "time shift between position and torque",
     )
-    return [
-        Check(
-            "On every joint?",
-            _state(worst.relative_error, *LIMIT.JOINT_ERROR),
-            text,
-            f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)",
-            remedy,
-        )
-    ]
 
 
 def lost_joints(estimate: Estimate, fit: Estimate) -> str:
@@ -306,7 +282,8 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     )
 
 
-def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool = False) -> Check:
+@Question("Does it predict data it has not seen?")
+def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool = False) -> Answer:
     """Largest relative error, %, on data that did not give the parameters; open where it is nan.
 
     halves : it is that of a half of the record, fitted from the other half. Half a record may lack
@@ -317,78 +294,67 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
         min(max(times * fit.relative_error, least), most)
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
-    return Check(
-        "Does it predict data it has not seen?",
-        "open"
-        if not np.isfinite(error)
-        else "doubtful"
-        if halves and error > limits[0]
-        else _state(error, *limits),
-        f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
-        f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
-        (
+    state: State = "open" if not np.isfinite(error) else _state(error, *limits)
+    remedy = "a longer or richer record"
+    if "standard" not in fit.details:
+        remedy = f"fewer parameters (a larger essential.threshold), {remedy}"
+    if halves:
+        remedy = f"name a record that it has to predict (validate.record); {remedy}"
+    if differ:
+        remedy = (
             "see in which parameters the records differ: another robot, load or wiring, or a "
-            "motion "
-            "that one of them does not excite"
+            "motion that one of them does not excite"
         )
-        if differ
-        else ("name a record that it has to predict (validate.record); " if halves else "")
-        + ("" if "standard" in fit.details else "fewer parameters (a larger essential.threshold), ")
-        + "a longer or richer record",
+    return Answer(
+        "doubtful" if halves and state == "no" else state,
+        f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
+        remedy,
+        f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
     )
 
 
-def agreeing(homogeneity: Homogeneity) -> Check:
+@Question(
+    "Do the records agree?",
+    f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}",
+    "look at the record that differs: load, temperature, time since the last one; or its "
+    "motion shows what the model leaves out",
+)
+def agreeing(homogeneity: Homogeneity) -> Answer:
     """Whether several records tell the same parameters."""
-    question, limit = (
-        "Do the records agree?",
-        f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}",
-    )
+    text = homogeneity.text.rstrip(".")
     if len(homogeneity.records) < 2:
-        return Check(question, "open", homogeneity.text.rstrip("."), limit)
-    remedy = (
-        "look at the record that differs: load, temperature, time since the last one; or its "
-        "motion shows what the model leaves out"
-    )
-    if not homogeneity.agree and homogeneity.largest <= LIMIT.RELEVANT_DIFFERENCE:
-        text = (
-            "They differ by more than their stated deviations, but by at most "
-            f"{homogeneity.largest:.0f} % of a value"
-        )
-        return Check(
-            question,
-            "good",
-            text,
-            f"{limit}, or by at most {LIMIT.RELEVANT_DIFFERENCE:g} % of any value",
-            remedy,
-        )
-    return Check(
-        question,
-        "good" if homogeneity.agree else "doubtful",
-        homogeneity.text.rstrip("."),
-        limit,
-        remedy,
+        return Answer("open", text, "")
+    if homogeneity.agree or homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE:
+        return Answer("good" if homogeneity.agree else "doubtful", text)
+    return Answer(
+        "good",
+        "They differ by more than their stated deviations, but by at most "
+        f"{homogeneity.largest:.0f} % of a value",
+        limit=f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}, or by "
+        f"at most {LIMIT.RELEVANT_DIFFERENCE:g} % of any value",
     )
 
 
-def signs(negative: Sequence[str]) -> Check:
+@Question(
+    "Have friction and motor inertia the right sign?",
+    f"not below zero by {LIMIT.CERTAIN_SIGN:g} deviations",
+    "look at the sign of ratio, torque constant and columns of that joint, then at its "
+    "coupling, units and frame; fit again",
+)
+def signs(negative: Sequence[str]) -> Answer:
     """Friction and motor inertias certainly below zero. Usual cause: the sign of a ratio."""
-    remedy = (
-        "look at the sign of ratio, torque constant and columns of that joint, then at its "
-        "coupling, units and frame; fit again"
-    )
-    text = f"Below zero: {', '.join(negative)}" if negative else "None is certainly below zero"
-    question = "Have friction and motor inertia the right sign?"
-    return Check(
-        question,
-        "no" if negative else "good",
-        text,
-        f"not below zero by {LIMIT.CERTAIN_SIGN:g} deviations",
-        remedy,
-    )
+    if negative:
+        return Answer("no", f"Below zero: {', '.join(negative)}")
+    return Answer("good", "None is certainly below zero")
 
 
-def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
+@Question(
+    "Is every value certain?",
+    f"{LIMIT.LARGE_DEVIATION:g} % of the value",
+    "do not use these values one by one: the torques know their combination better; a "
+    "longer record, or one that excites them",
+)
+def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Answer:
     """Deviations without the assumption of independent residuals; bootstrap : as for
     `checklist_of`.
     """
@@ -397,141 +363,100 @@ def certain(fit: Estimate, bootstrap: Mapping[str, float]) -> Check:
         percent = 100 * np.where(np.isfinite(deviations), deviations, fit.sigma) / np.abs(fit.X)
     order = np.argsort(-percent)
     above = [fit.names[i] for i in order if percent[i] > LIMIT.LARGE_DEVIATION]
-    physical_set = (
-        "standard" in fit.details
-    )  # all columns, held together by the conditions and the values of the robot file
-    state: State = (
-        "good"
-        if not above
-        else "no"
-        if 2 * len(above) > len(fit.names) and not physical_set
-        else "doubtful"
-    )
     text = (
         f"Largest deviation {percent[order[0]]:.0f} % ({fit.names[order[0]]}), median "
         f"{np.median(percent):.1f} %"
     )
-    if above:
-        text += (
-            f"; above {LIMIT.LARGE_DEVIATION:g} %: {', '.join(above[: LIMIT.PARAMETERS_NAMED])}"
-            + (
-                f" and {len(above) - LIMIT.PARAMETERS_NAMED} more"
-                if len(above) > LIMIT.PARAMETERS_NAMED
-                else ""
-            )
-        )
-    remedy = (
-        "do not use these values one by one: the torques know their combination better; a "
-        "longer record, or one that excites them"
-    )
-    return Check(
-        "Is every value certain?", state, text, f"{LIMIT.LARGE_DEVIATION:g} % of the value", remedy
-    )
+    if not above:
+        return Answer("good", text)
+    # a physical set has all columns, held together by the conditions and the values of the file
+    most = 2 * len(above) > len(fit.names) and "standard" not in fit.details
+    text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {named(above)}"
+    return Answer("no" if most else "doubtful", text)
 
 
-def separate(fit: Estimate) -> Check:
+@Question(
+    "Can the values be told apart?",
+    f"|correlation| below {LIMIT.CORRELATION:g}",
+    "use them together or not at all; a motion that moves them apart tells them (symgen excite)",
+)
+def separate(fit: Estimate) -> Answer:
     """Correlations of the estimates, eq. (10)."""
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         correlation = fit.covariance / np.outer(deviation, deviation)
     above = np.triu(np.abs(correlation) > LIMIT.CORRELATION, 1)
     pairs = [
-        (fit.names[i], fit.names[k], correlation[i, k])
+        f"{fit.names[i]} with {fit.names[k]} ({correlation[i, k]:+.2f})"
         for i, k in zip(*np.nonzero(above), strict=True)
     ]
-    text = ", ".join(f"{a} with {b} ({c:+.2f})" for a, b, c in pairs[:4]) + (
-        ", ..." if len(pairs) > 4 else ""
-    )
-    remedy = (
-        "use them together or not at all; a motion that moves them apart tells them (symgen excite)"
-    )
-    finding = f"These trade: {text}" if pairs else "No two of them trade against each other"
-    return Check(
-        "Can the values be told apart?",
-        "doubtful" if pairs else "good",
-        finding,
-        f"|correlation| below {LIMIT.CORRELATION:g}",
-        remedy,
-    )
+    if not pairs:
+        return Answer("good", "No two of them trade against each other")
+    more = ", ..." if len(pairs) > 4 else ""
+    return Answer("doubtful", f"These trade: {', '.join(pairs[:4])}{more}")
 
 
-def physical(estimate: Estimate, feasibility: Feasibility | None) -> Check:
+@Question(
+    "Can a physical robot have them?",
+    "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
+)
+def physical(estimate: Estimate, feasibility: Feasibility | None) -> Answer:
     """Whether a physical robot can have all parameters."""
-    question = "Can a physical robot have them?"
-    limit = "every pseudo-inertia positive semidefinite, friction and motor inertia not negative"
     if "standard" in estimate.details:
-        loose = [
-            name
-            for name, mass in estimate.details.get("masses", {}).items()
-            if not mass["determined"]
-        ]
-        text = (
-            (
+        masses = estimate.details.get("masses", {})
+        loose = [name for name, mass in masses.items() if not mass["determined"]]
+        text = "Yes: they were fitted under these conditions"
+        if loose:
+            text += (
                 "; the record does not determine the masses "
                 f"{', '.join(loose[: LIMIT.PARAMETERS_NAMED])}: none of them is a value to use by "
                 "itself"
             )
-            if loose
-            else ""
-        )
-        return Check(question, "good", f"Yes: they were fitted under these conditions{text}", limit)
+        return Answer("good", text)
     if feasibility is None:
-        remedy = "symgen report, or symgen identify --physical"
-        return Check(question, "open", "Not asked", limit, remedy)
+        return Answer("open", "Not asked", "symgen report, or symgen identify --physical")
     if feasibility.feasible:
-        return Check(question, "good", f"Yes, margin {feasibility.margin:.2g}", limit)
+        return Answer("good", f"Yes, margin {feasibility.margin:.2g}")
     blocking = ", ".join(name for name, _ in feasibility.blocking)
-    remedy = (
-        "before you simulate or control with them, fit under these conditions (estimate: "
-        "{method: feasible}); torque prediction is not concerned"
-    )
-    return Check(
-        question,
+    return Answer(
         "doubtful",
         f"No: no body has what the fit of all parameters gives {blocking}",
-        limit,
-        remedy,
+        "before you simulate or control with them, fit under these conditions (estimate: "
+        "{method: feasible}); torque prediction is not concerned",
     )
 
 
-def resolved(advice: Advice | None) -> Check:
+@Question(
+    "Does the encoder resolve enough?",
+    f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
+)
+def resolved(advice: Advice | None) -> Answer:
     """Whether the encoder resolves enough: the answer of the advisor, and of the step in use where
     it is given.
     """
-    question, limit = (
-        "Does the encoder resolve enough?",
-        f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
-    )
     if advice is None:
-        return Check(
-            question,
-            "open",
-            "Not asked",
-            limit,
-            "ask with symgen report, or symgen cestac --advise",
-        )
+        return Answer("open", "Not asked", "ask with symgen report, or symgen cestac --advise")
     steps = ", ".join(
-        (
-            f"{one.percent:g} % up to "
-            f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
-        )
+        f"{one.percent:g} % up to "
+        f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
         for one in advice.encoders[0].limits
     )
     text = f"Least squares stays within {steps} {advice.place}"
     if not advice.asked:
-        remedy = (
+        return Answer(
+            "open",
+            text,
             "say which step your encoder has (symgen report --encoder STEP, --side motor "
-            "where it sits there)"
+            "where it sits there)",
         )
-        return Check(question, "open", text, limit, remedy)
     name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
     labels = ", ".join(Level(step).label for step in advice.asked)
-    text += f"; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})"
-    remedy = (
+    return Answer(
+        _state(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
+        f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
         "a finer encoder, or an estimator that simulates the closed loop (estimate.method: "
-        f"{', '.join(CLOSED_LOOP)})"
+        f"{', '.join(CLOSED_LOOP)})",
     )
-    return Check(question, _state(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED), text, limit, remedy)
 
 
 def rounded(cond: float) -> str:

@@ -10,12 +10,10 @@ jobs:
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cache, partial
-from io import StringIO
 from pathlib import Path
 from typing import TypeAlias
 
@@ -34,7 +32,7 @@ from runtime.settings.files import settings_from_text, text_of
 from runtime.settings.location import located
 from runtime.settings.schema import Settings, Text, Whole, require
 from runtime.settings.study import SCHEMA, Study
-from runtime.table import aligned
+from runtime.table import aligned, csv_text
 
 Files: TypeAlias = Mapping[str, str | bytes]
 
@@ -254,11 +252,8 @@ class Fleet(Result, keys="jobs:rows", schema=1):
 
     def to_csv(self) -> str:
         """summary.csv: one line per job."""
-        stream = StringIO()
-        writer = csv.DictWriter(stream, [f.name for f in fields(Row)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(asdict, self.rows))
-        return stream.getvalue()
+        header = [f.name for f in fields(Row)]
+        return csv_text(header, [[getattr(row, name) for name in header] for row in self.rows])
 
 
 def identify_fleet(

@@ -49,13 +49,14 @@ from runtime.identification.friction_laws import (
 )
 from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.limits import LIMIT
+from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of, joint_labels, require
 from runtime.model.inertia import physical_model
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
 from runtime.signals.filters import decimated
-from runtime.table import aligned
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -134,24 +135,9 @@ class FrictionCurve:
 
     def to_table(self) -> str:
         """Laws line by line, then the parameters of the one that predicts."""
-        rows: list[Sequence[str]] = [
-            (f"joint {self.joint}", "error %", "held out %", "AIC", "p of F", "")
-        ]
-        for law in self.laws:
-            cells = (
-                f"{law.error:.3f}",
-                f"{law.held_out:.3f}",
-                f"{law.aic:+.1f}",
-                f"{law.p_value:.2g}",
-            )
-            rows.append((law.name, *cells, "chosen" if law.name == self.law_name else ""))
-        values = ", ".join(
-            f"{name} {x:.4g} +- {self.law.sigma[name]:.2g}"
-            for name, x in self.law.parameters.items()
-        )
-        return f"{aligned(rows)}\n{self.law_name}: {values}" + (
-            f"\n{self.note}" if self.note else ""
-        )
+        compared, predicting = law_tables([self])
+        parts = [compared.to_text(), f"{self.label}: {predicting.rows[0][2]}", self.note]
+        return "\n".join(part for part in parts if part)
 
     @property
     def label(self) -> str:
@@ -186,6 +172,39 @@ class FrictionCurve:
             "laws": self.laws,
             "curve": curve,
         }
+
+
+def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
+    """The laws compared joint by joint, and the parameters of those that predict."""
+    compared = [
+        (
+            *(curve.joint, law.name, number(law.error, ".2f"), number(law.held_out, ".2f")),
+            *(number(law.aic, "+.1f"), number(law.p_value, ".2g")),
+        )
+        for curve in curves
+        for law in curve.laws
+    ]
+    laws = [
+        (
+            *(curve.joint, curve.label),
+            ", ".join(
+                f"{name} {x:.4g} ± {curve.law.sigma[name]:.2g}"
+                for name, x in curve.law.parameters.items()
+            ),
+        )
+        for curve in curves
+    ]
+    return (
+        Table(
+            "Laws compared",
+            (
+                *("joint", "law", "error %", "held-out error %", "AIC against the first"),
+                "p of the F-test",
+            ),
+            compared,
+        ),
+        Table("Chosen laws, SI", ("joint", "law", "parameters"), laws),
+    )
 
 
 def friction_curves(

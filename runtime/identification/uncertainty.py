@@ -18,7 +18,6 @@ References: Seber and Lee (2003), section 4.3, for F.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +34,7 @@ from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
-from runtime.table import aligned
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -177,92 +176,61 @@ class Uncertainty(Result):
 
     def to_table(self) -> str:
         """Sentences, then every table."""
-        return "\n\n".join([self.to_text(), aligned(self.test_lines()), aligned(self.set_lines())])
+        return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
 
     def to_text(self) -> str:
         """Sentences, deviations and whiteness."""
-        return "\n\n".join(
-            [
-                "\n".join(self.verdict),
-                aligned(self.bootstrap_lines()),
-                aligned(self.whiteness_lines()),
-            ]
-        )
+        return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
 
-    def bootstrap_lines(self) -> list[Sequence[str]]:
-        """Deviations, header first."""
-        lines: list[Sequence[str]] = [
-            ("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)")
-        ]
-        for row in zip(
-            self.bootstrap.names,
-            self.bootstrap.sigma,
-            self.bootstrap.corrected,
-            self.bootstrap.drawn,
-            self.bootstrap.ratio,
-            strict=True,
-        ):
-            lines.append((row[0], *(f"{x:.3g}" for x in row[1:4]), f"{row[4]:.2f}"))
-        return lines
-
-    def whiteness_lines(self) -> list[Sequence[str]]:
-        """Residuals by joint, header first."""
-        lines: list[Sequence[str]] = [
-            (
-                "joint",
-                "rows",
-                "rho_1",
-                "Q",
-                "p",
-                "worth rows",
-                "peak Hz",
-                "half of the power below Hz",
-            )
-        ]
-        for w in self.whiteness:
-            lines.append(
-                (
-                    w.joint,
-                    str(w.rows),
-                    f"{w.correlation[0]:+.2f}",
-                    f"{w.Q:.4g}",
-                    f"{w.p:.2g}",
-                    f"{w.effective_rows:.0f}",
-                    f"{w.peak:.3g}",
-                    f"{w.half:.3g}",
-                )
-            )
-        return lines
-
-    def test_lines(self) -> list[Sequence[str]]:
-        """F-tests along the trail, header first."""
-        lines: list[Sequence[str]] = [
-            ("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one")
-        ]
-        for t in self.f_tests:
-            name = t.name if t.removed else f"{t.name} (kept)"
-            lines.append(
-                (
-                    name,
-                    f"{t.ratio:.5f}",
-                    f"{t.F:.3g}",
-                    f"{t.p:.2g}",
-                    f"{t.F_step:.3g}",
-                    f"{t.p_step:.2g}",
-                )
-            )
-        return lines
-
-    def set_lines(self) -> list[Sequence[str]]:
-        """Sets by threshold, header first."""
-        lines: list[Sequence[str]] = [("threshold", "parameters", "against the set used")]
-        return [
-            *lines,
-            *(
-                (f"{threshold:g}", str(count), " ".join(names) or "the same")
-                for threshold, count, names in self.sets
+    def tables(self) -> tuple[Table, ...]:
+        """Deviations, residuals by joint, F-tests along the trail, sets by threshold."""
+        drawn = self.bootstrap
+        deviations = (drawn.sigma, drawn.corrected, drawn.drawn)
+        columns = [[f"{x:.3g}" for x in own] for own in deviations]
+        columns.append([f"{x:.2f}" for x in drawn.ratio])
+        return (
+            Table(
+                "Deviations: eq. (10), corrected for correlation, blocks of time drawn again",
+                ("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)"),
+                list(zip(drawn.names, *columns, strict=True)),
             ),
-        ]
+            Table(
+                "Residuals by joint: correlation of neighbours, Ljung-Box, rows that count, "
+                "spectrum",
+                (
+                    *("joint", "rows", "rho_1", "Q", "p", "worth rows", "peak Hz"),
+                    "half of the power below Hz",
+                ),
+                [
+                    (
+                        *(w.joint, str(w.rows), f"{w.correlation[0]:+.2f}", f"{w.Q:.4g}"),
+                        *(f"{w.p:.2g}", f"{w.effective_rows:.0f}", f"{w.peak:.3g}"),
+                        f"{w.half:.3g}",
+                    )
+                    for w in self.whiteness
+                ],
+            ),
+            Table(
+                "F-tests along the trail; rows that count instead of rows",
+                ("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one"),
+                [
+                    (
+                        t.name if t.removed else f"{t.name} (kept)",
+                        *(f"{t.ratio:.5f}", f"{t.F:.3g}", f"{t.p:.2g}"),
+                        *(f"{t.F_step:.3g}", f"{t.p_step:.2g}"),
+                    )
+                    for t in self.f_tests
+                ],
+            ),
+            Table(
+                "Essential parameters by threshold; - removed besides, + kept besides",
+                ("threshold", "parameters", "against the set used"),
+                [
+                    (f"{threshold:g}", str(count), " ".join(names) or "the same")
+                    for threshold, count, names in self.sets
+                ],
+            ),
+        )
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""

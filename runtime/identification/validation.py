@@ -26,11 +26,12 @@ from runtime.estimators.solution import unit_columns
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of, point_estimate
+from runtime.markup import number
 from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import Observation
 from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings
-from runtime.table import aligned
+from runtime.table import Table, aligned
 
 Array = np.ndarray
 
@@ -154,17 +155,23 @@ class CrossValidation(Result):
             for columns in dict.fromkeys(p.columns for p in unseen)
         }
 
-    def to_table(self) -> str:
+    def table(self, form: str = ".3f") -> Table:
         """One line per part and set of columns, errors in %."""
-        lines: list[Sequence[str]] = [
-            ("part", "columns", "use", "total %", *(f"joint {j} %" for j in self.joints))
-        ]
-        for p in self.predictions:
-            errors = [f"{value:.3f}" for value in (p.relative_error, *p.per_joint)]
-            lines.append(
-                (p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted", *errors)
-            )
-        return "\n".join([aligned(lines), *self.missing])
+        return Table(
+            "Relative error, %",
+            ("part", "parameters", "use", "total", *(f"joint {j}" for j in self.joints)),
+            [
+                (
+                    *(p.part, f"{p.columns} ({p.count})", "fitted" if p.fitted else "predicted"),
+                    *(number(x, form) for x in (p.relative_error, *p.per_joint)),
+                )
+                for p in self.predictions
+            ],
+        )
+
+    def to_table(self) -> str:
+        """The table, and what could not be fitted."""
+        return "\n".join([self.table().caption, self.table().to_text(), *self.missing])
 
     def summary(self) -> dict[str, Any]:
         """What `to_json` writes, as a mapping."""

@@ -12,10 +12,9 @@ Same result, same bytes: neither file holds the time at which it was written.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from io import BytesIO, StringIO
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from runtime.errors import encodable
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import json_text
 from runtime.resolution.result import Cestac
+from runtime.table import csv_text
 
 Array = np.ndarray
 
@@ -158,58 +158,17 @@ def cestac_csv(result: Cestac) -> str:
     """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho),
     its increase beside it).
     """
-    stream = StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        (
-            "level",
-            "delta",
-            "torque",
-            "name",
-            "unit",
-            "X_LS",
-            "mean",
-            "sigma",
-            "relative_sigma",
-            "e",
-            "half_width",
-            "decides",
-            "increase",
-        )
-    )
+    reference, numbers = result.reference, ("mean", "sigma", "relative_sigma", "e", "half_width")
+    rows: list[Sequence[Any]] = []
     for r in result.levels:
-        place = (r.level.label, repr(float(r.level.delta)), repr(float(r.level.torque)))
+        place = (r.level.label, float(r.level.delta), float(r.level.torque))
         for i, name in enumerate(result.names):
-            numbers = (
-                repr(float(x[i]))
-                for x in (result.reference.X, r.mean, r.sigma, r.relative_sigma, r.e, r.half_width)
-            )
-            writer.writerow(
-                (
-                    *place,
-                    name,
-                    result.reference.units.get(name, ""),
-                    *numbers,
-                    int(name in result.deciding),
-                    "",
-                )
-            )
-        writer.writerow(
-            (
-                *place,
-                "rho",
-                "",
-                "",
-                "",
-                "",
-                "",
-                repr(float(r.e_rho)),
-                "",
-                1,
-                repr(float(r.increase)),
-            )
-        )
-    return stream.getvalue()
+            values = (float(x[i]) for x in (reference.X, *(getattr(r, own) for own in numbers)))
+            unit, decides = reference.units.get(name, ""), int(name in result.deciding)
+            rows.append((*place, name, unit, *values, decides, ""))
+        rows.append((*place, "rho", *[""] * 5, float(r.e_rho), "", 1, float(r.increase)))
+    header = ("level", "delta", "torque", "name", "unit", "X_LS", *numbers, "decides", "increase")
+    return csv_text(header, rows)
 
 
 def _texts(texts: Iterable[str]) -> Array:

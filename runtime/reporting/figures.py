@@ -7,17 +7,20 @@ too, so that a grey print can be read.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import LayoutEngine
 from matplotlib.ticker import FuncFormatter, NullLocator
 
+from runtime.identification.friction import FrictionCurve
+from runtime.identification.residuals import Whiteness
 from runtime.identification.validation import Comparison, JointComparison
 from runtime.limits import LIMIT
 from runtime.reporting.page import Image
@@ -25,6 +28,7 @@ from runtime.reporting.panels import PanelLayout
 from runtime.reporting.series import Series, series
 from runtime.resolution.result import Cestac
 
+T = TypeVar("T")
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = (
     "#000000",
     "#0072B2",
@@ -41,6 +45,7 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.titlesize": 9.0,
     "axes.titley": 1.0,  # not sought
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
@@ -50,6 +55,10 @@ STYLE: Any = {
     "path.simplify": True,
 }
 DPI = 150
+DOTTED: Any = (0, (1, 2))
+MEASURED: Any = {"color": BLACK, "linewidth": 1.5}
+PREDICTED: Any = {"color": ORANGE, "linewidth": 1.0, "linestyle": (0, (4, 1))}
+ERROR: Any = {"color": BLUE, "linewidth": 0.7, "label": "error"}
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -86,66 +95,90 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
     with mpl.rc_context(STYLE):
         figure = empty_figure((5.4, 3.4), layout=PanelLayout())
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-        t, measured, predicted, error = _broken(joint)
-        upper.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
-        upper.plot(
-            t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted"
-        )
-        lower.plot(t, error, color=BLUE, linewidth=0.7, label="error")
+        _torques(upper, lower, joint, source)
         upper.set_ylabel(f"torque, {unit}")
-        lower.set_ylabel(f"error, {unit}")
-        lower.set_xlabel("time, s")
-        upper.set_title(_title(joint), fontsize=9, loc="right")
-        upper.legend(
-            ncols=2,
-            loc="lower left",
-            bbox_to_anchor=(-0.02, 1.0),
-            fontsize=8,
-            handlelength=2.0,
-            columnspacing=1.0,
-            borderaxespad=0.2,
-        )
+        lower.set(ylabel=f"error, {unit}", xlabel="time, s")
+        upper.set_title(_title(joint), loc="right")
+        legend_above(upper, fontsize=8, handlelength=2.0, columnspacing=1.0)
     return figure
 
 
 def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "measured") -> Figure:
     """Fig. 4 of the chapter: every joint in a panel of its own."""
-    joints = comparison.joints
-    columns = 1 if len(joints) == 1 else 2
-    rows = -(-len(joints) // columns)
-    with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(
-            rows, columns, (4.8 * columns, 2.3 * rows + 0.4), used=len(joints)
-        )
-        for ax, joint in zip(axes, joints, strict=False):
-            _overlay(ax, joint, unit, source)
-        shared_legend(figure, axes[:1], 3)
-    return figure
+
+    def draw(ax: Axes, joint: JointComparison) -> None:
+        _torques(ax, ax, joint, source)
+        ax.set(title=_title(joint), xlabel="time, s", ylabel=f"torque, {unit}")
+
+    return panels(comparison.joints, draw, 2, cell=(4.8, 2.3), legend=3)
 
 
 def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
     """Residuals of every joint, each beside the normal law of the same deviation."""
-    joints = comparison.joints
-    columns = min(3, len(joints))
-    rows = -(-len(joints) // columns)
-    with mpl.rc_context(STYLE):
-        figure, axes = panels_figure(
-            rows, columns, (max(5.4, 3.2 * columns), 2.1 * rows + 0.4), used=len(joints)
+    x = np.linspace(-4, 4, 161)
+    normal = np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi)
+
+    def draw(ax: Axes, joint: JointComparison) -> None:
+        deviation = float(np.std(joint.error)) or 1.0
+        density, edges = np.histogram(joint.error / deviation, bins=40, range=(-4, 4), density=True)
+        ax.stairs(density, edges, fill=True, color=SKY, zorder=2)
+        ax.plot(x, normal, color=BLACK, linewidth=1.2)
+        title = f"joint {joint.joint}, deviation {deviation:.3g} {unit}"
+        ax.set(title=title, xlabel="residual / deviation", yticks=[])
+
+    return panels(comparison.joints, draw, 3, cell=(3.2, 2.1), least=5.4)
+
+
+def spectra_figure(
+    joints: Sequence[Whiteness], unit: str = "N m", cutoff: float | None = None
+) -> Figure:
+    """Spectral density of the residuals joint by joint, and the level of white residuals of the
+    same power.
+    """
+
+    def draw(ax: Axes, w: Whiteness) -> None:
+        positive, level = w.density > 0, float(np.mean(w.density)) or 1.0
+        ax.plot(
+            w.frequency[positive], w.density[positive], color=BLUE, linewidth=1.1, label="residuals"
         )
-        for ax, joint in zip(axes, joints, strict=False):
-            deviation = float(np.std(joint.error)) or 1.0
-            x = np.linspace(-4, 4, 161)
-            ax.stairs(
-                *np.histogram(joint.error / deviation, bins=40, range=(-4, 4), density=True),
-                fill=True,
-                color=SKY,
-                zorder=2,
-            )
-            ax.plot(x, np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=1.2)
-            ax.set_title(f"joint {joint.joint}, deviation {deviation:.3g} {unit}", fontsize=9)
-            ax.set_xlabel("residual / deviation")
-            ax.set_yticks([])
+        ax.axhline(level, color=ORANGE, linewidth=1.0, linestyle="--", label="white, same power")
+        ax.axvline(w.half, color=GREY, linewidth=0.9, label="half of the power below")
+        if cutoff is not None:
+            name = "cut-off of the decimation"
+            ax.axvline(cutoff, color=BLACK, linewidth=1.1, linestyle=DOTTED, label=name)
+        logarithmic(ax, "y")
+        ax.set(title=f"joint {w.joint}", xlabel="frequency, Hz")
+
+    figure = panels(joints, draw, 3, cell=(3.2, 2.0), extra=0.6, least=5.4, legend=2, letters=8)
+    figure.supylabel(f"density, ({unit})²/Hz", fontsize=9, x=0.005)
     return figure
+
+
+def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
+    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and
+    the one that predicts.
+    """
+    speed = "m/s" if unit == "N" else "rad/s"
+    first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
+    bins: Any = {"fmt": "o", "color": BLACK, "markersize": 3, "linewidth": 1.0}
+
+    def draw(ax: Axes, curve: FrictionCurve) -> None:
+        style: Any = {"color": "#C8C8C8", "markersize": 2, "zorder": 1, "rasterized": True}
+        ax.plot(curve.v, curve.f, ".", label="rows", **style)
+        ax.errorbar(curve.centre, curve.mean, curve.half, label="bins, 95 %", **bins)
+        law, torques = curve.laws[0].name, curve.law_torques
+        for side in (curve.centre < 0, curve.centre >= 0):
+            x = curve.centre[side]
+            ax.plot(x, torques[law][side], label="Coulomb and viscous", **first)
+            if curve.law_name != law:
+                chosen = torques[curve.law_name][side]
+                ax.plot(x, chosen, color=ORANGE, linewidth=1.4, label="chosen law")
+        ax.set(title=f"joint {curve.joint}: {curve.label}")
+        ax.set(xlabel=f"velocity, {speed}", ylabel=f"friction, {unit}")
+        ax.axhline(0, color=GREY, linewidth=0.6)
+        ax.axvline(0, color=GREY, linewidth=0.6)
+
+    return panels(curves, draw, 2, cell=(4.8, 2.9), legend=2 * min(2, len(curves)))
 
 
 def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
@@ -157,132 +190,105 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
     """
     levels = [level for level in result.levels if level.level.delta and not level.level.torque]
     levels.sort(key=lambda level: level.level.delta)
-    unit = (
-        "m"
-        if {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
-        else "rad"
-    )
+    lengths = {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
     delta = np.array([level.level.delta for level in levels])
     e = np.array([level.e for level in levels]).reshape(len(levels), -1)
-    coloured = [name for name in names if name in result.names] or _sharpest(result)
-    with mpl.rc_context(STYLE):
-        figure, (ax,) = panels_figure(1, 1, (6.4, 4.4), right=0.45, below=0.25)
+    order = np.argsort(result.reference.relative_sigma, kind="stable")[: len(MARKED)]
+    coloured = [name for name in names if name in result.names] or [result.names[i] for i in order]
+
+    def draw(ax: Axes, limits: tuple[float, ...]) -> None:
+        def line(values: np.ndarray, **style: Any) -> None:
+            ax.plot(delta, np.where(np.isfinite(values) & (values > 0), values, np.nan), **style)
+
         for name in result.deciding:
             if name not in coloured:
-                ax.plot(
-                    delta,
-                    _drawn(e[:, result.names.index(name)]),
-                    color="#C8C8C8",
-                    linewidth=0.8,
-                    zorder=1,
-                )
+                line(e[:, result.names.index(name)], color="#C8C8C8", linewidth=0.8, zorder=1)
         for (color, marker), name in zip(MARKED, coloured, strict=False):
-            ax.plot(
-                delta,
-                _drawn(e[:, result.names.index(name)]),
-                color=color,
-                marker=marker,
-                markersize=5,
-                linewidth=1.4,
-                label=name,
-            )
-        ax.plot(
-            delta,
-            _drawn(np.array([abs(level.increase) for level in levels])),
-            color=BLACK,
-            linestyle="--",
-            linewidth=1.8,
-            label="residual, of |Y|",
-        )
+            style: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.4}
+            line(e[:, result.names.index(name)], label=name, **style)
+        increase = np.array([abs(level.increase) for level in levels])
+        line(increase, color=BLACK, linestyle="--", linewidth=1.8, label="residual, of |Y|")
         logarithmic(ax)
         ax.set_ylim(0.01, 1000)
-        for limit in (LIMIT.NEGLIGIBLE, LIMIT.BIASED):
-            ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)))
-            ax.annotate(
-                f"{limit:g} %",
-                (1.0, limit),
-                xycoords=("axes fraction", "data"),
-                xytext=(3, 0),
-                textcoords="offset points",
-                va="center",
-            )
-        ax.set_xticks(
-            delta,
-            [level.level.label.replace("2*pi/", "2π/") for level in levels],
-            rotation=30,
-            ha="right",
-            fontsize=8,
-        )
-        ax.set_xlabel(f"resolution Δ, {unit}")
+        place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+        for limit in limits:
+            ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=DOTTED)
+            ax.annotate(f"{limit:g} %", (1.0, limit), xytext=(3, 0), va="center", **place)
+        labels = [level.level.label.replace("2*pi/", "2π/") for level in levels]
+        ax.set_xticks(delta, labels, rotation=30, ha="right", fontsize=8)
+        ax.set_xlabel(f"resolution Δ, {'m' if lengths else 'rad'}")
         ax.set_ylabel("%e: change of the estimate, %")
-        shared_legend(figure, [ax], 4, size=8)
-    return figure
+
+    limits = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)
+    room = PanelLayout(right=0.45, below=0.25)
+    return panels([limits], draw, 1, cell=(6.4, 4.0), legend=4, letters=8, layout=room)
 
 
-def _overlay(ax: Axes, joint: JointComparison, unit: str, source: str) -> None:
-    """Lines break where rows were left out or another record starts."""
-    t, measured, predicted, error = _broken(joint)
-    ax.plot(t, measured, color=BLACK, linewidth=1.5, label=source)
-    ax.plot(t, predicted, color=ORANGE, linewidth=1.0, linestyle=(0, (4, 1)), label="predicted")
-    ax.plot(t, error, color=BLUE, linewidth=0.7, label="error")
-    ax.set_title(_title(joint), fontsize=9)
-    ax.set_xlabel("time, s")
-    ax.set_ylabel(f"torque, {unit}")
+def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
+    """Lines of as many instants as show, which break where rows were left out or another record
+    starts.
+    """
+    thinned = series(joint, "", "")
+    upper.plot(thinned.t, thinned.first, label=source, **MEASURED)
+    upper.plot(thinned.t, thinned.second, label="predicted", **PREDICTED)
+    lower.plot(thinned.t, thinned.first - thinned.second, **ERROR)
 
 
 def _title(joint: JointComparison) -> str:
     return f"joint {joint.joint}, error {joint.relative_error:.1f} %"
 
 
-def _broken(joint: JointComparison) -> tuple[np.ndarray, ...]:
-    """Time, measured, predicted torque and error as they are drawn: as many instants as show."""
-    thinned = series(joint, "", "")
-    return thinned.t, thinned.first, thinned.second, thinned.first - thinned.second
-
-
-def _sharpest(result: Cestac) -> list[str]:
-    order = np.argsort(result.reference.relative_sigma, kind="stable")
-    return [result.names[i] for i in order[: len(MARKED)]]
-
-
-def _drawn(values: np.ndarray) -> np.ndarray:
-    """Values of a logarithmic axis: zeros and what is not finite are not drawn."""
-    return np.where(np.isfinite(values) & (values > 0), values, np.nan)
-
-
-def panels_figure(
-    rows: int,
+def panels(
+    items: Sequence[T],
+    draw: Callable[[Axes, T], None],
     columns: int,
-    size: tuple[float, float],
     *,
-    used: int | None = None,
-    right: float = 0.12,
-    below: float = 0.0,
-) -> tuple[Figure, list[Axes]]:
-    """A figure of `size`, inch, and its panels row by row; there are none beyond `used`.
+    cell: tuple[float, float],
+    extra: float = 0.4,
+    least: float = 0.0,
+    legend: int = 0,
+    letters: float = STYLE["font.size"],
+    layout: LayoutEngine | None = None,
+) -> Figure:
+    """A figure with a panel for each item, row by row.
 
-    right, below : room for what stands to the right of a panel, and below it besides a line of
-    ticks and a label, inch.
+    Parameters
+    ----------
+    draw : function of Axes and an item
+        Fills a panel.
+    columns : int
+        Largest number of panels beside each other.
+    cell : (float, float), inch
+        Width and height of a panel; `extra` is added to the height of all, and the whole is at
+        least `least` wide.
+    legend : int
+        Columns of the one legend above the figure, every label once, in letters of `letters`
+        points; 0: none.
+    layout : LayoutEngine, optional
+        Room around the panels.
     """
-    figure = empty_figure(size, layout=PanelLayout(right=right, below=below))
-    grid = figure.add_gridspec(rows, columns)
-    return figure, [
-        figure.add_subplot(grid[k]) for k in range(rows * columns if used is None else used)
-    ]
+    columns = max(1, min(columns, len(items)))
+    rows = -(-len(items) // columns)
+    with mpl.rc_context(STYLE):
+        size = (max(least, cell[0] * columns), cell[1] * rows + extra)
+        figure = empty_figure(size, layout or PanelLayout())
+        grid = figure.add_gridspec(rows, columns)
+        for k, item in enumerate(items):
+            draw(figure.add_subplot(grid[k]), item)
+        if legend:
+            labelled = [ax.get_legend_handles_labels() for ax in figure.axes]
+            entries = {name: handle for own in labelled for handle, name in zip(*own, strict=True)}
+            handles = list(entries.values())
+            figure.legend(
+                handles, list(entries), ncols=legend, loc="upper center", fontsize=letters
+            )
+    return figure
 
 
-def shared_legend(
-    figure: Figure, panels: Sequence[Axes], columns: int, *, size: float = STYLE["font.size"]
-) -> None:
-    """One legend of some panels above the figure, every label once."""
-    entries = {
-        label: handle
-        for ax in panels
-        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(
-        list(entries.values()), list(entries), ncols=columns, loc="upper center", fontsize=size
-    )
+def legend_above(ax: Axes, **style: Any) -> None:
+    """The legend of a panel in two columns, above its left edge."""
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (-0.02, 1.0), "borderaxespad": 0.2}
+    ax.legend(ncols=2, **place, **style)
 
 
 def logarithmic(ax: Axes, axes: str = "xy") -> None:
@@ -298,7 +304,7 @@ def _power(x: float, _: int) -> str:
     return f"{x:g}" if 1e-3 < x < 1e4 else "10" + str(round(np.log10(x))).translate(RAISED)
 
 
-def empty_figure(size: tuple[float, float], layout: Any = "constrained") -> Figure:
+def empty_figure(size: tuple[float, float], layout: LayoutEngine) -> Figure:
     figure = Figure(figsize=size, layout=layout)
     FigureCanvasAgg(figure)
     return figure

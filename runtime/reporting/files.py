@@ -20,12 +20,10 @@ from runtime.loop.result import Simulation
 from runtime.model.generated import joint_labels
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
-from runtime.reporting.excitation import excitation_page
+from runtime.reporting.motions import excitation_page, simulation_figure
 from runtime.reporting.page import Page, Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
-from runtime.reporting.physical import standard_csv
-from runtime.reporting.sections import parameters_csv
-from runtime.reporting.simulation import simulation_figure
+from runtime.reporting.parameters import parameters_csv, standard_csv
 from runtime.resolution.advice import Advice
 from runtime.resolution.result import Cestac
 from runtime.result_files import Results, write_all

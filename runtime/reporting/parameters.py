@@ -1,5 +1,5 @@
-"""The parameters of an identification in one table: value, deviations, CAD, what became of each,
-and what it is made of.
+"""Parameters on a page and in files: base parameters with deviations, CAD, what became of each, and
+what it is made of; those that trade; those of a physical robot; those of a load.
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.estimators.essential import Removal
 from runtime.estimators.estimate import Estimate
+from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.result import Identification
+from runtime.limits import LIMIT
 from runtime.markup import element, formula, number, symbol, unit
 from runtime.model.generated import GeneratedModel
-from runtime.reporting.page import Section
-from runtime.table import Table
+from runtime.reporting.page import Matrix, Section
+from runtime.table import Table, csv_text
 
 HEADER = (
     "parameter",
@@ -113,12 +114,11 @@ def roles_of(result: Identification) -> dict[str, str]:
     roles = dict.fromkeys(result.estimate.names, "essential")
     if result.model_columns == "all":
         roles |= dict.fromkeys(essential.names, "essential by least squares")
-    removed = [step for step in essential.trail if step.removed]
-    for k, step in enumerate(removed, start=1):
-        roles[step.name] = f"removed no. {k}, ratio {step.ratio:.4f}"
-    refused: list[Removal] = [step for step in essential.trail if not step.removed]
-    for step in refused:
-        roles[step.name] += f", the next to go: ratio {step.ratio:.4f}"
+    for k, step in enumerate(essential.trail, start=1):
+        if step.removed:
+            roles[step.name] = f"removed no. {k}, ratio {step.ratio:.4f}"
+        else:
+            roles[step.name] += f", the next to go: ratio {step.ratio:.4f}"
     return roles
 
 
@@ -142,3 +142,170 @@ def _compared(cad: float, value: float) -> tuple[str, str]:
     return ("" if math.isnan(cad) else number(cad)), (
         f"{difference:+.1f}" if math.isfinite(difference) else ""
     )
+
+
+def correlation_section(result: Identification) -> Section:
+    """Groups and pairs of all parameters, then the most correlated of those that carry the
+    model.
+    """
+    correlations = result.correlations
+    groups = "; ".join(", ".join(group) for group in correlations.groups) or "none"
+    pairs = Table(
+        f"Pairs with |correlation| above {correlations.threshold:g}, all parameters fitted",
+        ("first", "second", "correlation"),
+        [(symbol(p.first), symbol(p.second), f"{p.correlation:+.3f}") for p in correlations.pairs],
+    )
+    directions = Table(
+        "Directions that W sees least (columns of norm 1), all parameters fitted",
+        ("singular value ratio", "combination"),
+        [
+            (f"{d.ratio:.2e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()))
+            for d in correlations.directions
+        ],
+        wide=(1,),
+    )
+    text = (
+        f"Groups, all parameters fitted: {groups}.",
+        (
+            "Two estimates with a correlation near ±1 are known together, not apart: what one "
+            "gains "
+            "the other loses, and the torques hardly change."
+        ),
+    )
+    matrix = correlation_matrix(result.model_estimate)
+    return Section(
+        "Parameters that trade against each other",
+        text,
+        tables=[*([pairs] if correlations.pairs else []), directions],
+        matrices=[matrix] if matrix else [],
+    )
+
+
+def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> Matrix | None:
+    """Correlations, eq. (10), among the parameters with the strongest ones, in column order; None
+    of a single parameter, or without covariance.
+    """
+    deviation = np.sqrt(np.diag(fit.covariance))
+    if len(fit.names) < 2 or not np.all(deviation > 0):
+        return None
+    correlation = fit.covariance / np.outer(deviation, deviation)
+    strongest = np.abs(correlation - np.diag(np.diag(correlation))).max(axis=1)
+    shown = np.sort(np.argsort(-strongest, kind="stable")[:most])
+    caption = "Correlation of the estimates that carry the model" + (
+        f", the {most} strongest" if len(fit.names) > most else ""
+    )
+    return Matrix(
+        caption, [symbol(fit.names[i]) for i in shown], correlation[np.ix_(shown, shown)].tolist()
+    )
+
+
+def physical_section(fit: Estimate) -> Section:
+    """Conditions with their smallest eigenvalues, then the standard parameters."""
+    details = fit.details
+    conditions = Table(
+        "Conditions of a physical robot",
+        ("condition", "smallest eigenvalue", "at its limit"),
+        [
+            (name, number(value, ".3e"), "yes" if name in details["active"] else "")
+            for name, value in details["smallest_eigenvalues"].items()
+        ],
+    )
+    masses = details.get("masses", {})
+    standard = Table(
+        "Standard parameters of one such robot",
+        ("parameter", "value", "what the record says of it"),
+        [(n, *_value_cells(v, masses.get(n))) for n, v in details["standard"].items()],
+    )
+    text = (
+        fit.message,
+        "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, "
+        "inertia and friction not negative; all base parameters "
+        "are fitted together. The standard parameters give exactly the torques of the base "
+        "parameters; what the torques leave open is nearest to "
+        "the values of the robot file. A mass that the record does not determine has a dash and "
+        "its range here: standard_parameters.csv holds one complete "
+        "set, to be used as a whole.",
+    )
+    return Section("Physical consistency", text, tables=[conditions, standard])
+
+
+def _value_cells(value: float, mass: Mapping[str, Any] | None) -> tuple[str, str]:
+    """Value and remark of a standard parameter; of a mass that the record does not determine, a
+    dash and its range.
+    """
+    text = number(value, ".5g")
+    return (text, "") if mass is None else (text if mass["determined"] else "-", mass_text(mass))
+
+
+def mass_text(mass: Mapping[str, Any]) -> str:
+    """The range of a mass over the physical robots that explain the record."""
+    known = "determined" if mass["determined"] else "NOT determined"
+    return f"{known}: {number(mass['lowest'], '.2g')} to {number(mass['highest'], '.3g')} kg"
+
+
+def payload_section(study: PayloadStudy) -> Section:
+    """Parameters of the load; gains motor by motor."""
+    load = study.payload
+    rows = [(name, number(value, ".5g"), "given") for name, value in load.given.items()]
+    rows += [
+        (name, number(value, ".5g"), number(sigma, ".2g"))
+        for name, value, sigma in zip(load.names, load.value, load.sigma, strict=True)
+    ]
+    caption = f"Load on {load.place}, its parameters there, SI"
+    tables = [Table(caption, ("parameter", "value", "sigma"), rows)]
+    text = ["Records with and without the load, fitted together."]
+    if study.gains is not None:
+        gains = study.gains
+        lines = [
+            (j, *(number(float(x), ".5g") for x in values))
+            for j, *values in zip(
+                gains.joints,
+                gains.together,
+                gains.sigma,
+                gains.alone,
+                gains.sigma_alone,
+                strict=True,
+            )
+        ]
+        tables.append(
+            Table(
+                "Factors on the torque constants of the robot file",
+                ("motor", "together", "sigma", "alone", "sigma"),
+                lines,
+            )
+        )
+        text.append(f"Torque constants: {gains.text}.")
+    return Section("Load", text, tables=tables)
+
+
+def standard_csv(fit: Estimate) -> str:
+    """standard_parameters.csv: name, value, note; a note says which masses the record does not
+    determine.
+    """
+    masses = fit.details.get("masses", {}).items()
+    loose = {name: mass_text(mass) for name, mass in masses if not mass["determined"]}
+    rows = [(name, value, loose.get(name, "")) for name, value in fit.details["standard"].items()]
+    return csv_text(("name", "value", "note"), rows)
+
+
+def parameters_csv(result: Identification) -> str:
+    """parameters.csv: name, value, sigma, %sigma, corrected sigma, unit; then value and %sigma of
+    the essential fit, empty where removed.
+    """
+    fit, essential = result.estimate, result.essential.estimate
+    columns = ("X", "sigma", "relative_sigma", "sigma_corrected")
+    short = ("X", "relative_sigma")
+    alone = {
+        name: [float(getattr(essential, column)[k]) for column in short]
+        for k, name in enumerate(essential.names)
+    }
+    rows = [
+        (
+            name,
+            *(float(getattr(fit, column)[i]) for column in columns),
+            fit.units.get(name, ""),
+            *alone.get(name, ("", "")),
+        )
+        for i, name in enumerate(fit.names)
+    ]
+    return csv_text(("name", *columns, "unit", *(f"{x}_essential" for x in short)), rows)

@@ -4,19 +4,17 @@ here.
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Sequence
 
+from runtime.checks.plausibility import Plausibility
+from runtime.identification.friction import FrictionCurve, law_tables
 from runtime.identification.result import Identification
 from runtime.markup import number
 from runtime.reporting import figures as plots
-from runtime.reporting.correlations import correlation_section
 from runtime.reporting.page import Section
-from runtime.reporting.parameters import parameter_section
-from runtime.reporting.plausibility import plausibility_section
-from runtime.reporting.residuals import residual_section
+from runtime.reporting.parameters import correlation_section, parameter_section
 from runtime.reporting.series import series
-from runtime.reporting.uncertainty import uncertainty_section
+from runtime.signals.decimation import CUTOFF
 from runtime.table import Table
 
 MEANING = {
@@ -45,7 +43,9 @@ def identification_sections(result: Identification) -> list[Section]:
         *([motion_section(result)] if result.motion_table().rows else []),
         residual_section(result, unit),
         correlation_section(result),
-        uncertainty_section(result.uncertainty),
+        Section(
+            "How far to trust it", result.uncertainty.verdict, tables=result.uncertainty.tables()
+        ),
         trail_section(result),
         validation_section(result),
         *([coupling_section(result)] if result.coupling else []),
@@ -210,24 +210,7 @@ def trail_section(result: Identification) -> Section:
 
 def validation_section(result: Identification) -> Section:
     """One part of the data predicts the others."""
-    tables = []
-    for part in result.validation:
-        rows = [
-            (
-                p.part,
-                f"{p.columns} ({p.count})",
-                "fitted" if p.fitted else "predicted",
-                *(number(v, ".2f") for v in (p.relative_error, *p.per_joint)),
-            )
-            for p in part.predictions
-        ]
-        tables.append(
-            Table(
-                "Relative error, %",
-                ("part", "parameters", "use", "total", *(f"joint {j}" for j in part.joints)),
-                rows,
-            )
-        )
+    tables = [part.table(".2f") for part in result.validation]
     text = (
         (
             "Parameters fitted on one part of the data predict the torques of another; the "
@@ -263,32 +246,70 @@ def coupling_section(result: Identification) -> Section:
     return Section("With and without the coupling of the drives", text, tables=[table])
 
 
-def parameters_csv(result: Identification) -> str:
-    """parameters.csv: name, value, sigma, %sigma, corrected sigma, unit; then value and %sigma of
-    the essential fit, empty where removed.
+def residual_section(result: Identification, unit: str = "N m") -> Section:
+    """Spectra with the cut-off of the decimation, histograms with the normal law."""
+    joints = result.uncertainty.whiteness
+    if not joints:
+        return Section("Residuals: spectrum and distribution")
+    cutoff = decimation_cutoff(result)
+    peaks = ", ".join(f"joint {w.joint} {w.peak:.3g} Hz" for w in joints)
+    text = [
+        "A peak at the frequency of the motion is model error, not noise: friction, flexibility or "
+        "a parameter that is missing. A level that is flat up to "
+        "the cut-off and falls behind it is filtered noise, the best there is.",
+        f"Largest density: {peaks}.",
+    ]
+    if cutoff is not None:
+        text.append(
+            f"The rows come {result.observation.rate:g} times a second; the filter of the "
+            f"decimation ends at {cutoff:g} Hz (dotted)."
+        )
+    images = [
+        plots.drawn(
+            "Spectral density of the residuals",
+            plots.spectra_figure(joints, unit, cutoff),
+            "Spectral density of the residuals of every joint, by frequency",
+        ),
+        plots.drawn(
+            "Residuals over their deviation; line: normal law",
+            plots.residual_histogram(result.comparison, unit),
+            "Histograms of the residuals, joint by joint",
+            "residuals",
+        ),
+    ]
+    return Section("Residuals: spectrum and distribution", text, images)
+
+
+def decimation_cutoff(result: Identification) -> float | None:
+    """Where the filter of the parallel decimation ends, Hz; None without one."""
+    if result.study.signals.decimate is None or result.observation.settings.get("factor") == 1:
+        return None
+    return CUTOFF * result.observation.rate / 2
+
+
+def plausibility_section(found: Plausibility) -> Section:
+    """Whether record, study and robot file suit each other. The checks stand with the others at the
+    top; here is what they rest on.
     """
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        (
-            "name",
-            "X",
-            "sigma",
-            "relative_sigma",
-            "sigma_corrected",
-            "unit",
-            "X_essential",
-            "relative_sigma_essential",
-        )
+    text = [f"No record can tell: {change}." for change in found.equivalent]
+    if found.gravity is not None:
+        text.append(f"Gravity fitted freely: {found.gravity.text}.")
+    return Section("Record, study and robot file", tuple(text), tables=found.tables())
+
+
+def friction_section(curves: Sequence[FrictionCurve], unit: str = "N m") -> Section:
+    """The figure, the laws compared joint by joint, the parameters of those that predict."""
+    text = (
+        "What the rest of the model leaves of the torque of each joint, against its velocity. A "
+        "law with more terms is chosen only if it predicts "
+        "blocks of time that did not fit it at least 1 % better and passes the F-test, which "
+        "counts independent samples.",
+        *(f"Joint {curve.joint}: {curve.note}." for curve in curves if curve.note),
     )
-    fit, essential = result.estimate, result.essential.estimate
-    for i, name in enumerate(fit.names):
-        own = [fit.X[i], fit.sigma[i], fit.relative_sigma[i], fit.sigma_corrected[i]]
-        k = essential.names.index(name) if name in essential.names else None
-        alone = (
-            ["", ""]
-            if k is None
-            else [repr(float(essential.X[k])), repr(float(essential.relative_sigma[k]))]
-        )
-        writer.writerow((name, *(repr(float(x)) for x in own), fit.units.get(name, ""), *alone))
-    return stream.getvalue()
+    image = plots.drawn(
+        "Friction against velocity",
+        plots.friction_figure(curves, unit),
+        "Friction torque against velocity, joint by joint, with laws",
+        "friction",
+    )
+    return Section("Friction curves", text, [image], law_tables(curves))

@@ -119,7 +119,8 @@ def test_friction_and_physical_options(folder, tmp_path) -> None:
     result = run(folder, "", "-o", str(tmp_path / "out"), "--friction", "--physical")
     assert result.exit_code == 0, result.output
     assert (
-        "The parameters are physically feasible" in result.output and "held out %" in result.output
+        "The parameters are physically feasible" in result.output
+        and "held-out error %" in result.output
     )
     found = json.loads((tmp_path / "out" / "estimate.json").read_text())
     assert found["feasibility"]["feasible"] and found["feasibility"]["margin"] > 0

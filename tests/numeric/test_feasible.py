@@ -36,7 +36,7 @@ from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
-from runtime.reporting.physical import standard_csv
+from runtime.reporting.parameters import standard_csv
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot

@@ -18,8 +18,8 @@ from runtime.model.generated import load_model
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.reporting import figures as plots
-from runtime.reporting.friction import friction_figure, friction_section
 from runtime.reporting.page import Page, render
+from runtime.reporting.sections import friction_section
 from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -171,7 +171,7 @@ def test_tx40_record(tx40_data) -> None:
         and "(no peak)" in curve.label
         for curve in curves
     )
-    png = plots.png(friction_figure(curves))
+    png = plots.png(plots.friction_figure(curves))
     assert png[:4] == b"\x89PNG"
     page = render(Page("friction", "", [friction_section(curves)]))
     assert "Friction curves" in page and "stribeck+load (no peak)" in page

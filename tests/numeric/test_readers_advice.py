@@ -9,7 +9,7 @@ from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
 from runtime.limits import LIMIT
-from runtime.reporting.resolution_advice import advice_section
+from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac

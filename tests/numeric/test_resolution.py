@@ -16,7 +16,7 @@ from runtime.model.generated import load_model
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.reporting.resolution_advice import advice_section
+from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing, sampled
 from runtime.resolution.advisor import ALL, Predictor, advise, torque_sigma
 from runtime.rows.observe import observe

@@ -18,7 +18,6 @@ from runtime.identification.uncertainty import block_bootstrap, f_tests, uncerta
 from runtime.identification.validation import JointComparison, direct_comparison
 from runtime.json_documents import json_text
 from runtime.loop.methods import estimate_of
-from runtime.reporting.uncertainty import uncertainty_section
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 
@@ -185,8 +184,7 @@ def test_sets_by_threshold_and_what_is_shown():
         and len(data["scatter"]["drawn"]) == len(found.names)
         and data["f_tests"][0]["name"] == found.trail[0].name
     )
-    section = uncertainty_section(checked)
-    assert [len(t.rows) for t in section.tables] == [
+    assert [len(t.rows) for t in checked.tables()] == [
         len(found.names),
         2,
         len(found.trail),

@@ -57,11 +57,14 @@ def test_panels_stand_apart_and_inside_the_figure():
 
 
 def test_logarithmic_axes_read_as_numbers():
-    with mpl.rc_context(plots.STYLE):
-        figure, (ax,) = plots.panels_figure(1, 1, (3, 2))
-        ax.plot([1e-6, 1e2], [1e-2, 1e4])
+    def draw(ax, values):
+        ax.plot(*values)
         plots.logarithmic(ax)
         ax.set(xlim=(1e-6, 1e2), ylim=(1e-2, 1e4))
+
+    with mpl.rc_context(plots.STYLE):
+        figure = plots.panels([([1e-6, 1e2], [1e-2, 1e4])], draw, 1, cell=(3, 2))
+        (ax,) = figure.axes
         plots.png(figure)
         labels = {
             text.get_text() for axis in (ax.xaxis, ax.yaxis) for text in axis.get_ticklabels()

@@ -16,9 +16,8 @@ from runtime.identification.checklist import _state, checklist_of, lost_joints, 
 from runtime.identification.validation import JointComparison
 from runtime.markup import split, symbol, unit
 from runtime.model.generated import load_model
-from runtime.reporting.correlations import correlation_matrix
-from runtime.reporting.parameters import cad_values, roles_of
-from runtime.reporting.residuals import decimation_cutoff
+from runtime.reporting.parameters import cad_values, correlation_matrix, roles_of
+from runtime.reporting.sections import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
 from runtime.settings.study import Decimate, Signals
 from symgen.symbols.letters import letter as other_symbol
