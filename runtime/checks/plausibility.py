@@ -22,11 +22,10 @@ from runtime.checks.case import Case
 from runtime.checks.check import WORST, Check, worst_of
 from runtime.checks.continuous import searched
 from runtime.checks.delay import Delay
-from runtime.checks.excited import motion_excites
 from runtime.checks.gravity import Gravity
 from runtime.checks.known import KnownValues
+from runtime.checks.motion import motion_excites, rest
 from runtime.checks.physics import better, delayed, direction, not_asked, physics, size, values
-from runtime.checks.rest import rest
 from runtime.checks.samples import excerpts, samples_of
 from runtime.checks.sizes import (
     accelerations,

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from runtime.blas import single_threaded
+from runtime.checks.motion import low_speed_of_rest
 from runtime.checks.plausibility import plausibility
-from runtime.checks.rest import low_speed_of_rest
 from runtime.checks.samples import samples_of
 from runtime.errors import InputError
 from runtime.identification.identification import identify

@@ -15,9 +15,8 @@ from campaign import campaign, sampled
 import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
-from runtime.checks.excited import excited, unexcited_shares
 from runtime.checks.fits import Barrier, Grams, least_squares, physical_fit
-from runtime.checks.rest import low_speed_of_rest, standing_share
+from runtime.checks.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
 from runtime.checks.samples import Samples, excerpts, samples_of
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
 from runtime.limits import LIMIT

@@ -1,0 +1,150 @@
+"""Does the motion serve: do the joints move while they are used, and which parameters can it not
+tell, from W alone, before anything is fitted? Friction at rest is no law of motion.
+
+    share_i = 100 sigma_i ||W_w,i|| / ||Y_w||
+            rows of W_w, Y_w divided by the deviation of their torque, sigma_i as
+            `runtime.excitation` predicts it
+
+is the predicted deviation of parameter i in % of the value with which it alone would make all of
+the measured torque. A larger value is not to be expected, so
+its %sigma is hardly below share_i. The torque noise is taken as LIMIT.TORQUE_NOISE of the torque of
+the joint, white: a convention, since the noise is not known before the fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.checks.case import Case
+from runtime.checks.check import Answer, Question, State, named
+from runtime.checks.samples import Samples
+from runtime.errors import InputError
+from runtime.excitation.criteria import Weights, kept_correlation
+from runtime.limits import LIMIT
+from runtime.loop.methods import estimate_of
+from runtime.rows.observation import Observation
+from runtime.rows.observe import observe
+from runtime.rows.selection import per_joint
+from runtime.settings.study import EstimateSettings, Signals, Study
+
+Array = np.ndarray
+
+
+@Question(
+    "Do the joints move while they are used?",
+    f"standing at most {100 * LIMIT.REST_SHARE:g} % of the rows that are used",
+)
+def rest(case: Case) -> Answer:
+    """Share of the instants at which a joint stands, and what leaving them out changes."""
+    model, study = case.model, case.study
+    share = standing_share(case.samples, study)
+    worst = int(np.argmax(share))
+    text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
+    proposed = low_speed_of_rest(case.samples, study)
+    if proposed is None:
+        return Answer("good", text)
+    stated = list(proposed) if isinstance(proposed, tuple) else proposed
+    remedy = (
+        f"set rows.low_speed: {stated} ({case.units[worst]}/s), or cut the record (rows.window)"
+    )
+    try:
+        moving = replace(study, rows=replace(study.rows, low_speed=proposed))
+        without = observe(model, case.given, moving)
+    except InputError:
+        without = None
+    if case.observation is None or without is None:
+        return Answer("doubtful", text, remedy)
+    before, after = (
+        estimate_of(rows, EstimateSettings(), model=model).relative_error
+        for rows in (case.observation, without)
+    )
+    text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
+    state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
+    return Answer(state, text, remedy)
+
+
+def standing_share(samples: Samples, study: Study) -> Array:
+    """Share of the rows of each joint at which it stands, shape (n,)."""
+    speed = np.where(
+        samples.still(), np.inf, np.abs(samples.qd)
+    )  # a joint that never moves is told as such
+    used = speed >= per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    standing = used & (speed <= samples.standing())
+    return np.asarray(standing.sum(axis=0) / np.maximum(used.sum(axis=0), 1))
+
+
+def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ...] | None:
+    """rows.low_speed that leaves out the rows of joints that stand, rad/s or m/s; None where at
+    most LIMIT.REST_SHARE of them stand.
+    """
+    if standing_share(samples, study).max() <= LIMIT.REST_SHARE:
+        return None
+    low = per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
+    wanted = tuple(
+        _rounded_up(max(v, x))
+        for v, x in zip(np.where(samples.still(), 0.0, samples.standing()), low, strict=True)
+    )
+    return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
+
+
+def _rounded_up(x: float) -> float:
+    """x to two digits, not below x: a threshold rounded down would keep what it is to leave out."""
+    digit = 10.0 ** (np.floor(np.log10(x)) - 1) if x > 0 else 1.0
+    return float(f"{np.ceil(x / digit * (1 - 1e-12)) * digit:.2g}")
+
+
+@Question(
+    "Does the motion excite every parameter?",
+    f"predicted deviation below {LIMIT.UNEXCITED:g} % of the largest possible value, with "
+    f"{100 * LIMIT.TORQUE_NOISE:g} % of torque noise",
+    "move the joints behind these parameters more, further or faster (symgen excite finds "
+    "a motion), or leave them out (estimate.columns)",
+)
+def motion_excites(case: Case) -> Answer | None:
+    """Parameters that the motion cannot tell; None where the study has no rows."""
+    if case.observation is None:
+        return None
+    return excited(case.observation, case.study.signals, case.records[0].rate)
+
+
+def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:
+    """Parameters that the motion cannot tell; None where W has no full rank, which the fit itself
+    says by name.
+    """
+    try:
+        shares = unexcited_shares(observation, signals, rate)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    order = sorted(shares, key=lambda name: -shares[name])
+    unseen = [name for name in order if shares[name] > LIMIT.UNEXCITED]
+    if unseen:
+        return Answer("doubtful", f"It cannot tell {named(unseen)}, whatever their values")
+    text = f"Least excited is {order[0]}, {shares[order[0]]:.2g} %"
+    if weak := [name for name in order if shares[name] > LIMIT.LARGE_DEVIATION]:
+        listed = ", ".join(weak[: LIMIT.PARAMETERS_NAMED])
+        text += f"; above {LIMIT.LARGE_DEVIATION:g} %: {listed}"
+    return Answer("good", text, "")
+
+
+def unexcited_shares(observation: Observation, signals: Signals, rate: float) -> dict[str, float]:
+    """share_i, %, by name of the parameter; LinAlgError where W has no full rank."""
+    s = np.array(
+        [
+            LIMIT.TORQUE_NOISE * float(np.sqrt(np.mean(observation.Y[observation.joint(j)] ** 2)))
+            for j in range(observation.n)
+        ]
+    )
+    if not s.all():
+        raise InputError("torques that are zero throughout")
+    columns = np.linalg.norm(observation.W / s[observation.joints][:, None], axis=0)
+    if not columns.all():
+        raise np.linalg.LinAlgError("a column is zero")
+    weights = Weights(
+        observation.names, s, float(np.linalg.norm(observation.Y / s[observation.joints])) / columns
+    )
+    if weights.condition(observation) > LIMIT.SINGULAR:
+        raise np.linalg.LinAlgError("no full rank")
+    sigma = weights.relative_sigma(observation, kept_correlation(signals, rate))
+    return dict(zip(observation.names, map(float, sigma), strict=True))
