@@ -65,7 +65,7 @@ from runtime.resolution.result import deciding_names
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.run import forget, moved_estimate
 from runtime.rows.observation import stack
-from runtime.rows.position_errors import NormalEquations, Perturbation, perturbation
+from runtime.rows.position_errors import Perturbation, perturbation, solution
 from runtime.rows.prepared import Prepared, common_drives, prepared
 from runtime.settings.study import Study, to_mapping
 
@@ -89,24 +89,25 @@ class Predictor:
 
     def change(self, delta: float, encoders: Sequence[int]) -> Array:
         """100 (X(v)/X(0) - 1), shape (b,), in %."""
-        X = self._total(self.share * delta**2, encoders).solve(self.weights)
+        X = solution(self._total(self.share * delta**2, encoders), self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * (X / self.exact - 1))
 
     @cached_property
     def exact(self) -> Array:
         """X with exact encoders, shape (b,)."""
-        return self._total(0.0, ()).solve(self.weights)
+        return solution(self._total(0.0, ()), self.weights)
 
     def rate(self, encoders: Sequence[int]) -> Array:
         """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
-        clean, X = self._total(0.0, ()), self.exact
+        moved, X = self._total(0.0, ()), self.exact
         added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
-        moved = NormalEquations(clean.G, added.g - added.G @ X).solve(self.weights)
+        moved[..., -1] = added @ np.append(-X, 1.0)
+        moved = solution(moved, self.weights)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(100 * self.share * moved / X)
 
-    def _total(self, variance: float, encoders: Sequence[int]) -> NormalEquations:
+    def _total(self, variance: float, encoders: Sequence[int]) -> Array:
         return reduce(add, [part.expected(variance, encoders) for part in self.parts])
 
 
@@ -382,7 +383,7 @@ def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
         middle = middle + np.einsum(
             "i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True
         )
-        A = A + np.einsum("j,jab->ab", w**2, part.clean.G)
+        A = A + np.einsum("j,jab->ab", w**2, part.clean[:, :-1, :-1])
     inverse = np.linalg.inv(A)
     return np.asarray(np.sqrt(np.diag(inverse @ middle @ inverse)))
 

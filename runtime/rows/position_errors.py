@@ -51,34 +51,16 @@ NODE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class NormalEquations:
-    """By joint: G, shape (n, b, b), of W_j'W_j, and g, shape (n, b), of W_j'Y_j."""
-
-    G: Array
-    g: Array
-
-    def __add__(self, other: NormalEquations) -> NormalEquations:
-        return NormalEquations(self.G + other.G, self.g + other.g)
-
-    def solve(self, weights: Array) -> Array:
-        """X, shape (b,), with the rows of joint j multiplied by weights[j]; columns are scaled
-        first.
-        """
-        A, y = np.einsum("j,jab->ab", weights**2, self.G), weights**2 @ self.g
-        D = 1 / np.sqrt(np.diag(A))
-        return np.asarray(D * np.linalg.solve(A * np.outer(D, D), D * y))
-
-
-@dataclass(frozen=True, eq=False)
 class Perturbation:
-    """One record under position errors.
+    """One record under position errors. Gram matrices are those of [W_j Y_j], by joint, shape (n, b
+    + 1, b + 1).
 
-    observation : the unperturbed rows; torque : Y before rows are left out, shape (n, K).
-    clean : their normal equations.
+    observation : the unperturbed rows.
+    clean : their Gram matrices.
     smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
-    errors : by encoder, ndarray, shape (n, b, b), E[dW_j'dW_j] alone.
-    speeds : by encoder, ndarray, shape (n, b, K): sensitivity of the rows to dqd of that encoder,
-    times the root of its variance.
+    errors : by encoder, E[dW_j'dW_j] alone, shape (encoders, n, b, b).
+    speeds : by encoder, sensitivity of the rows to dqd of that encoder, times the root of its
+    variance, shape (encoders, n, b, K).
     root : ndarray, shape (n, encoders), joint position error per encoder error.
     along : s = G qd over the window, shape (N,), by column that switches.
     used : bool, shape (n, N), instants of the window nearest to a row that is used.
@@ -86,78 +68,58 @@ class Perturbation:
     """
 
     observation: Observation
-    torque: Array
     selection: Selection
     along: Mapping[int, Array]
     band: Bandwidth
     root: Array
-    clean: NormalEquations
-    smooth: tuple[NormalEquations, ...]
-    errors: tuple[Array, ...]
-    speeds: tuple[Array, ...]
+    clean: Array
+    smooth: Array
+    errors: Array
+    speeds: Array
     switches: tuple[Switch, ...]
     kernels: Kernels
     used: Array
     known: dict[tuple[int, int], Switched] = field(default_factory=dict)
 
-    def expected(self, variance: float, encoders: Sequence[int]) -> NormalEquations:
-        """Expected normal equations with errors of that variance on the encoders named (from 0),
-        the others exact.
+    def expected(self, variance: float, encoders: Sequence[int]) -> Array:
+        """Expected Gram matrices with errors of that variance on the encoders named (from 0), the
+        others exact.
         """
-        normal = self.clean
-        for i in encoders:
-            normal = normal + NormalEquations(
-                variance * self.smooth[i].G, variance * self.smooth[i].g
-            )
-        if not self.switches or variance == 0:
-            return normal
-        G, g = normal.G.copy(), normal.g.copy()
-        self._add_switches(G, g, variance, encoders)
-        return NormalEquations(G, g)
+        coarse = list(encoders)
+        gram = self.clean + variance * self.smooth[coarse].sum(axis=0)
+        if variance:
+            self._add_switches(gram, variance, coarse)
+        return np.asarray(gram)
 
-    def _add_switches(self, G: Array, g: Array, variance: float, encoders: Sequence[int]) -> None:
+    def _add_switches(self, gram: Array, variance: float, encoders: list[int]) -> None:
         """Means, covariances with the smooth columns and with each other, variances of the columns
         that switch.
         """
         before, after = self.band.before[1, 1], self.band.after[1, 1]
-        kept = self.selection.mask
         acting = []
         for switch in self.switches:
-            share = switch.G @ self.root[:, list(encoders)]  # of each encoder's error in s
+            share = switch.G @ self.root[:, encoders]  # of each encoder's error in s
             if share.any():
                 sigma = np.sqrt(variance * before) * float(np.linalg.norm(share))
                 acting.append((switch, share, self._at(switch, sigma)))
-        for j in range(len(G)):
-            rows, used = self.observation.joint(j), kept[j]
-            acting_here = [
-                (k, scale * share, scale, noisy) for k, share, scale, noisy in _on_joint(acting, j)
-            ]
-            if not acting_here:
+        for j in range(len(gram)):
+            own = [each for each in acting if each[0].G[j]]
+            if not own:
                 continue
-            columns = [k for k, *_ in acting_here]
-            shift = np.array([scale * noisy.shift[used] for _, _, scale, noisy in acting_here]).T
-            slopes = [noisy.slope[used] for *_, noisy in acting_here]
-            W, Y = self.observation.W[rows], self.observation.Y[rows]
-            change = W.T @ shift
-            G[j][:, columns] += change
-            G[j][columns] += change.T
-            G[j][np.ix_(columns, columns)] += shift.T @ shift
-            g[j][columns] += shift.T @ Y
-            for a, (k, share, scale, noisy) in enumerate(acting_here):
-                along = sum(
-                    share[m] * (self.speeds[i][j] @ noisy.slope)
-                    for m, i in enumerate(encoders)
-                    if share[m]
-                )
-                along = np.sqrt(variance * variance / before) * after * along
-                G[j][:, k] += along
-                G[j][k] += along
-                G[j][k, k] += scale**2 * noisy.variance[j]
-                for c, (other, share_c, *_) in enumerate(acting_here):
-                    if c != a:
-                        G[j][k, other] += (
-                            variance * after * (share @ share_c) * float(slopes[a] @ slopes[c])
-                        )
+            columns, used = [switch.column for switch, *_ in own], self.selection.mask[j]
+            scale = np.array([switch.G[j] for switch, *_ in own])
+            shares = scale[:, None] * np.array([share for _, share, _ in own])
+            slopes = np.array([noisy.slope for *_, noisy in own])
+            shift = scale * np.array([noisy.shift[used] for *_, noisy in own]).T
+            change = _rows(self.observation, j).T @ shift
+            change[:-1] += (variance * after / np.sqrt(before)) * np.einsum(
+                "mK,me,ebK->bm", slopes, shares, self.speeds[encoders, j], optimize=True
+            )
+            gram[j][:, columns] += change
+            gram[j][columns] += change.T
+            both = variance * after * (shares @ shares.T) * (slopes[:, used] @ slopes[:, used].T)
+            np.fill_diagonal(both, scale**2 * [noisy.variance[j] for *_, noisy in own])
+            gram[j][np.ix_(columns, columns)] += shift.T @ shift + both
 
     def _at(self, switch: Switch, sigma: float) -> Switched:
         """The switch at one deviation of its speed, interpolated between nodes."""
@@ -181,20 +143,14 @@ class Perturbation:
         return self.known[key]
 
 
-def _on_joint(
-    acting: Sequence[tuple[Switch, Array, Switched]], j: int
-) -> list[tuple[int, Array, float, Switched]]:
-    return [
-        (switch.column, share, float(switch.G[j]), noisy)
-        for switch, share, noisy in acting
-        if switch.G[j]
-    ]
-
-
-def _used(selection: Selection, N: int) -> Array:
-    """bool, shape (n, N): instants nearest to a row that is used."""
-    nearest = np.rint((np.arange(N) - selection.kept[0]) / selection.factor).astype(int)
-    return np.asarray(selection.mask[:, np.clip(nearest, 0, len(selection.kept) - 1)])
+def solution(gram: Array, weights: Array) -> Array:
+    """X, shape (b,), of least squares with the rows of joint j multiplied by weights[j]; columns
+    are scaled first. gram : by joint, shape (n, b + 1, b + 1).
+    """
+    total = np.einsum("j,jab->ab", weights**2, gram)
+    D = 1 / np.sqrt(np.diag(total)[:-1])
+    A, y = total[:-1, :-1] * np.outer(D, D), D * total[:-1, -1]
+    return np.asarray(D * np.linalg.solve(A, y))
 
 
 def perturbation(
@@ -217,35 +173,40 @@ def perturbation(
     own = prepared(model, record, replace(study, signals=lowpass_alone(signals)))
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of steps on them", own.record.file)
-    states, selection = own.states, own.selection
+    selection = own.selection
     observation = own.observation(model, names, constants)
     settings = {**observation.settings, "signals": to_mapping(signals)}
     observation = replace(observation, settings=settings)
-    switching = switches(model, names, constants)
-    window = states[selection.samples]
+    window, switching = own.states[selection.samples], switches(model, names, constants)
     root = encoder_root(
         encoder_drives(study.cestac.side, drives or own.drives, "cestac"), own.record.n
     )
+    rows = [_rows(observation, j) for j in range(observation.n)]
     smooth, errors, speeds = _smooth(
-        model, window, selection, observation, band, root, switching, dict(constants or {})
+        model,
+        window[selection.kept],
+        selection.mask,
+        rows,
+        names,
+        band,
+        root,
+        switching,
+        dict(constants or {}),
     )
+    nearest = np.rint((np.arange(len(window)) - selection.kept[0]) / selection.factor).astype(int)
     return Perturbation(
         observation=observation,
-        torque=own.torque,
         selection=selection,
         along={switch.column: window.qd @ switch.G for switch in switching},
         band=band,
         root=root,
-        clean=_normal(
-            [observation.W[observation.joint(j)] for j in range(observation.n)],
-            [observation.Y[observation.joint(j)] for j in range(observation.n)],
-        ),
+        clean=np.array([A.T @ A for A in rows]),
         smooth=smooth,
         errors=errors,
         speeds=speeds,
         switches=switching,
         kernels=kernels(band, len(window), selection.factor),
-        used=_used(selection, len(window)),
+        used=selection.mask[:, np.clip(nearest, 0, len(selection.kept) - 1)],
     )
 
 
@@ -286,7 +247,7 @@ def with_errors(
         observation.names,
         drives=drives,
     )
-    total = deviation**2 * sum(part.errors)
+    total = deviation**2 * part.errors.sum(axis=0)
     return replace(observation, errors=total / np.maximum(observation.rows, 1)[:, None, None])
 
 
@@ -295,28 +256,34 @@ def lowpass_alone(signals: Signals) -> Signals:
     return replace(signals, reader="lowpass", step=None, side="joint", lines="detected")
 
 
+def _rows(observation: Observation, j: int) -> Array:
+    """[W_j Y_j]."""
+    own = observation.joint(j)
+    return np.column_stack([observation.W[own], observation.Y[own]])
+
+
 def _smooth(
     model: GeneratedModel,
-    window: States,
-    selection: Selection,
-    observation: Observation,
+    kept: States,
+    mask: Array,
+    rows: Sequence[Array],
+    names: Sequence[str],
     band: Bandwidth,
     root: Array,
     switching: Sequence[Switch],
     constants: Mapping[str, float],
-) -> tuple[tuple[NormalEquations, ...], tuple[Array, ...], tuple[Array, ...]]:
-    """Per encoder: what errors of variance 1 add to the normal equations, E[dW'dW] of it, and the
-    sensitivities to the speed.
+) -> tuple[Array, Array, Array]:
+    """Per encoder: what errors of variance 1 add to the Gram matrices, E[dW'dW] of it, and the
+    sensitivities to the speed; of the states at the kept instants, of which mask, bool (n, K), is
+    used.
     """
-    kept = States(window.q[selection.kept], window.qd[selection.kept], window.qdd[selection.kept])
-    columns = np.array([model.BASE_PARAMETERS.index(name) for name in observation.names])
+    columns = np.array([model.BASE_PARAMETERS.index(name) for name in names])
     rigid = np.array(model.STRUCTURE)[columns].T & ~np.isin(
         np.arange(len(columns)), [s.column for s in switching]
     )
     axes = np.linalg.cholesky(band.before)
     into = np.linalg.inv(axes)
     C = np.linalg.cholesky(into @ band.after @ into.T)
-
     out = model.store(len(kept))
 
     def store(direction: Array, scale: float, joints: Array) -> Array:
@@ -328,57 +295,25 @@ def _smooth(
         return np.asarray(D.transpose(2, 1, 0)[columns])
 
     at_rest = store(axes[:, 0], 0.0, root[:, 0])
-    smooth, errors, speeds = [], [], []
-    for i in range(root.shape[1]):
-        first, second = [], np.zeros_like(at_rest)
+    encoders, (n, b) = root.shape[1], rigid.shape
+    smooth, errors = np.zeros((encoders, n, b + 1, b + 1)), np.zeros((encoders, n, b, b))
+    speeds = np.zeros((encoders, n, b, len(kept)))
+    for i in range(encoders):
+        first, second = np.empty((3, *at_rest.shape)), np.zeros_like(at_rest)
         for k in range(3):
             h = STEP / axes[0, 0] if k == 0 else 1 / axes[k, k]
             up, down = (store(axes[:, k], sign * h, root[:, i]) for sign in (1, -1))
-            first.append((up - down) / (2 * h))
+            first[k] = (up - down) / (2 * h)
             second += (up - 2 * at_rest + down) / (2 * h**2)
-        squares = _squares(selection, np.array(first), C, rigid)
-        shifted = _shifted(observation, selection, band.gain * second, rigid)
-        smooth.append(NormalEquations(squares + shifted.G, shifted.g))
-        errors.append(squares)
-        speeds.append(
-            np.where(rigid.T[:, :, None], first[1], 0.0).transpose(1, 0, 2)
-            * selection.mask[:, None, :]
-        )
-    return tuple(smooth), tuple(errors), tuple(speeds)
-
-
-def _squares(selection: Selection, first: Array, C: Array, rigid: Array) -> Array:
-    """E[dW'dW] by joint, shape (n, b, b); first, shape (3, b, n, K), C a Cholesky factor, shape (3,
-    3).
-    """
-    n, b = rigid.shape
-    G = np.zeros((n, b, b))
-    for j in range(n):
-        columns, used = np.flatnonzero(rigid[j]), selection.mask[j]
-        S = np.einsum("kl,kbK->blK", C, first[:, columns, j][..., used]).reshape(
-            len(columns), 3 * int(used.sum())
-        )
-        G[j][np.ix_(columns, columns)] = S @ S.T
-    return G
-
-
-def _shifted(
-    observation: Observation, selection: Selection, second: Array, rigid: Array
-) -> NormalEquations:
-    """W'E[dW] + E[dW]'W and E[dW]'Y by joint; second = E[dW], shape (b, n, K)."""
-    n, b = rigid.shape
-    G, g = np.zeros((n, b, b)), np.zeros((n, b))
-    for j in range(n):
-        columns, used = np.flatnonzero(rigid[j]), selection.mask[j]
-        B = second[columns, j][:, used]
-        change = B @ observation.W[observation.joint(j)]
-        G[j][columns] += change
-        G[j][:, columns] += change.T
-        g[j][columns] = B @ observation.Y[observation.joint(j)]
-    return NormalEquations(G, g)
-
-
-def _normal(W: Sequence[Array], Y: Sequence[Array]) -> NormalEquations:
-    return NormalEquations(
-        np.array([A.T @ A for A in W]), np.array([A.T @ y for A, y in zip(W, Y, strict=True)])
-    )
+        for j in range(n):
+            C_j, used = np.flatnonzero(rigid[j]), mask[j]
+            S = np.einsum("kl,kbK->blK", C, first[:, C_j, j][..., used]).reshape(
+                len(C_j), 3 * int(used.sum())
+            )
+            errors[i, j][np.ix_(C_j, C_j)] = S @ S.T
+            shifted = band.gain * second[C_j, j][:, used] @ rows[j]  # E[dW]'[W Y]
+            smooth[i, j][C_j] += shifted
+            smooth[i, j][:, C_j] += shifted.T
+            speeds[i, j, C_j] = first[1, C_j, j] * used
+        smooth[i, :, :-1, :-1] += errors[i]
+    return smooth, errors, speeds

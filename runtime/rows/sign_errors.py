@@ -49,6 +49,15 @@ MEMORY = 40
 FAR = 4.0
 """|s|/sigma from which the sign never flips: once in 16000 samples."""
 
+SHAPES = {
+    ("coulomb", "both"): (0.0, 1.0, 0.0),
+    ("coulomb", "positive"): (0.0, 0.5, 0.0),
+    ("coulomb", "negative"): (0.0, 0.5, 0.0),
+    ("viscous", "positive"): (0.5, 0.0, 0.5),
+    ("viscous", "negative"): (0.5, 0.0, -0.5),
+}
+"""linear, jump, kink of the elements of friction that switch."""
+
 
 @dataclass(frozen=True, eq=False)
 class Switch:
@@ -120,7 +129,7 @@ def switches(
         if element is None:
             continue
         kind, direction, along = element
-        shape = _shape(kind, direction)
+        shape = SHAPES.get((kind, direction))
         if shape is None:
             continue
         strange = [j for j in along if j not in model.JOINTS]
@@ -138,16 +147,6 @@ def switches(
         G = np.array([along.get(j, 0.0) for j in model.JOINTS])
         switching.append(Switch(column, G, *shape))
     return tuple(switching)
-
-
-def _shape(kind: str, direction: str) -> tuple[float, float, float] | None:
-    """linear, jump, kink of an element of friction; None for one that does not switch."""
-    both = direction == "both"
-    if kind == "coulomb":
-        return (0.0, 1.0, 0.0) if both else (0.0, 0.5, 0.0)
-    if kind == "viscous" and not both:
-        return (0.5, 0.0, 0.5) if direction == "positive" else (0.5, 0.0, -0.5)
-    return None
 
 
 def switched(
@@ -179,15 +178,9 @@ def switched(
     slope[near] = switch.linear + switch.jump * 2 * phi / sigma + switch.kink * m
     decimated_shift, decimated_slope = decimated(np.array([shift, slope]), factor, settings)
     coefficients = _coefficients(switch, u, m, phi, sigma)
-    joints = switch.joints
     variance = np.zeros(len(switch.G))
-    for j in joints:
-        alike = [i for i in joints if i < j and np.array_equal(used[i], used[j])]
-        variance[j] = (
-            variance[alike[0]]
-            if alike
-            else _summed_variance(coefficients * used[j][near], near, known) / factor
-        )
+    for j in switch.joints:
+        variance[j] = _summed_variance(coefficients * used[j][near], near, known) / factor
     return Switched(sigma, decimated_shift, decimated_slope / gain, variance)
 
 
@@ -202,21 +195,12 @@ def _coefficients(switch: Switch, u: Array, m: Array, phi: Array, sigma: float) 
     c = [switch.jump * sign[n] + switch.kink * sigma * sign[n - 1] for n in range(1, ORDERS + 2)]
     c[0] += switch.linear * sigma
     normed = np.array([value / np.sqrt(factorial(n)) for n, value in enumerate(c, start=1)])
-    total = switch.jump**2 * (1 - m**2) + sigma**2 * (_second(switch, u, m, phi))
+    size = u * m + 2 * phi  # E|v|, v = s + sigma z in units of sigma; Cov(v, |v|) = m
+    both = switch.linear**2 + 2 * switch.linear * switch.kink * m
+    total = switch.jump**2 * (1 - m**2) + sigma**2 * (both + switch.kink**2 * (1 + u**2 - size**2))
     rest = np.clip(total - (normed[:ORDERS] ** 2).sum(axis=0), 0, None)
     normed[ORDERS] = np.sqrt(REST * rest) * np.sign(normed[ORDERS])
     return normed
-
-
-def _second(switch: Switch, u: Array, m: Array, phi: Array) -> Array:
-    """Variance of linear v + kink |v| over sigma^2, v = s + sigma z in units of sigma."""
-    size = u * m + 2 * phi  # E|v|
-    cross = m  # Cov(v, |v|) = E sign v
-    return np.asarray(
-        switch.linear**2
-        + 2 * switch.linear * switch.kink * cross
-        + switch.kink**2 * (1 + u**2 - size**2)
-    )
 
 
 @dataclass(frozen=True, eq=False)
