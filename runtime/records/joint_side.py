@@ -212,27 +212,6 @@ def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
     return tuple(name for _, name in found)
 
 
-def require_finite(
-    x: Array, names: Sequence[str], table: Table, first: int = 0, hint: str = ""
-) -> Array:
-    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity
-    among them; hint : what else may be done about nan.
-    """
-    if not np.isfinite(x).all():
-        bad = np.argwhere(~np.isfinite(x))
-        i, j = bad[0]
-        column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
-        raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut "
-            "the record"
-            f"{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
-            file=table.file,
-            column=column,
-            row=table.row(first + int(i)),
-        )
-    return x
-
-
 def _per_joint(
     value: float | Sequence[float], n: int, key: str, table: Table | None = None
 ) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from runtime.errors import InputError, ModelError
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
+from runtime.model.generated import GeneratedModel, drives_of
 from runtime.records.clock import Stamps
 from runtime.records.datasets import fetch
 from runtime.records.formats.columns import Array, Table
@@ -23,11 +24,11 @@ from runtime.records.joint_side import (
     column_names,
     conversion,
     require_alike,
-    require_finite,
 )
-from runtime.records.labels import Label
+from runtime.records.labels import Label, labels
 from runtime.records.missing import COUNTS, bridged
-from runtime.settings.record import NONE, Columns, RecordSettings
+from runtime.records.record import require_finite
+from runtime.settings.record import NONE, Columns, RecordSettings, each_record
 from runtime.settings.units import time_unit
 
 QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
@@ -158,7 +159,8 @@ class RecordFiles:
             self.first.blocks([[self.columns.t or ""]], size),
             strict=True,
         ):
-            yield self._time(t, a)
+            names = [self.columns.t or ""]
+            yield self._time(require_finite(t, names, self.first.file, self.first.row, a))
 
     def largest_known(self, size: int) -> Array | None:
         """Size of the known torques, shape (n,), read by blocks; None where there are none."""
@@ -168,6 +170,16 @@ class RecordFiles:
         blocks = self.tables[2].blocks([names], size)
         largest = np.max([np.abs(x).max(axis=0) for (x,) in blocks], axis=0)
         return np.ravel(self._on_joints(largest[None]))
+
+    @property
+    def stated_rate(self) -> float:
+        """Sampling rate that the settings state, Hz; InputError where they state none."""
+        if self.settings.rate is None:
+            raise InputError(
+                "no time column and no rate; set record.rate (Hz) or record.columns.t",
+                file=self.first.file,
+            )
+        return self.settings.rate
 
     def close(self) -> None:
         """End the processes that read the files."""
@@ -187,30 +199,15 @@ class RecordFiles:
         )
         if missing.any():
             parts["q"] = bridged(parts["q"], missing, before)
-        joint_side = {
-            "q": self.side.position,
-            "q_r": self.side.position,
-            "tau": self.side.torque,
-            "tau_ff": self.side.torque,
-        }
-        place = {
-            key: (table, own)
-            for table, groups in groups_of(self.columns, self.tables)
-            for key, own in groups.items()
-        }
-        hints = {} if self.missing else {"q": COUNTS}
-        checked = {
-            key: require_finite(x, place[key][1], place[key][0], start, hints.get(key, ""))
-            for key, x in parts.items()
-            if key != "t"
-        }
-        converted = {
-            key: joint_side[key](x) if key in joint_side else self._on_joints(x)
-            for key, x in checked.items()
-        }
-        return Samples(
-            t=self._time(parts["t"], start) if "t" in parts else None, missing=missing, **converted
-        ), parts["q"][-1]
+        sides = {"q": self.side.position, "tau": self.side.torque, "tau_known": self._on_joints}
+        sides |= {"q_r": self.side.position, "tau_ff": self.side.torque, "t": self._time}
+        converted = {}
+        for table, groups in groups_of(self.columns, self.tables):
+            for key, names in groups.items():
+                hint = COUNTS if key == "q" and not self.missing else ""
+                x = require_finite(parts[key], names, table.file, table.row, start, hint)
+                converted[key] = sides[key](x)
+        return Samples(**{"t": None, "missing": missing, **converted}), parts["q"][-1]
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""
@@ -221,11 +218,43 @@ class RecordFiles:
         spread[:, own] = known
         return spread
 
-    def _time(self, t: Array, start: int) -> Array:
-        return np.asarray(
-            require_finite(t, [self.columns.t or ""], self.first, start)[:, 0]
-            * time_unit(self.settings.units.t)
+    def _time(self, t: Array) -> Array:
+        return np.asarray(t[:, 0] * time_unit(self.settings.units.t))
+
+
+def open_records(
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel | None,
+    folder: str | Path | None,
+    *,
+    by_blocks: bool = False,
+    missing: bool = False,
+) -> Iterator[RecordFiles]:
+    """The files of each record of one robot, opened behind one another; no name twice.
+
+    Parameters
+    ----------
+    model : module, optional
+        Emitted model of the robot, for its drives and its number of joints.
+    folder : str or Path, optional
+        Where relative file names start; default: the current folder.
+    by_blocks : bool
+        Refuse formats that are read whole only.
+    missing : bool
+        Whether positions may be missing: nan, an empty field, a null.
+    """
+    settings, drives = each_record(tuple(settings)), None if model is None else drives_of(model)
+    for one, label in zip(settings, labels(settings), strict=True):
+        joints = names_of(model)
+        opened = open_record(
+            one, label, drives, Path(folder or ""), joints, by_blocks=by_blocks, missing=missing
         )
+        if model is not None and opened.n != len(model.JOINTS):
+            raise InputError(
+                f"{opened.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}",
+                file=", ".join(opened.hashes),
+            )
+        yield opened
 
 
 def open_record(
@@ -233,10 +262,10 @@ def open_record(
     label: Label,
     drives: Drives | None,
     folder: Path,
+    joints: Sequence[str],
     *,
-    joints: Sequence[str] = (),
-    by_blocks: bool = False,
-    missing: bool = False,
+    by_blocks: bool,
+    missing: bool,
 ) -> RecordFiles:
     """The files of a record, opened.
 
@@ -250,10 +279,8 @@ def open_record(
         Where relative file names start.
     joints : sequence of str
         Names of the joints of the robot, where it has them.
-    by_blocks : bool
-        Refuse formats that are read whole only.
-    missing : bool
-        Whether positions may be missing: nan, an empty field, a null.
+    by_blocks, missing : bool
+        As for `open_records`.
     """
     opened = [
         open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks)
@@ -340,12 +367,6 @@ def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
     if settings.dataset is None:
         return [folder / file for file in settings.files]
     return [fetch(settings.dataset, file) for file in settings.files]
-
-
-def drives_of(model: Any) -> Drives | None:
-    """Drives of an emitted model, where it has them."""
-    drives = getattr(model, "DRIVES", None)
-    return None if drives is None else Drives.from_mapping(drives)
 
 
 def names_of(model: Any) -> tuple[str, ...]:

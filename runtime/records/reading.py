@@ -16,17 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import rate_of
-from runtime.records.labels import Label, labels
 from runtime.records.missing import Missing
 from runtime.records.named import study_of
-from runtime.records.opening import RecordFiles, Samples, drives_of, names_of, open_record
+from runtime.records.opening import RecordFiles, Samples, open_records
 from runtime.records.record import Origin, Record
 from runtime.records.resampling import Stretch, resampled
 from runtime.records.time_stamps import time_stamps
-from runtime.settings.record import RecordSettings, each_record
+from runtime.settings.record import RecordSettings
 
 IRREGULAR = (
     0.05  # between the rate of the settings and the median step of stamps that are resampled
@@ -96,30 +94,12 @@ def read_records(
     missing : bool
         Whether positions may be missing, as `signals.reader: counts` admits.
     """
-    settings = each_record(tuple(settings))
-    records = [
-        record
-        for one, label in zip(settings, labels(settings), strict=True)
-        for record in read_pieces(
-            one, label, drives_of(model), Path(folder or ""), names_of(model), missing=missing
-        )
-    ]
-    for record in records if model is not None else ():
-        require_joints(record.n, tuple(record.files), model)
-    return records
+    opened = open_records(settings, model, folder, missing=missing)
+    return [record for files in opened for record in read_pieces(files)]
 
 
-def read_pieces(
-    settings: RecordSettings,
-    label: Label,
-    drives: Drives | None,
-    folder: Path,
-    joints: Sequence[str] = (),
-    *,
-    missing: bool = False,
-) -> list[Record]:
+def read_pieces(opened: RecordFiles) -> list[Record]:
     """The record, or those into which `resample` splits it at gaps and where time goes back."""
-    opened = open_record(settings, label, drives, folder, joints=joints, missing=missing)
     try:
         samples = opened.read()
         stretches, rate, text = _uniform(opened, samples)
@@ -139,19 +119,10 @@ def read_pieces(
             rate=rate,
             name=opened.name if K == 1 else f"{opened.name} ({k} of {K})",
             missing=Missing(own["missing"], opened.side.follows) if "missing" in own else None,
-            origin=Origin(opened.hashes, text, settings.jitter, opened.side.drives),
+            origin=Origin(opened.hashes, text, opened.settings.jitter, opened.side.drives),
         )
         for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]
-
-
-def require_joints(n: int, files: Sequence[str], model: GeneratedModel | None) -> None:
-    """Raise InputError unless a record of `n` joints is one of the robot of the model."""
-    if model is not None and n != len(model.JOINTS):
-        raise InputError(
-            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}",
-            file=", ".join(files),
-        )
 
 
 def _uniform(opened: RecordFiles, samples: Samples) -> tuple[list[Stretch], float, str]:
@@ -161,11 +132,8 @@ def _uniform(opened: RecordFiles, samples: Samples) -> tuple[list[Stretch], floa
     settings, stamps, file = opened.settings, opened.stamps, opened.first.file
     t, signals = samples.t, tuple(samples.signals.values())
     if t is None:
-        if settings.rate is None:
-            raise InputError(
-                "no time column and no rate; set record.rate (Hz) or record.columns.t", file=file
-            )
-        return [Stretch(np.arange(opened.samples) / settings.rate, signals)], settings.rate, ""
+        rate = opened.stated_rate
+        return [Stretch(np.arange(opened.samples) / rate, signals)], rate, ""
     if settings.resample is None:
         rate = rate_of(stamps, t)
         return [Stretch(t, signals)], rate, time_stamps(t, file=file).to_text(stamps.row)

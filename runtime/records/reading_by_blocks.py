@@ -19,14 +19,12 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import clock
 from runtime.records.formats.columns import BLOCK, Array
 from runtime.records.formats.table import is_read_by_blocks
-from runtime.records.labels import Label, labels
-from runtime.records.opening import RecordFiles, drives_of, names_of, open_record, record_files
-from runtime.records.reading import read_records, require_joints
+from runtime.records.opening import RecordFiles, open_records, record_files
+from runtime.records.reading import read_records
 from runtime.records.record import Origin, Record
 from runtime.records.stream import Stream
 from runtime.settings.record import RecordSettings, each_record
@@ -119,47 +117,24 @@ def open_streams(
     missing: bool = False,
 ) -> list[FileStream]:
     """Several records of one robot, to be read by blocks of `block` samples; as `read_records`."""
-    settings, drives, joints = each_record(tuple(settings)), drives_of(model), names_of(model)
-    streams = [
-        _stream(one, label, drives, joints, Path(folder or ""), block, missing)
-        for one, label in zip(settings, labels(settings), strict=True)
-    ]
-    for stream in streams:
-        require_joints(stream.n, tuple(stream.origin.files), model)
-    return streams
-
-
-def _stream(
-    settings: RecordSettings,
-    label: Label,
-    drives: Drives | None,
-    joints: Sequence[str],
-    folder: Path,
-    block: int,
-    missing: bool,
-) -> FileStream:
     if block < LIMIT.FEWEST_SAMPLES:
         raise InputError(f"blocks of {block} samples; expected at least {LIMIT.FEWEST_SAMPLES}")
-    if settings.resample is not None:
-        raise InputError(
-            "record.resample needs the whole record; set stream: off", file=", ".join(label.files)
-        )
-    opened = open_record(
-        settings, label, drives, folder, joints=joints, by_blocks=True, missing=missing
-    )
-    rate = settings.rate
-    if opened.columns.t is not None:
-        rate = clock(opened.stamps, lambda: opened.times(block))
-    if rate is None:
-        raise InputError(
-            "no time column and no rate; set record.rate (Hz) or record.columns.t",
-            file=opened.first.file,
-        )
+    for one in settings:
+        if one.resample is not None:
+            raise InputError(
+                "record.resample needs the whole record; set stream: off", file=", ".join(one.files)
+            )
+    opened = open_records(settings, model, folder, by_blocks=True, missing=missing)
+    return [_stream(files, block) for files in opened]
+
+
+def _stream(opened: RecordFiles, block: int) -> FileStream:
+    timed = opened.columns.t is not None
     return FileStream(
         name=opened.name,
         n=opened.n,
-        rate=rate,
-        origin=Origin(opened.hashes, jitter=settings.jitter, drives=opened.side.drives),
+        rate=clock(opened.stamps, lambda: opened.times(block)) if timed else opened.stated_rate,
+        origin=Origin(opened.hashes, jitter=opened.settings.jitter, drives=opened.side.drives),
         samples=opened.samples,
         block=block,
         follows=opened.side.follows,

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import Any
@@ -135,7 +135,13 @@ class Record:
         if missing is not None:
             given["q"] = bridged(given["q"], missing.at_joints() & np.isnan(given["q"]))
         for label, x in given.items():
-            require_finite(x, label.replace("_", ""), file)
+            column = label.replace("_", "")
+            require_finite(
+                x if x.ndim == 2 else x[:, None],
+                [column] if x.ndim == 1 else [f"{column}{j + 1}" for j in range(x.shape[1])],
+                file,
+                hint=f"{COUNTS} (here: missing=np.isnan(q))" if label == "q" else "",
+            )
             x.setflags(write=False)
         if rate is not None and not (np.isfinite(rate) and rate > 0):
             raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
@@ -205,22 +211,26 @@ def known_text(largest: Array | None) -> str:
     )
 
 
-def require_finite(x: Array, label: str, file: str) -> None:
-    """Raise InputError at the first value of x, shape (N,) or (N, k), that is not finite; columns
-    are called label1, label2 ...
+def require_finite(
+    x: Array,
+    names: Sequence[str],
+    file: str,
+    row: Callable[[int], str] = sample,
+    first: int = 0,
+    hint: str = "",
+) -> Array:
+    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity
+    among them; row : place of a sample in words; hint : what else may be done about nan.
     """
     if not np.isfinite(x).all():
         bad = np.argwhere(~np.isfinite(x))
-        value, column = x[tuple(bad[0])], label if x.ndim == 1 else f"{label}{bad[0][1] + 1}"
+        i, j = bad[0]
+        column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{value} ({len(bad)} such values in all); expected finite numbers, repair or cut the "
-            "record"
-            + (
-                f"; {COUNTS} (here: missing=np.isnan(q))"
-                if label == "q" and np.isnan(value)
-                else ""
-            ),
+            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut "
+            f"the record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=file,
             column=column,
-            row=sample(int(bad[0][0])),
+            row=row(first + int(i)),
         )
+    return x
