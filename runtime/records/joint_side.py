@@ -17,8 +17,10 @@ from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.joint_states import joint_columns, named_columns
-from runtime.settings.record import BY_NAME, Columns, RecordSettings
+from runtime.settings.record import BY_NAME, NONE, Columns, RecordSettings
 from runtime.settings.units import COMMANDS, position_unit, torque_unit
+
+QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,3 +278,36 @@ def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) ->
             for j, (kind, factor) in enumerate(units)
         ]
     )
+
+
+def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
+    """Columns by quantity; none of a quantity that is not asked for."""
+    known = tuple(name for name in names.tau_known if name != NONE)
+    return dict(
+        zip(
+            QUANTITIES,
+            (
+                () if names.t is None else (names.t,),
+                names.q,
+                names.qr,
+                names.tau,
+                names.tau_ff,
+                known,
+            ),
+            strict=True,
+        )
+    )
+
+
+def groups_of(
+    names: Columns, tables: tuple[Table, Table, Table]
+) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
+    """Each file once, with the columns that it is asked for, by quantity."""
+    first, last, other = tables
+    place = dict(zip(QUANTITIES, (first, first, first, last, last, other), strict=True))
+    asked = {key: columns for key, columns in asked_columns(names).items() if columns}
+    groups = {
+        table: {key: columns for key, columns in asked.items() if place[key] is table}
+        for table in dict.fromkeys(tables)
+    }
+    return [(table, own) for table, own in groups.items() if own]

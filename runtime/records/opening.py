@@ -21,8 +21,10 @@ from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.table import open_table
 from runtime.records.joint_side import (
     Conversion,
+    asked_columns,
     column_names,
     conversion,
+    groups_of,
     require_alike,
 )
 from runtime.records.labels import Label, labels
@@ -30,8 +32,6 @@ from runtime.records.missing import COUNTS, bridged
 from runtime.records.record import require_finite
 from runtime.settings.record import NONE, Columns, RecordSettings, each_record
 from runtime.settings.units import time_unit
-
-QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,36 +383,3 @@ def names_of(model: Any) -> tuple[str, ...]:
         if model is not None and labels.keys() >= {*model.JOINTS}
         else ()
     )
-
-
-def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
-    """Columns by quantity; none of a quantity that is not asked for."""
-    known = tuple(name for name in names.tau_known if name != NONE)
-    return dict(
-        zip(
-            QUANTITIES,
-            (
-                () if names.t is None else (names.t,),
-                names.q,
-                names.qr,
-                names.tau,
-                names.tau_ff,
-                known,
-            ),
-            strict=True,
-        )
-    )
-
-
-def groups_of(
-    names: Columns, tables: tuple[Table, Table, Table]
-) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
-    """Each file once, with the columns that it is asked for, by quantity."""
-    first, last, other = tables
-    place = dict(zip(QUANTITIES, (first, first, first, last, last, other), strict=True))
-    asked = {key: columns for key, columns in asked_columns(names).items() if columns}
-    groups = {
-        table: {key: columns for key, columns in asked.items() if place[key] is table}
-        for table in dict.fromkeys(tables)
-    }
-    return [(table, own) for table, own in groups.items() if own]
