@@ -20,7 +20,6 @@ gives those steps too. One core, BLAS on one thread, medians of interleaved roun
 import sys
 import time
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -34,18 +33,14 @@ from scipy.special import stdtrit  # noqa: E402
 
 import symgen  # noqa: E402
 from runtime.estimators.essential import essential_of  # noqa: E402
-from runtime.estimators.linear import assemble  # noqa: E402
-from runtime.estimators.method import linear_system  # noqa: E402
 from runtime.model.generated import drives_of  # noqa: E402
 from runtime.records.datasets import dataset_study  # noqa: E402
 from runtime.records.reading import read_records  # noqa: E402
-from runtime.resolution.advice import crossing  # noqa: E402
-from runtime.resolution.advisor import LIMITS, advise, sampled_level  # noqa: E402
+from runtime.resolution.advice import LIMITS, crossing  # noqa: E402
+from runtime.resolution.advisor import advise  # noqa: E402
 from runtime.resolution.cestac import cestac  # noqa: E402
-from runtime.resolution.perturbed import Task, prepared_record  # noqa: E402
-from runtime.resolution.readers import RealEncoders  # noqa: E402
+from runtime.resolution.coarse_encoders import CoarseEncoders  # noqa: E402
 from runtime.rows.observe import observe  # noqa: E402
-from runtime.rows.position_errors import perturbation  # noqa: E402
 from runtime.rows.prepared import prepared  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
 from symgen.demo.tx40_tables import MAIN  # noqa: E402
@@ -75,19 +70,16 @@ def steps_table(name, model, study, record, names):
     """Predicted and sampled steps of every parameter that matters."""
     advice = advise(model, record, study, columns=names, encoders=("all",), confirm=False)
     first = advice.encoders[0]
-    part = perturbation(model, record, study, names)
-    system = linear_system(part.observation, replace(study.estimate, columns="all"))
-    task = Task(
-        (prepared_record(prepared(model, record, study), study),),
+    level = CoarseEncoders(
         model,
-        tuple(names),
-        replace(study.estimate, columns="all"),
-        study.cestac,
-        (),
-        None,
+        [prepared(model, record, study)],
+        study,
+        names,
+        drives_of(model),
         {},
-    )
-    level = partial(sampled_level, task, (part,), assemble(system, system.solve(), model=model))
+        study.cestac.rounding,
+        "lowpass",
+    ).sampled
     low, high = first.limits[0].delta / RATIO**2, first.delta[-1] / RATIO
     grid = np.geomspace(low, high, round(np.log(high / low) / np.log(RATIO)) + 1)
     points = [level(range(record.n), delta, RUNS[name]) for delta in grid]
@@ -189,14 +181,8 @@ def real_table(name, model, study, record, names):
         flush=True,
     )
     for reader in advice.real:
-        own = (
-            law
-            if reader.reader == "lowpass"
-            else replace(law, signals=replace(law.signals, reader="counts"))
-        )
-        real = RealEncoders(
-            model, [prepared(model, record, own)], own, names, drives_of(model), {}, reader.reader
-        )
+        own = [prepared(model, record, law)]
+        real = CoarseEncoders(model, own, law, names, drives_of(model), {}, "phase", reader.reader)
         first, ratios = reader.encoders[0], []
         for limit in first.limits:
             if not np.isfinite(limit.delta):

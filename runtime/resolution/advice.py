@@ -45,17 +45,12 @@ class Sampled:
     half_width: Array
 
 
-def sampled(delta: float, X: Array, reference: Array) -> Sampled:
-    """Eqs. (18), (21) of the estimates X, shape (runs, b)."""
-    N = len(X)
+def sampled(delta: float, ratios: Array) -> Sampled:
+    """Eqs. (18), (21) of estimates over those of the record, shape (runs, b)."""
+    N = len(ratios)
     half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return Sampled(
-            delta,
-            N,
-            100 * (X.mean(axis=0) / reference - 1),
-            100 * half * X.std(axis=0, ddof=1) / np.abs(reference),
-        )
+    change = 100 * (ratios.mean(axis=0) - 1)
+    return Sampled(delta, N, change, 100 * half * ratios.std(axis=0, ddof=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +186,17 @@ class Advice(Result):
         return deciding_names(self.reference)
 
     @property
+    def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
+        """How encoders were judged, in words, the advice on them, and the change at the steps
+        asked for: by the chapter's law, without words, unless real encoders alone were; then real
+        ones by both readers.
+        """
+        real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
+        if self.real and self.encoders is self.real[0].encoders:
+            return real
+        return (("", self.encoders, self.steps), *real)
+
+    @property
     def unit(self) -> str:
         """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are
         coarse.
@@ -218,23 +224,17 @@ class Advice(Result):
         """Whether least squares would be biased at one of the steps asked for, or the runs
         contradict the prediction.
         """
-        several = (
-            *self.encoders,
-            *(encoder for reader in self.real for encoder in reader.encoders),
-        )
+        several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
         contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
         return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
 
     @property
     def verdict(self) -> str:
         """The answer in words."""
-        both = bool(self.real) and self.encoders is not self.real[0].encoders
-        parts = [] if self.real and not both else self._answers(self.encoders)
-        for reader in self.real:
-            parts += [
-                f"Real encoders read as {NAMES[reader.reader]}:",
-                *self._answers(reader.encoders),
-            ]
+        parts: list[str] = []
+        for name, encoders, _ in self.ways:
+            parts += [f"Real encoders read as {name}:"] if name else []
+            parts += self._answers(encoders)
         parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
         return " ".join(parts)
 
@@ -317,74 +317,40 @@ class Advice(Result):
         """Steps by encoder, by the chapter's law and of real encoders by both readers, then by
         parameter.
         """
-        if not self.real:
-            return [self.step_table(), self.parameter_table()]
-        if self.encoders is self.real[0].encoders:
-            return [self.reader_table(), self.parameter_table()]
-        return [self.step_table(), self.reader_table(), self.parameter_table()]
+        law, real = ([way for way in self.ways if bool(way[0]) == real] for real in (False, True))
+        captions = (
+            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with "
+            "the Student interval of the runs",
+            "Real encoders, counts of random phase: coarsest step of each, the others exact; none: "
+            "not even the finest step tried",
+        )
+        tables = [
+            self._step_table(caption, ways)
+            for caption, ways in zip(captions, (law, real), strict=True)
+            if ways
+        ]
+        return [*tables, self.parameter_table()]
 
-    def reader_table(self) -> Table:
-        """Coarsest steps of real encoders, read as positions beside read as counts."""
+    def _step_table(
+        self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
+    ) -> Table:
+        """Coarsest steps by encoder, of some ways side by side."""
         headers, rows = ["encoder"], []
-        for reader in self.real:
-            for limit in reader.encoders[0].limits:
-                headers += [
-                    f"{NAMES[reader.reader]}, {limit.percent:g} %",
-                    "first parameter",
-                    "sampled %e",
-                ]
-        for k, advice in enumerate(self.real[0].encoders):
-            cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
-            for reader in self.real:
-                for limit in reader.encoders[k].limits:
-                    sampled = (
-                        "-"
-                        if limit.sampled is None
-                        else f"{limit.error:.2f} ± {limit.half_width:.2f}"
-                    )
-                    step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
-                    turn = counts(limit.delta) if advice.unit == "rad" else ""
-                    cells += [turn or step, limit.parameter or "-", sampled]
+        for name, encoders, _ in ways:
+            for limit in encoders[0].limits:
+                percent = f"{limit.percent:g} %"
+                step = f"{name}, {percent}" if name else f"{percent}: Delta, {self.unit}"
+                headers += [step, "first parameter", "sampled %e"]
+        for alike in zip(*(encoders for _, encoders, _ in ways), strict=True):
+            unit = alike[0].unit
+            cells = [alike[0].label if unit == self.unit else f"{alike[0].label}, {unit}"]
+            for limit in (limit for advice in alike for limit in advice.limits):
+                runs = f"{limit.error:.2f} ± {limit.half_width:.2f}" if limit.sampled else "-"
+                step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
+                turn = counts(limit.delta) if unit == "rad" else ""
+                cells += [turn or step, limit.parameter or "-", runs]
             rows.append(tuple(cells))
-        caption = (
-            "Real encoders, counts of random phase: coarsest step of each, the others "
-            "exact; "
-            "none: not even the finest step tried"
-        )
         return Table(caption, headers, rows)
-
-    def step_table(self) -> Table:
-        """Coarsest steps by encoder."""
-        limits = self.encoders[0].limits
-        headers = (
-            h
-            for limit in limits
-            for h in (
-                f"{limit.percent:g} %: Delta, {self.unit}",
-                "",
-                "first parameter",
-                "sampled %e",
-            )
-        )
-        rows = []
-        for advice in self.encoders:
-            cells = [advice.label if advice.unit == self.unit else f"{advice.label}, {advice.unit}"]
-            for limit in advice.limits:
-                sampled = (
-                    "-" if limit.sampled is None else f"{limit.error:.2f} ± {limit.half_width:.2f}"
-                )
-                cells += [
-                    f"{limit.delta:.3g}",
-                    counts(limit.delta) if advice.unit == "rad" else "",
-                    limit.parameter or "-",
-                    sampled,
-                ]
-            rows.append(tuple(cells))
-        caption = (
-            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter "
-            "with the Student interval of the runs"
-        )
-        return Table(caption, ("encoder", *headers), rows)
 
     def parameter_table(self) -> Table:
         """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of
@@ -416,12 +382,10 @@ class Advice(Result):
     def asked_lines(self) -> list[str]:
         """One line per step asked for."""
         lines = []
-        ways = [(f", read as {NAMES[reader.reader]}", reader.steps) for reader in self.real]
-        if not self.real or self.encoders is not self.real[0].encoders:
-            ways.insert(0, ("", self.steps))
         for k, delta in enumerate(self.asked):
-            for way, steps in ways:
+            for reader, _, steps in self.ways:
                 name, e = self.worst(k, steps)
+                way = f", read as {reader}" if reader else ""
                 change = (
                     "not judged on this record"
                     if np.isnan(e)
@@ -496,6 +460,26 @@ def confirmed(
     return replace(
         advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made))
     )
+
+
+def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
+    """Where the first parameter that matters crosses the limits; nan where the finest step is
+    already beyond or none is judged, inf where no step is.
+    """
+    names, limits = deciding_names(reference), []
+    e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
+    for percent in LIMITS if len(delta) else ():
+        first = {name: crossing(delta, e[name], percent) for name in names}
+        beyond = [name for name in names if e[name][0] > percent]
+        reached = [name for name in names if np.isfinite(first[name])]
+        if beyond:
+            limits.append(Limit(percent, np.nan, max(beyond, key=lambda name: e[name][0])))
+        elif reached:
+            name = min(reached, key=lambda name: first[name])
+            limits.append(Limit(percent, first[name], name))
+        else:
+            limits.append(Limit(percent, np.inf, ""))
+    return tuple(limits) or tuple(Limit(percent, np.nan, "") for percent in LIMITS)
 
 
 def crossing(delta: Array, e: Array, percent: float) -> float:

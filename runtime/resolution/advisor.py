@@ -49,21 +49,21 @@ from runtime.records.record import Record
 from runtime.resolution.advice import (
     ALL,
     LIMITS,
+    NAMES,
     Advice,
     EncoderAdvice,
     Limit,
     ReaderAdvice,
-    Sampled,
     confirmed,
-    crossing,
-    sampled,
+    limits_of,
 )
 from runtime.resolution.c.workspace import usable
-from runtime.resolution.perturbed import Task, prepared_record, study_columns
-from runtime.resolution.readers import READERS, real_encoders
+from runtime.resolution.coarse_encoders import READERS, CoarseEncoders, Reader
+from runtime.resolution.perturbed import study_columns
+from runtime.resolution.readers import reader_advice
 from runtime.resolution.result import deciding_names
-from runtime.resolution.rounding import VARIANCE, rounded, stream
-from runtime.resolution.run import forget, moved_estimate
+from runtime.resolution.rounding import VARIANCE, Mode
+from runtime.resolution.run import forget
 from runtime.rows.observation import stack
 from runtime.rows.position_errors import Perturbation, perturbation, solution
 from runtime.rows.prepared import Prepared, common_drives, prepared
@@ -187,52 +187,49 @@ def advise(
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))
-    task = Task(
-        tuple(prepared_record(own, study, drives) for own in as_measured),
-        model,
-        names,
-        settings,
-        study.cestac,
-        (),
-        drives,
-        dict(constants or {}),
-    )
-    units = (
-        joint_units(model) if study.cestac.side == "joint" else ("rad",) * len(model.JOINTS)
-    )  # motors turn
+    joints = joint_units(model) if study.cestac.side == "joint" else ["rad" for _ in every]
     selections = _selections(model, encoders)
-    total = len(selections) * ((law != "phase") + len(READERS) * (real or law == "phase"))
+    units = {
+        label: " or ".join(sorted({joints[i] for i in own}, reverse=True))
+        for label, own in selections.items()
+    }
+    real = real or law == "phase"
+    total = len(selections) * ((law != "phase") + len(NAMES) * real)
     done = count(1)
 
     def advance() -> None:
         if progress is not None:
             progress(next(done), total)
 
-    by_reader: tuple[ReaderAdvice, ...] = ()
-    if real or law == "phase":
-        rate = np.abs(
-            Predictor(parts, predictor.weights, VARIANCE["phase"]).rate(every)[decisive]
-        ).max(initial=0.0)
-        start = float(np.sqrt(LIMITS[0] / rate)) if np.isfinite(rate) and rate > 0 else np.inf
-        given: dict[str, Any] = {
-            "drives": drives,
-            "constants": dict(constants or {}),
-            "confirm": confirm,
-            "progress": advance,
-            "asked": asked,
-        }
-        by_reader = real_encoders(
-            model, as_measured, study, reference, selections, units, start, **given
+    def coarse(law: Mode, reader: Reader) -> CoarseEncoders:
+        return CoarseEncoders(
+            model, as_measured, study, names, drives, constants or {}, law, reader
         )
+
+    rate = replace(predictor, share=VARIANCE["phase"]).rate(every)[decisive]
+    fastest = np.abs(rate).max(initial=0.0)
+    start = float(np.sqrt(LIMITS[0] / fastest)) if np.isfinite(fastest) and fastest > 0 else np.inf
+    by_reader: list[ReaderAdvice] = []
     advices = []
     try:
-        for label, own in selections.items() if law != "phase" else ():
-            unit = " or ".join(sorted({units[i] for i in own}, reverse=True))
-            advice = _advice(predictor, label, own, names, decisive, unit)
-            if confirm:
-                advice = confirmed(
-                    advice, reference, partial(sampled_level, task, parts, reference, own)
+        for reader in READERS if real else ():
+            by_reader.append(
+                reader_advice(
+                    coarse("phase", reader),
+                    reference,
+                    selections,
+                    units,
+                    start,
+                    asked=asked,
+                    confirm=confirm,
+                    progress=advance,
                 )
+            )
+        runs = coarse(law, "lowpass") if confirm and law != "phase" else None
+        for label, own in selections.items() if law != "phase" else ():
+            advice = _advice(predictor, label, own, reference, units[label])
+            if runs is not None:
+                advice = confirmed(advice, reference, partial(runs.sampled, own))
             advices.append(advice)
             advance()
     finally:
@@ -241,12 +238,12 @@ def advise(
         len(asked), len(names)
     )
     if law == "phase":
-        steps = next(reader.steps for reader in by_reader if reader.reader == study.signals.reader)
+        steps = next(one.steps for one in by_reader if one.reader == study.signals.reader)
     return Advice(
         names=names,
         reference=reference,
         encoders=tuple(advices) if advices else by_reader[0].encoders,
-        real=by_reader,
+        real=tuple(by_reader),
         asked=tuple(asked),
         steps=steps,
         torque_sigma=torque_sigma(predictor, drives),
@@ -275,24 +272,17 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
 
 
 def _advice(
-    predictor: Predictor,
-    label: str,
-    encoders: Sequence[int],
-    names: Sequence[str],
-    decisive: Sequence[int],
-    unit: str,
+    predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
 ) -> EncoderAdvice:
     """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond
     them.
     """
+    decisive = [reference.names.index(name) for name in deciding_names(reference)]
     rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
     if not (np.isfinite(rate) and rate > 0):
+        limits = tuple(Limit(percent, np.inf, "") for percent in LIMITS)
         return EncoderAdvice(
-            label,
-            tuple(Limit(percent, np.inf, "") for percent in LIMITS),
-            np.empty(0),
-            np.empty((0, len(names))),
-            unit=unit,
+            label, limits, np.empty(0), np.empty((0, len(reference.names))), unit=unit
         )
     start = float(np.sqrt(LIMITS[0] / rate))
     known: dict[int, Array] = {}
@@ -313,60 +303,9 @@ def _advice(
     for k in range(low, high + 1):
         worst(k)
     order = sorted(known)
-    delta, change = (
-        start * LIMIT.CURVE_RATIO ** np.array(order, dtype=float),
-        np.array([known[k] for k in order]),
-    )
-    limits = []
-    for percent in LIMITS:
-        steps = [crossing(delta, np.abs(change[:, i]), percent) for i in decisive]
-        first = int(np.nanargmin(steps)) if np.isfinite(steps).any() else None
-        limits.append(
-            Limit(percent, np.inf, "")
-            if first is None
-            else Limit(percent, steps[first], names[decisive[first]])
-        )
-    return EncoderAdvice(label, tuple(limits), delta, change, unit=unit)
-
-
-def sampled_level(
-    task: Task,
-    parts: Sequence[Perturbation],
-    reference: Estimate,
-    encoders: Sequence[int],
-    delta: float,
-    runs: int | None = None,
-) -> Sampled:
-    """CESTAC with only some encoders coarse, eqs. (17), (18), (21); the streams of an encoder do
-    not depend on which others are coarse.
-
-    encoders : numbers from 0.   runs : default: as many as the settings say.
-    """
-    X = []
-    for run in range(runs or task.settings.runs):
-        X.append(
-            moved_estimate(
-                task, [_errors(task, part, k, delta, encoders, run) for k, part in enumerate(parts)]
-            )
-        )
-    return sampled(delta, np.array(X), reference.X)
-
-
-def _errors(
-    task: Task, part: Perturbation, k: int, delta: float, encoders: Sequence[int], run: int
-) -> Array:
-    """What rounding some encoders does to the joint positions of record k, shape (N, n)."""
-    settings, q = task.settings, task.records[k].q
-    errors, seen = (
-        np.zeros(q.shape[::-1]),
-        np.linalg.inv(part.root),
-    )  # of joints; positions as the encoders see them, up to their offsets
-    for i in encoders:
-        own = q @ seen[i]
-        error = rounded(own, delta, settings.rounding, stream(settings.seed, k, run, i)) - own
-        for j in np.flatnonzero(part.root[:, i]):
-            errors[j] += part.root[j, i] * error
-    return errors.T
+    delta = start * LIMIT.CURVE_RATIO ** np.array(order, dtype=float)
+    change = np.array([known[k] for k in order])
+    return EncoderAdvice(label, limits_of(delta, change, reference), delta, change, unit=unit)
 
 
 def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:

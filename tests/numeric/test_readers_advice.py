@@ -13,7 +13,8 @@ from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
-from runtime.resolution.readers import RealEncoders, curves
+from runtime.resolution.coarse_encoders import CoarseEncoders
+from runtime.resolution.readers import curves
 from runtime.rows.prepared import prepared
 from runtime.settings.study import CestacSettings, Rows, Study
 from runtime.signals.filters import filtered_states
@@ -34,8 +35,8 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     one encoder of two alike.
     """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
-    real = RealEncoders(
-        planar, [prepared(planar, RECORD, STUDY)], STUDY, NAMES, None, {}, "lowpass"
+    real = CoarseEncoders(
+        planar, [prepared(planar, RECORD, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
     )
     change = real.asked(STEP)
     level = found.levels[0]
@@ -130,8 +131,8 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
             states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)
         ),
     )
-    real = RealEncoders(
-        planar, [prepared(planar, record, STUDY)], STUDY, NAMES, None, {}, "lowpass"
+    real = CoarseEncoders(
+        planar, [prepared(planar, record, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
     )
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
@@ -147,7 +148,7 @@ class Scattered:
     phase; encoder 2 rests.
     """
 
-    reader, names, finest, coarsest = "counts", ("FV1",), 0.1, np.array([1e3, np.inf])
+    reader, reference, finest, coarsest = "counts", np.ones(1), 0.1, np.array([1e3, np.inf])
 
     def nodes(self, delta, moving, count=4):
         assert moving == [0]

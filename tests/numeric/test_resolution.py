@@ -336,7 +336,7 @@ def test_where_a_curve_crosses():
     assert np.isnan(crossing(delta, 0.001 * delta, 1.0)) and np.isnan(
         crossing(delta, 2 * delta, 1.0)
     )
-    found = sampled(1.0, np.array([[1.0], [3.0]]), np.array([4.0]))
+    found = sampled(1.0, np.array([[1.0], [3.0]]) / 4.0)
     assert np.isclose(found.change[0], -50) and np.isclose(
         found.half_width[0], 100 * 12.706204736 * np.sqrt(2) / np.sqrt(2) / 4
     )
