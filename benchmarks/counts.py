@@ -41,7 +41,7 @@ from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
-from runtime.resolution.readers import READERS
+from runtime.resolution.coarse_encoders import READERS
 from runtime.rows.observe import observe
 from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.selection import certain_rows, select_rows
