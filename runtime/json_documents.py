@@ -207,18 +207,11 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
         )
     if missing := [f.name for f in fields(kind) if f.name not in data]:  # type: ignore[arg-type]
         raise InputError(f"no {missing[0]!r}; the file is incomplete", file=file)
-    result: T = validated(kind, data, file)
-    return result
-
-
-def validated(kind: Any, data: Any, file: str) -> Any:
-    """`data` of a JSON result as a value of type `kind`; InputError names the key that is of
-    another type.
-    """
     try:
-        return TypeAdapter(kind).validate_python(data)
+        result: T = TypeAdapter(kind).validate_python(data)
     except ValidationError as e:
         raise InputError(f"{settings_error(e, data)}; the file was changed", file=file) from e
+    return result
 
 
 def _refuse_constant(name: str) -> NoReturn:

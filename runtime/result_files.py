@@ -25,9 +25,9 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import overload
+from typing import Any
 
 from runtime.errors import InputError, encodable
 
@@ -108,31 +108,26 @@ class Results:
 
 def write_all(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Write every file into `folder`, or none, after whoever is just writing there; their paths."""
-    folder = Path(folder)
-    with _made(folder), _locked(folder, PATIENCE):
-        return Results(folder).write_all(contents)
-
-
-@overload
-def reserved(folder: str | Path) -> AbstractContextManager[Results]: ...
-@overload
-def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]: ...
-def reserved(folder: str | Path | None) -> AbstractContextManager[Results | None]:
-    """Keep other commands out of `folder`, made where it is missing, as long as the block lasts;
-    None: nothing is to be written.
-
-    Raises OutputError at once where another command holds the folder, or nothing can be written
-    there.
-    """
-    return nullcontext() if folder is None else _reserved(Path(folder))
+    with reserved(folder, PATIENCE) as results:
+        return results.write_all(contents)  # type: ignore[no-any-return]
 
 
 @contextmanager
-def _reserved(folder: Path) -> Iterator[Results]:
-    with _made(folder), _locked(folder, 0.0):
-        with _clear_errors(folder):
-            Results(folder).recover()
-        yield Results(folder)
+def reserved(folder: str | Path | None, patience: float = 0.0) -> Iterator[Any]:
+    """Keep other commands out of `folder`, made where it is missing, as long as the block lasts;
+    the context gives it as `Results`, or None, where nothing is to be written.
+
+    Raises OutputError where another command holds the folder for longer than `patience`, s, or
+    nothing can be written there.
+    """
+    if folder is None:
+        yield None
+        return
+    results = Results(Path(folder))
+    with _made(results.folder), _locked(results.folder, patience):
+        with _clear_errors(results.folder):
+            results.recover()
+        yield results
 
 
 @contextmanager

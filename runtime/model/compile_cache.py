@@ -97,7 +97,10 @@ def shared_object(
         " ".join((*flags, *LIBRARIES)).encode(),
         " ".join(command).encode(),
         version.encode(),
-        _processor().encode(),
+        (
+            f"{platform.system()} {platform.machine()} {platform.architecture()[0]} "
+            f"{_cpuinfo('flags', 'Features')}"
+        ).encode(),  # what the code may depend on
     )
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     try:
@@ -238,14 +241,6 @@ def processor() -> str:
         f"{platform.machine()} "
         f"{_cpuinfo('model name').partition(':')[2].strip() or platform.processor()}"
     ).strip()
-
-
-def _processor() -> str:
-    """What the code may depend on: machine, system, processor flags."""
-    return (
-        f"{platform.system()} {platform.machine()} {platform.architecture()[0]} "
-        f"{_cpuinfo('flags', 'Features')}"
-    )
 
 
 def _cpuinfo(*starts: str) -> str:

@@ -185,7 +185,8 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
     try:
         return Path(source.fetch(file, downloader=pooch.HTTPDownloader(timeout=TIMEOUT)))
     except (OSError, ValueError) as e:
-        tried.append(f"download of {dataset.url}{file}: {_short(e)}")
+        reason = f"{type(e).__name__}: {e}"[:200]
+        tried.append(f"download of {dataset.url}{file}: {reason}")
     lines = "\n".join(f"  - {line}" for line in tried)
     raise DataUnavailableError(
         (
@@ -244,7 +245,3 @@ def _cache(cache: Path | None) -> Path:
     import pooch
 
     return Path(pooch.os_cache("symgen"))
-
-
-def _short(e: Exception) -> str:
-    return f"{type(e).__name__}: {e}"[:200]

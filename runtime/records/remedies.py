@@ -21,7 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from runtime.records.time_stamps import Array, TimeStamps
+from runtime.records.time_stamps import Array, TimeStamps, times
 from runtime.settings.record import Resample
 
 BRIDGED, BRIDGED_PERIODS = 0.02, 10.0  # s, and periods: gaps up to the longer one are bridged
@@ -52,7 +52,7 @@ def remedies(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
     short = gaps[gaps <= limit]
     taken = step[(step > 0) & (step <= limit * stamps.period)]
     mean, most = len(taken) / float(taken.sum()), 1 / stamps.period
-    pauses = f", {_count(len(gaps) - len(short), 'pause')} aside," if len(short) < len(gaps) else ""
+    pauses = f", {times(len(gaps) - len(short), 'pause')} aside," if len(short) < len(gaps) else ""
     count = (
         f"{len(taken) + 1} samples in {taken.sum():.6g} s{pauses} are {mean:.6g} Hz, 1/median "
         f"step is {most:.6g} Hz"
@@ -65,7 +65,7 @@ def remedies(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
             f": about {missing} samples are missing ({100 * missing / (len(t) + missing):.2g} %)"
         )
     bridge = (
-        f"bridges {_count(len(short), 'gap')} of up to {short.max():.0f} periods by interpolation"
+        f"bridges {times(len(short), 'gap')} of up to {short.max():.0f} periods by interpolation"
         if len(short)
         else ""
     )
@@ -125,7 +125,7 @@ def _pieces(t: Array, stamps: TimeStamps, longest: float, whole: float) -> tuple
     long = lengths[lengths >= SHORTEST]
     kept = float(long.sum()) / whole
     return (
-        f"{_count(len(long), 'piece')} of {SHORTEST:g} s or more, {100 * kept:.3g} % of the time",
+        f"{times(len(long), 'piece')} of {SHORTEST:g} s or more, {100 * kept:.3g} % of the time",
         kept,
     )
 
@@ -138,7 +138,3 @@ def _shift(t: Array, rate: float) -> float:
 def _correlation(step: Array) -> float:
     off = step - step.mean()
     return float(off[1:] @ off[:-1] / (off @ off)) if np.any(off) else 0.0
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

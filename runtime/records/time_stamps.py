@@ -79,26 +79,23 @@ class TimeStamps:
         ):
             if found:
                 largest = sorted(found, key=lambda s: -abs(s.step))[:LISTED]
-                places = ", ".join(f"{row(s.sample)} ({self._size(s)})" for s in largest)
+                places = ", ".join(
+                    f"{row(s.sample)} (t = {s.before:.6g} s"
+                    + (f", {s.step:.6g} s" if s.step else "")
+                    + (f", {s.step / self.period:.0f} periods)" if s.step > 0 else ")")
+                    for s in largest
+                )
                 parts.append(
-                    f"{_count(len(found), kind)}{', the largest' if len(found) > LISTED else ''} "
+                    f"{times(len(found), kind)}{', the largest' if len(found) > LISTED else ''} "
                     f"at {places}"
                 )
         return "; ".join(parts)
 
-    def _size(self, irregular: Irregular) -> str:
-        periods = f", {irregular.step / self.period:.0f} periods" if irregular.step > 0 else ""
-        return f"t = {irregular.before:.6g} s" + (
-            f", {irregular.step:.6g} s{periods}" if irregular.step else ""
-        )
 
-
-def _count(number: int, kind: str) -> str:
+def times(number: int, kind: str) -> str:
     """1 gap, 2 steps back."""
-    first, _, rest = kind.partition(" ")
-    if number == 1:
-        return f"1 {kind}"
-    return f"{number} {kind}s" if first == "repeated" or not rest else f"{number} {first}s {rest}"
+    several = "steps back" if kind == "step back" else f"{kind}s"
+    return f"{number} {kind if number == 1 else several}"
 
 
 def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStamps:
