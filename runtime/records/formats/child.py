@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib import import_module
-from io import BytesIO
 from pathlib import Path
 from time import process_time
 from typing import Any, BinaryIO
@@ -20,8 +19,6 @@ from runtime.errors import InputError, first_line
 from runtime.files import allowed
 from runtime.records.formats.columns import Source, Table
 from runtime.records.formats.table import Format, format_of, needed
-
-CALLS = ("samples", "note", "widths", "scalar", "row", "blocks")
 
 
 def serve() -> None:
@@ -76,26 +73,18 @@ def results(table: Table, call: str, *arguments: Any) -> Iterator[Any]:
     elif call == "blocks":
         yield from table.blocks(*arguments)
         yield {"value": None}
-    elif call in CALLS:
+    else:
         yield {"value": getattr(table, call)(*arguments)}
 
 
 def send(answers: BinaryIO, answer: Any) -> None:
     """One line of JSON, and the arrays of a block."""
-    files = [npy(x) for x in answer] if isinstance(answer, tuple) else []
-    answers.write(
-        json.dumps({"arrays": [len(data) for data in files]} if files else answer).encode() + b"\n"
-    )
-    for data in files:
-        answers.write(data)
+    arrays = answer if isinstance(answer, tuple) else ()
+    head = {"arrays": [x.shape for x in arrays]} if arrays else answer
+    answers.write(json.dumps(head).encode() + b"\n")
+    for x in arrays:
+        answers.write(np.ascontiguousarray(x, dtype=float).data)
     answers.flush()
-
-
-def npy(x: np.ndarray) -> bytes:
-    """The bytes of a .npy file."""
-    stream = BytesIO()
-    np.lib.format.write_array(stream, np.ascontiguousarray(x), allow_pickle=False)
-    return stream.getvalue()
 
 
 def described(e: BaseException, format_: Format, memory: int) -> dict[str, str | None]:

@@ -3,8 +3,8 @@ all time or memory, ends that process only.
 
 Requests go out as lines of JSON, one at a time: a method of `Table` and its arguments. Answers come
 back as a line of JSON, {"value": ...},
-{"error": {...}}, or {"arrays": [sizes]} ahead of so many .npy files of that many bytes, one line
-for every block; nothing is pickled.
+{"error": {...}}, or {"arrays": [shapes]} ahead of the float64 numbers of so many arrays in C order,
+one line for every block; nothing is pickled.
 
 The limits, all of them here: MEMORY for every file and GROWTH times its size; SECONDS of processor
 time and one more for every
@@ -23,7 +23,6 @@ import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from io import BytesIO
 from tempfile import TemporaryDirectory
 from typing import IO, Any, cast
 
@@ -45,19 +44,14 @@ START = (
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "POLARS_MAX_THREADS", "MALLOC_ARENA_MAX"), "1")
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What the process may use: memory and size of files in bytes, processor time of one request in
-    s.
-    """
+def memory_of(size: int) -> int:
+    """Bytes that reading a file of `size` bytes may take."""
+    return MEMORY + GROWTH * size
 
-    memory: int
-    seconds: int
 
-    @classmethod
-    def of(cls, size: int) -> Limits:
-        """For a file of `size` bytes."""
-        return cls(MEMORY + GROWTH * size, SECONDS + size // BYTES_PER_SECOND)
+def seconds_of(size: int) -> int:
+    """Processor time, s, of one request to a file of `size` bytes."""
+    return SECONDS + size // BYTES_PER_SECOND
 
 
 class Process:
@@ -66,7 +60,6 @@ class Process:
     """
 
     def __init__(self, source: Source) -> None:
-        limits = Limits.of(source.size)
         folder = TemporaryDirectory(
             prefix="symgen-record-"
         )  # of the other process, which may be ended before it can tidy up
@@ -78,15 +71,8 @@ class Process:
             env={**os.environ, **ONE_THREAD, "TMPDIR": folder.name},
         )
         self.end = weakref.finalize(self, _ended, self.popen, folder)
-        self.send(
-            [
-                str(source.path.absolute()),
-                source.topic,
-                source.decimal,
-                limits.memory,
-                limits.seconds,
-            ]
-        )
+        place = [str(source.path.absolute()), source.topic, source.decimal]
+        self.send([*place, memory_of(source.size), seconds_of(source.size)])
 
     def send(self, request: Any) -> None:
         """One line of JSON; where the process has ended, the answer that does not come tells."""
@@ -103,10 +89,9 @@ class Process:
         answer = json.loads(line) if line.endswith(b"\n") else None
         if answer is None or "arrays" not in answer:
             return answer
-        files = [pipe.read(size) for size in answer["arrays"]]
-        if [len(data) for data in files] != answer["arrays"]:
-            return None
-        return tuple(np.load(BytesIO(data), allow_pickle=False) for data in files)
+        arrays = tuple(np.empty(shape) for shape in answer["arrays"])
+        whole = all(pipe.readinto(x.data.cast("B")) == x.nbytes for x in arrays if x.size)
+        return arrays if whole else None
 
 
 @dataclass(eq=False, kw_only=True)
@@ -197,10 +182,10 @@ class IsolatedTable(Table):
                 process.end()
 
     def _death(self, code: int) -> InputError:
-        seconds = Limits.of(self.size).seconds
         if -code in (signal.SIGXCPU, signal.SIGKILL):
             return InputError(
-                f"takes more than {seconds} s of processor time to read; expected {self.title}",
+                f"takes more than {seconds_of(self.size)} s of processor time to read; expected "
+                f"{self.title}",
                 file=self.file,
             )
         end = signal.Signals(-code).name if code < 0 else f"code {code}"
