@@ -42,6 +42,7 @@ from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
 from runtime.estimators.essential import essential_of
+from runtime.estimators.normal_equations import least_squares
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
@@ -49,7 +50,6 @@ from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.resolution.c import kernels
-from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.cestac import cestac, levels_of
 from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
@@ -145,7 +145,6 @@ def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object
     states = kernels.FilteredStates(measured, part.rate, chosen.signals, room)
     arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
     y = kernels.decimated(work.entries, states, *arguments)
-    rows = KeptRows(work.entries, [(y, part.torque, chosen.mask)], work.room)
 
     def draw_and_filter() -> kernels.FilteredStates:
         up = packed_bits(part.q.size, stream(task.settings.seed, *KEY))
@@ -156,7 +155,9 @@ def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object
     return {
         "  C: draw, filters": draw_and_filter,
         "  C: signals, decimation": lambda: kernels.decimated(work.entries, states, *arguments),
-        "  C: least squares": lambda: least_squares(rows),
+        "  least squares": lambda: least_squares(
+            work.entries.rows([(y, part.torque, chosen.mask)])
+        ),
     }
 
 

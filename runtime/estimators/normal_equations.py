@@ -14,7 +14,7 @@ kappa = rcond^(-1/2), rcond of D A D in the
 positive definite, the structured triangular factor is used instead (`runtime.rows.factor`), and the
 result says so.
 
-The rows are those of a resolution study, read in C (`runtime.resolution.c.least_squares`).
+The rows are those of a run of a resolution study whose signals were made in C.
 
 References: Golub and Van Loan, Matrix Computations, sections 5.3 and 5.3.8; Higham, Accuracy and
 Stability of Numerical Algorithms, chapters 12 and 20.
@@ -29,7 +29,9 @@ from typing import Literal
 import numpy as np
 from scipy.linalg.lapack import dpocon, dpotrf, dpotrs
 
-from runtime.rows.factor import Array
+from runtime.estimators.solution import solve
+from runtime.limits import LIMIT
+from runtime.rows.factor import Array, Factor, JointFactor
 
 Method = Literal["normal equations", "triangular factor"]
 
@@ -106,3 +108,54 @@ class Cholesky:
     def solve(self, g: Array) -> Array:
         """A^-1 g."""
         return np.asarray(self.D * dpotrs(self.L, self.D * g, lower=1)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class JointRows:
+    """Rows of [W Y] by joint.
+
+    names : columns of W.   columns : C_j, by joint.
+    rows : [W_j[:, C_j] Y_j]', by joint, shape (|C_j| + 1, rows of the joint).
+    """
+
+    names: tuple[str, ...]
+    columns: tuple[Array, ...]
+    rows: tuple[Array, ...]
+
+    def normal(self) -> JointEquations:
+        """The normal equations."""
+        return JointEquations(self.columns, tuple(a @ a.T for a in self.rows), len(self.names))
+
+    def residuals(self, X: Array) -> list[Array]:
+        """Y_j - W_j X by joint."""
+        return [a[-1] - X[C] @ a[:-1] for C, a in zip(self.columns, self.rows, strict=True)]
+
+    def factor(self) -> Factor:
+        """Structured triangular factor of [W Y]."""
+        joints = [
+            JointFactor(C, np.linalg.qr(a.T, mode="r"), a.shape[1])
+            for C, a in zip(self.columns, self.rows, strict=True)
+        ]
+        return Factor.of(self.names, joints)
+
+
+def least_squares(rows: JointRows, limit: float = LIMIT.NORMAL_EQUATIONS) -> LeastSquares:
+    """X = argmin ||Y - W X|| by normal equations and one refinement; by the triangular factor where
+    kappa reaches `limit`.
+
+    The residual norms are those before the refinement: it changes them by less than kappa^2 eps
+    squared.
+    """
+    equations = rows.normal()
+    cholesky = equations.cholesky()
+    if cholesky is None or not cholesky.kappa < limit:
+        factor = rows.factor()
+        fit = solve(factor)
+        norms = np.array([joint.residual_norm(fit.X) for joint in factor.joints])
+        return LeastSquares(fit.X, norms, fit.cond_unit, "triangular factor")
+    X = cholesky.solve(equations.g)
+    residuals = rows.residuals(X)
+    gradients = [a[:-1] @ r for a, r in zip(rows.rows, residuals, strict=True)]
+    norms = np.array([np.linalg.norm(r) for r in residuals])
+    X += cholesky.solve(equations.scattered(gradients))
+    return LeastSquares(X, norms, cholesky.kappa, "normal equations")

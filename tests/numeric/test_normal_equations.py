@@ -1,6 +1,4 @@
-"""Normal equations by joint: the digits they keep, against least squares in extended precision;
-blocks change nothing.
-"""
+"""Normal equations by joint: the digits they keep, against least squares in extended precision."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -8,14 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.estimators.normal_equations import JointEquations
+from runtime.estimators.normal_equations import JointRows, least_squares
 from runtime.estimators.solution import solve
 from runtime.limits import LIMIT
 from runtime.model.generated import load_model
-from runtime.resolution.c.least_squares import least_squares
-from runtime.rows.factor import Factor, JointFactor
 
-N = 2003  # no multiple of a block
+N = 2003
 
 
 @lru_cache
@@ -68,43 +64,16 @@ def columns():
     return tuple(np.flatnonzero(column) for column in np.asarray(model().STRUCTURE).T)
 
 
-class Rows:
-    """What `least_squares` reads of rows, in NumPy: [W_j[:, C_j] Y_j] of every joint, by blocks of
-    `size` samples.
-    """
-
-    def __init__(self, q, qd, qdd, tau, size=500):
-        W = model().observation_matrix(q, qd, qdd).reshape(6, len(q), 60)
-        self.joints = [np.column_stack([W[j][:, C], tau[:, j]]) for j, C in enumerate(columns())]
-        self.starts = range(0, len(q), size)
-        self.size = size
-
-    def blocks(self, rows):
-        return [rows[k : k + self.size] for k in self.starts]
-
-    def normal(self):
-        grams = [sum(x.T @ x for x in self.blocks(rows)) for rows in self.joints]
-        return JointEquations(columns(), tuple(grams), 60)
-
-    def gradient(self, X):
-        residuals = [
-            rows[:, -1] - rows[:, :-1] @ X[C]
-            for rows, C in zip(self.joints, columns(), strict=True)
-        ]
-        pairs = zip(self.joints, residuals, strict=True)
-        return [rows[:, :-1].T @ r for rows, r in pairs], np.array([r @ r for r in residuals])
-
-    def factor(self):
-        joints = [
-            JointFactor(C, np.linalg.qr(rows, mode="r"), len(rows))
-            for C, rows in zip(columns(), self.joints, strict=True)
-        ]
-        return Factor.of(model().BASE_PARAMETERS, joints)
+def rows_from(q, qd, qdd, tau):
+    """[W_j[:, C_j] Y_j]' of every joint."""
+    W = model().observation_matrix(q, qd, qdd).reshape(6, len(q), 60)
+    joints = [np.vstack([W[j][:, C].T, tau[:, j]]) for j, C in enumerate(columns())]
+    return JointRows(model().BASE_PARAMETERS, columns(), tuple(joints))
 
 
 @lru_cache
-def rows_of(swing, size=500):
-    return Rows(*states(swing), size)
+def rows_of(swing):
+    return rows_from(*states(swing))
 
 
 def refined(rows, refinements):
@@ -113,7 +82,8 @@ def refined(rows, refinements):
     cholesky = equations.cholesky()
     X = cholesky.solve(equations.g)
     for _ in range(refinements):
-        X = X + cholesky.solve(equations.scattered(rows.gradient(X)[0]))
+        pairs = zip(rows.rows, rows.residuals(X), strict=True)
+        X = X + cholesky.solve(equations.scattered([a[:-1] @ r for a, r in pairs]))
     return X
 
 
@@ -144,13 +114,12 @@ def test_digits_by_condition_number(swing):
     np.testing.assert_array_equal(solution.X, refined(rows, 1))
 
 
-@pytest.mark.parametrize("block", [7, 97, 1000, N, 10 * N])
-def test_blocks_change_nothing(block):
-    """Sums in another order: equal to rounding times kappa."""
+def test_well_conditioned_rows_against_lstsq():
+    """Equal to rounding times kappa."""
     q, qd, qdd, tau = states(3.0)
     W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
     exact = np.linalg.lstsq(W, Y, rcond=None)[0]
-    found = least_squares(rows_of(3.0, block))
+    found = least_squares(rows_of(3.0))
     assert found.method == "normal equations"
     np.testing.assert_allclose(found.X, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
     norms = np.linalg.norm((Y - W @ exact).reshape(6, -1), axis=1)
@@ -162,7 +131,7 @@ def test_residual_norms_of_an_exact_fit():
     q, qd, qdd, _ = states(3.0)
     X = np.arange(1.0, 61.0)
     tau = model().inverse_dynamics(q, qd, qdd, X)
-    found = least_squares(Rows(q, qd, qdd, tau))
+    found = least_squares(rows_from(q, qd, qdd, tau))
     np.testing.assert_allclose(found.X, X, rtol=1e-11)
     assert (found.residual_norms < 1e-11 * np.linalg.norm(tau, axis=0)).all()
 
@@ -176,7 +145,7 @@ def test_ill_conditioned_rows_go_to_the_triangular_factor():
 def test_rows_that_do_not_determine_every_parameter():
     q, qd, qdd, tau = (x.copy() for x in states(3.0))
     q[:, 5], qd[:, 5], qdd[:, 5] = 0.3, 0, 0
-    found = least_squares(Rows(q, qd, qdd, tau))
+    found = least_squares(rows_from(q, qd, qdd, tau))
     W, Y = model().observation_matrix(q, qd, qdd), tau.T.ravel()
     assert found.method == "triangular factor" and np.isinf(found.kappa)
     best = np.linalg.norm(Y - W @ np.linalg.lstsq(W, Y, rcond=None)[0])
@@ -186,7 +155,7 @@ def test_rows_that_do_not_determine_every_parameter():
 def test_factor_and_equations_have_the_gram_matrix_of_the_rows():
     q, qd, qdd, tau = states(3.0)
     whole = np.column_stack([model().observation_matrix(q, qd, qdd), tau.T.ravel()])
-    rows = rows_of(3.0, 333)
+    rows = rows_of(3.0)
     equations, factor = rows.normal(), rows.factor()
     scale = np.outer(*2 * [np.linalg.norm(whole, axis=0)])
     np.testing.assert_allclose(

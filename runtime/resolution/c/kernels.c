@@ -3,12 +3,8 @@
     fused_states      median-filtered positions -> q, qd, qdd: low-pass forward and backward, central differences (runtime/signals/filters.py)
     fused_gather      rows of q, qd, qdd from these
     fused_decimated   states -> signals -> kept samples of the zero-phase decimation (folding.py); the signals are never stored
-    fused_normal      rows -> A_j = [W_j Y_j]'[W_j Y_j] of every joint on its own columns
-    fused_residual    rows, X -> W_j'(Y_j - W_j X) and ||Y_j - W_j X||^2: one refinement
-    fused_rows        rows of [W_j Y_j] themselves, column by column, for a QR
 
-Signals are rows of samples, U[s*stride + t]; entry e of joint j is sign[e]*U[signal[e]]. All memory comes from the caller and nothing is kept
-between calls, so any number of threads may work, each on its own arrays. Functions return 0, 1 for arguments that cannot be, 2 where the
+Signals are rows of samples, U[s*stride + t]. All memory comes from the caller and nothing is kept between calls, so any number of threads may work, each on its own arrays. Functions return 0, 1 for arguments that cannot be, 2 where the
 signals of the robot refuse theirs. Compile with -ffp-contract=fast, never with -ffast-math; -DPORTABLE leaves out what is for
 one processor, -DSCALAR vector types too.
 */
@@ -18,16 +14,12 @@ one processor, -DSCALAR vector types too.
 #include <stdint.h>
 #include <string.h>
 
-#define ABI 3
+#define ABI 4
 #define STATE 8   /* real numbers of a state of the decimation filter, of order 8; also the most kept samples of a block */
-#define LANES 8   /* joints filtered together, samples summed together */
-#define SIDE 4    /* rows and columns of one tile of a Gram matrix */
+#define LANES 8   /* joints filtered together */
 #define MOST 10   /* second-order sections of a low-pass */
 #define CHUNK 256 /* samples that all sections of a low-pass treat in turn */
 #define FOLD 32   /* pairs of samples that the decimation adds up at once */
-#define SPAN 512  /* samples of one block of rows */
-#define WHOLE (SIDE*LANES) /* samples that sums take at once, at most */
-#define APART (SPAN + LANES)
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 
 /* What takes time is written once, for vectors of WIDTH numbers, and read in once for each width: see KERNELS. */
@@ -100,37 +92,11 @@ struct decimation {
     double *d, *x, *y;
 };
 
-/* Entries of the n joints: those of joint j are from[j] .. from[j + 1] - 1, c of them; its torque stands behind the last one.
-
-A: width^2 numbers a joint, width being c + 1 rounded up to SIDE. g: width numbers a joint, g[c] the square of the residual. O: scratch, rows of
-SPAN + LANES numbers, as many as the largest width. R: (c + 1, c + 1 + most) a joint, of which rows for a QR fill taken[j] <= most columns
-behind the first c + 1.
-*/
-struct entries {
-    int64_t n, most;
-    const int32_t *from, *signal;
-    const double *sign;
-    double *A, *g, *O, *R;
-    int64_t *taken;
-};
-
-/* m rows: sample t of signal s is U[(t/tile*count + s)*tile + t%tile], torques Y (n, ystride), mask (n, mstride) of rows used, NULL for all. */
-struct rows {
-    int64_t m, tile, count, ystride, mstride;
-    const double *U, *Y;
-    const uint8_t *mask;
-};
-
-enum task { NORMAL, RESIDUAL, ROWS };
-
 int32_t fused_states(const struct states *a);
 int32_t fused_gather(const struct states *a, int64_t t, int64_t m, double *q, double *qd, double *qdd, int64_t stride);
 int32_t fused_decimated(const struct states *states, const struct source *from, const struct decimation *a);
-int32_t fused_normal(const struct entries *a, const struct rows *r);
-int32_t fused_residual(const struct entries *a, const struct rows *r, const double *X);
-int32_t fused_rows(const struct entries *a, const struct rows *r);
 int32_t fused_abi(void);
-void fused_layout(int64_t layout[8]);
+void fused_layout(int64_t layout[4]);
 
 /* What takes time, for one width of vectors. */
 struct kernels {
@@ -142,8 +108,6 @@ struct kernels {
     void (*begin)(const struct decimation *a, const struct source *from);
     void (*finish)(const struct decimation *a, const struct source *from);
     void (*backward)(const struct decimation *a, int64_t S);
-    void (*gram)(const double *O, int64_t width, int64_t samples, double *A);
-    void (*gradient)(double *O, int64_t c, int64_t samples, const double *X, double *g);
 };
 
 /* States of all sections in the steady state of the sample x. */
@@ -311,97 +275,12 @@ int32_t fused_decimated(const struct states *states, const struct source *from, 
     return 0;
 }
 
-/* ------------------------------------------------------------------------------------------------------------------ least squares */
-
-/* The rows of joint j that are used, signs applied, torque last: `out` (width, stride); returns their number. */
-static int64_t used_rows(const struct entries *a, const struct rows *r, int64_t j, int64_t t, int64_t m, double *out, int64_t stride)
-{
-    const uint8_t *mask = r->mask ? r->mask + j*r->mstride + t : NULL;
-    const int64_t c = a->from[j + 1] - a->from[j];
-    int32_t used[SPAN];
-    int64_t count = 0;
-    for (int32_t i = 0; i < m; i++) {
-        used[count] = i;
-        count += mask ? mask[i] != 0 : 1;
-    }
-    for (int64_t k = 0; k <= c; k++, out += stride) {
-        const int32_t e = a->from[j] + (int32_t)k;
-        const double *u = k < c ? r->U + (t/r->tile*r->count + a->signal[e])*r->tile + t%r->tile : r->Y + j*r->ystride + t;
-        const double sign = k < c ? a->sign[e] : 1.0;
-        if (count == m)
-            for (int64_t i = 0; i < m; i++)
-                out[i] = sign*u[i];
-        else
-            for (int64_t i = 0; i < count; i++)
-                out[i] = sign*u[used[i]];
-    }
-    return count;
-}
-
-/* One task on m rows; X: parameters by entry. */
-static void work(enum task task, const struct entries *a, const struct rows *r, const double *X)
-{
-    double *A = a->A, *g = a->g, *R = a->R;
-    const struct kernels *const use = best();
-    for (int64_t j = 0; j < a->n; j++) {
-        const int64_t c = a->from[j + 1] - a->from[j], width = (c + 1 + SIDE - 1)/SIDE*SIDE;
-        for (int64_t t = 0; t < r->m; t += SPAN) {
-            const int64_t m = r->m - t < SPAN ? r->m - t : SPAN;
-            int64_t count = 0;
-            for (int64_t p = t, part; p < t + m; p += part) {
-                const int64_t left = r->tile - p%r->tile;
-                part = left < t + m - p ? left : t + m - p;
-                if (task == ROWS)
-                    a->taken[j] += used_rows(a, r, j, p, part, R + c + 1 + a->taken[j], c + 1 + a->most);
-                else
-                    count += used_rows(a, r, j, p, part, a->O + count, APART);
-            }
-            if (task == ROWS)
-                continue;
-            const int64_t full = (count + WHOLE - 1)/WHOLE*WHOLE;
-            for (int64_t k = 0; k <= c; k++)
-                memset(a->O + k*APART + count, 0, (size_t)(full - count)*sizeof *a->O);
-            for (int64_t k = c + 1; k < width; k++)
-                memset(a->O + k*APART, 0, (size_t)full*sizeof *a->O);
-            if (task == NORMAL)
-                use->gram(a->O, width, full, A);
-            else
-                use->gradient(a->O, c, full, X + a->from[j], g);
-        }
-        A += width*width;
-        g += width;
-        R += (c + 1)*(c + 1 + a->most);
-    }
-}
-
-/* Rows for a QR. */
-int32_t fused_rows(const struct entries *a, const struct rows *r)
-{
-    if (r->m > a->most)
-        return 1;
-    work(ROWS, a, r, NULL);
-    return 0;
-}
-
-int32_t fused_normal(const struct entries *a, const struct rows *r)
-{
-    work(NORMAL, a, r, NULL);
-    return 0;
-}
-
-int32_t fused_residual(const struct entries *a, const struct rows *r, const double *X)
-{
-    work(RESIDUAL, a, r, X);
-    return 0;
-}
-
 int32_t fused_abi(void) { return ABI; }
 
-/* LANES, SIDE, SPAN and the sizes of the structures: what a caller must agree on. */
-void fused_layout(int64_t layout[8])
+/* LANES and the sizes of the structures: what a caller must agree on. */
+void fused_layout(int64_t layout[4])
 {
-    const int64_t found[8] = {LANES, SIDE, SPAN, (int64_t)sizeof(struct states), (int64_t)sizeof(struct source),
-                              (int64_t)sizeof(struct decimation), (int64_t)sizeof(struct entries), (int64_t)sizeof(struct rows)};
+    const int64_t found[4] = {LANES, (int64_t)sizeof(struct states), (int64_t)sizeof(struct source), (int64_t)sizeof(struct decimation)};
     memcpy(layout, found, sizeof found);
 }
 
@@ -557,15 +436,6 @@ TARGET static void NAME(rows)(const double *x, int64_t m, int64_t used, double *
     for (; t < m; t++, x += LANES)
         for (int64_t l = 0; l < used; l++)
             to[l*stride + t] = x[l];
-}
-
-TARGET INLINE double NAME(total)(const NAME(V) *sum)
-{
-    double part[WIDTH], all = 0.0;
-    memcpy(part, sum, sizeof part);
-    for (int l = 0; l < WIDTH; l++)
-        all += part[l];
-    return all;
 }
 
 /* sum += M'u: M (length, outs). */
@@ -726,55 +596,7 @@ TARGET static void NAME(backward)(const struct decimation *a, int64_t S)
         }
 }
 
-/* A += O O' in tiles of SIDE, those below the diagonal for both sides; samples in whole vectors. */
-TARGET static void NAME(gram)(const double *O, int64_t width, int64_t samples, double *A)
-{
-    for (int64_t i = 0; i < width; i += SIDE)
-        for (int64_t k = 0; k <= i; k += SIDE) {
-            NAME(V) sum[SIDE*SIDE];
-            memset(sum, 0, sizeof sum);
-            for (int64_t t = 0; t < samples; t += WIDTH)
-                for (int p = 0; p < SIDE; p++) {
-                    const NAME(V) o = FROM(O + (i + p)*APART + t);
-                    for (int r = 0; r < SIDE; r++)
-                        sum[SIDE*p + r] += o*FROM(O + (k + r)*APART + t);
-                }
-            for (int p = 0; p < SIDE*SIDE; p++) {
-                const int64_t row = i + p/SIDE, column = k + p%SIDE;
-                const double all = NAME(total)(sum + p);
-                A[row*width + column] += all;
-                if (k < i)
-                    A[column*width + row] += all;
-            }
-        }
-}
-
-/* g += O (y - O'X); what is in brackets takes the place of y, the last of c + 1 rows of O, so that g[c] gets its square. */
-TARGET static void NAME(gradient)(double *O, int64_t c, int64_t samples, const double *X, double *g)
-{
-    double *y = O + c*APART;
-    for (int64_t t = 0; t < samples; t += SIDE*WIDTH) {
-        NAME(V) rest[SIDE];
-        memcpy(rest, y + t, sizeof rest);
-        for (int64_t k = 0; k < c; k++)
-            for (int v = 0; v < SIDE; v++)
-                rest[v] -= X[k]*FROM(O + k*APART + t + v*WIDTH);
-        memcpy(y + t, rest, sizeof rest);
-    }
-    for (int64_t k = 0; k <= c; k += SIDE) {
-        NAME(V) sum[SIDE];
-        memset(sum, 0, sizeof sum);
-        for (int64_t t = 0; t < samples; t += WIDTH) {
-            const NAME(V) rest = FROM(y + t);
-            for (int r = 0; r < SIDE; r++)
-                sum[r] += FROM(O + (k + r)*APART + t)*rest;
-        }
-        for (int r = 0; r < SIDE; r++)
-            g[k + r] += NAME(total)(sum + r);
-    }
-}
-
-static const struct kernels NAME(kernels) = {NAME(moved), NAME(zero_phase), NAME(rows), NAME(keep), NAME(block), NAME(begin), NAME(finish), NAME(backward), NAME(gram), NAME(gradient)};
+static const struct kernels NAME(kernels) = {NAME(moved), NAME(zero_phase), NAME(rows), NAME(keep), NAME(block), NAME(begin), NAME(finish), NAME(backward)};
 
 #undef AT
 #undef LOW

@@ -4,11 +4,9 @@ least squares around the signals of a robot in C.
     FilteredStates(positions, rate, signals, room)
             as runtime.signals.filters.filtered_states, of Positions(q, window, room)
     SignalEntries(model, names)
-            which signals stand where in the wanted columns
+            which signals stand where in the wanted columns, and the rows of [W Y] that they make
     decimated(entries, states, samples, ...)
             kept samples of the wanted signals; the signals are not stored
-
-Least squares on these rows: `runtime.resolution.c.least_squares`.
 
 The same matrices and the same order of operations as the NumPy path where that costs nothing:
 filtered states agree with scipy's in every bit on
@@ -21,6 +19,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ import numpy as np
 from scipy.signal import sosfilt_zi
 
 from runtime.errors import InputError
+from runtime.estimators.normal_equations import JointRows
 from runtime.model.compile_cache import FLAGS, NotCompiledError, shared_object
 from runtime.model.compiled import CompiledSignals
 from runtime.model.loading import cache_folder
@@ -47,8 +47,8 @@ SOURCE = Path(__file__).with_name("kernels.c")
 FUSED_FLAGS = tuple(
     {"-O2": "-O3", "-ffp-contract=off": "-ffp-contract=fast"}.get(flag, flag) for flag in FLAGS
 )
-ABI = 3
-LANES, SIDE, SPAN = 8, 4, 512  # of kernels.c; LANES is 1 without vector types
+ABI = 4
+LANES = 8  # of kernels.c; 1 without vector types
 # most samples of signals evaluated together, except where one block is longer: these stay in cache
 TOGETHER = 640
 REFUSALS = {
@@ -102,26 +102,7 @@ class DecimationStructure(ctypes.Structure):
     ]
 
 
-class EntriesStructure(ctypes.Structure):
-    """struct entries."""
-
-    _fields_ = _fields("n most", "start signal sign A g O R taken")
-    most: int
-
-
-class RowsStructure(ctypes.Structure):
-    """struct rows."""
-
-    _fields_ = _fields("m tile count ystride mstride", "U Y mask")
-
-
-STRUCTURES = (
-    StatesStructure,
-    SourceStructure,
-    DecimationStructure,
-    EntriesStructure,
-    RowsStructure,
-)
+STRUCTURES = (StatesStructure, SourceStructure, DecimationStructure)
 
 
 @lru_cache(maxsize=4)
@@ -135,17 +116,17 @@ def library(folder: Path | None = None) -> ctypes.CDLL:
 def _opened(path: Path) -> ctypes.CDLL:
     """The object, if it has this interface."""
     opened = ctypes.CDLL(str(path))
-    layout = (ctypes.c_int64 * 8)()
+    layout = (ctypes.c_int64 * 4)()
     try:
         opened.fused_abi.restype = ctypes.c_int32
         abi = opened.fused_abi()
         opened.fused_layout.restype = None
         opened.fused_layout(layout)
-        for name in ("states", "gather", "decimated", "normal", "residual", "rows"):
+        for name in ("states", "gather", "decimated"):
             getattr(opened, f"fused_{name}").restype = ctypes.c_int32
     except AttributeError as e:
         raise NotCompiledError(f"{SOURCE.name} is not the one of this version: {e}") from e
-    expected = [SIDE, SPAN, *map(ctypes.sizeof, STRUCTURES)]
+    expected = [*map(ctypes.sizeof, STRUCTURES)]
     if abi != ABI or layout[0] not in (1, LANES) or list(layout[1:]) != expected:
         raise NotCompiledError(
             f"{SOURCE.name} has interface {abi} and sizes {list(layout)}, expected {ABI} and "
@@ -332,6 +313,21 @@ class SignalEntries:
         self.table = (
             table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
         )
+
+    def rows(self, parts: Sequence[tuple[Array, Array, Array]]) -> JointRows:
+        """Rows of [W_j Y_j] of decimated signals.
+
+        parts : of each record the signals y, shape (S, K), as `decimated` gives them; torques Y,
+        shape (n, K), N m (N); mask, bool, shape (n, K), of the rows used.
+        """
+        joints = []
+        for j, (a, b) in enumerate(pairwise(self.start)):
+            blocks = [
+                np.vstack([self.sign[a:b, None] * y[self.number[a:b]], Y[j]])[:, mask[j]]
+                for y, Y, mask in parts
+            ]
+            joints.append(blocks[0] if len(blocks) == 1 else np.hstack(blocks))
+        return JointRows(self.names, self.columns, tuple(joints))
 
 
 def decimated(

@@ -1,9 +1,9 @@
-"""The workspace of a compiled model: filters, signals, decimation and least squares of
+"""The workspace of a compiled model: filters, signals and decimation of
 `runtime.resolution.c.kernels` in place of NumPy's.
 
 The same draws as with NumPy and the same estimates to rounding; the same bits for the same seed on
 one kind of machine, whoever works. Only
-perturbed positions go in and small matrices come out; room is reused from run to run.
+perturbed positions go in and decimated signals come out; room is reused from run to run.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.normal_equations import LeastSquares
+from runtime.estimators.normal_equations import LeastSquares, least_squares
 from runtime.model.compile_cache import FallbackWarning
 from runtime.model.compiled import CompiledSignals, compiled_model
 from runtime.model.generated import GeneratedModel
 from runtime.resolution.c import kernels
-from runtime.resolution.c.least_squares import KeptRows, least_squares
 from runtime.resolution.c.self_test import unavailable
 from runtime.resolution.perturbed import (
     PreparedRecord,
@@ -66,7 +65,6 @@ class CompiledWorkspace:
             kernels.SignalEntries(model, task.names),
         )
         self.constants = model.constant_values(task.constants)
-        self.room = kernels.Room()
         self.records = [
             (record, self._positions(record, record.q, kernels.Room()), kernels.Room())
             for record in task.records
@@ -82,7 +80,7 @@ class CompiledWorkspace:
             position, torque = stream_keys(draw, k)
             y = self._signals(record, self._states(record, measured, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
-        return least_squares(KeptRows(self.entries, rows, self.room))
+        return least_squares(self.entries.rows(rows))
 
     def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
         """The same with the positions of every record moved by `errors`, shape (N, n) each, torques
@@ -93,7 +91,7 @@ class CompiledWorkspace:
             moved = self._positions(record, record.q + error, room)
             states = kernels.FilteredStates(moved, record.rate, record.selection.signals, room)
             rows.append((self._signals(record, states, room), record.torque, record.selection.mask))
-        return least_squares(KeptRows(self.entries, rows, self.room))
+        return least_squares(self.entries.rows(rows))
 
     def _positions(self, record: PreparedRecord, q: Array, room: kernels.Room) -> kernels.Positions:
         """Positions q, shape (N, n), as C reads them."""
