@@ -54,7 +54,6 @@ STATUS = {
     "AlmostDualInfeasible": "unbounded_inaccurate",
 }
 SOLVED = ("optimal", "optimal_inaccurate")
-# largest unknown, in units of its size: the problem of `margin` has a solution whatever K leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,133 +167,129 @@ class Optimum:
 
 
 class Program:
-    """A cone program in w of chi = origin + basis w and `more` further unknowns, built constraint
-    by constraint.
+    """A cone program in w of chi = origin + basis w, and in what the criterion adds: P >= least 1
+    of every condition, or P >= t 1 of an unknown t, and the rows; then constraint by constraint.
+
+    Parameters
+    ----------
+    space : Space
+    rows : LinearBounds
+    conditions : sequence of Condition
+    least : float or None, SI
+        Smallest eigenvalue of every condition; None: the unknown t, after w.
     """
 
-    def __init__(self, space: Space, more: int) -> None:
-        self.space, self.m = space, space.basis.shape[1]
-        self.quadratic, self.linear = (
-            np.zeros((self.m + more, self.m + more)),
-            np.zeros(self.m + more),
-        )
+    def __init__(
+        self,
+        space: Space,
+        rows: LinearBounds,
+        conditions: Sequence[Condition],
+        least: float | None,
+    ) -> None:
+        self.space, rows = within(space, rows)
+        self.conditions, self.with_margin = conditions, least is None
+        self.m = self.space.basis.shape[1]
+        self.squares = np.zeros((self.m, self.m))  # of w, in the criterion
+        self.linear, self.diagonal = np.zeros((2, self.m + self.with_margin))
         self.constraints: list[tuple[Any, Array, Array]] = []  # cone, A, b: b + A x in the cone
-        self.multipliers: dict[str, slice] = {}  # of each condition
-
-    def unknowns(self, count: int) -> Array:
-        """The matrix with which zeros stand for x in `count` rows."""
-        return np.zeros((count, len(self.linear)))
-
-    def of_chi(self, M: Array) -> tuple[Array, Array]:
-        """M chi as A x + b, M of shape (k, p): A and b."""
-        A = self.unknowns(len(M))
-        A[:, : self.m] = M @ self.space.basis
-        return A, M @ self.space.origin
-
-    def conditions_hold(self, conditions: Sequence[Condition], least: float) -> None:
-        """P >= least 1 of every condition; of least 0: P >= t 1, t the last unknown, in a problem
-        of `margin`.
-        """
-        start = sum(len(b) for _, _, b in self.constraints)
-        triangles, ones = _triangles(tuple(conditions), len(self.space.origin))
+        triangles, ones = _triangles(tuple(conditions), len(space.origin))
         A, b = self.of_chi(triangles)
-        if not least:
-            A[:, -1] = -ones
-        b, end = b - least * ones, 0
-        for c in conditions:
-            n = c.B.shape[1]
-            own = slice(end, end := end + n * (n + 1) // 2)
-            self.constraints.append(
-                (
-                    clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1),
-                    A[own],
-                    b[own],
-                )
-            )
-            self.multipliers[c.name] = slice(start + own.start, start + own.stop)
-
-    def rows_hold(self, rows: LinearBounds) -> None:
-        """lower <= A chi <= upper."""
+        if least is None:
+            A[:, self.m] = -ones
+        else:
+            b = b - least * ones
+        sizes = [c.B.shape[1] for c in conditions]
+        ends = np.cumsum([n * (n + 1) // 2 for n in sizes])[:-1]
+        for n, of_A, of_b in zip(sizes, np.split(A, ends), np.split(b, ends), strict=False):
+            cone = clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1)
+            self.constraints.append((cone, of_A, of_b))
         A, b = self.of_chi(rows.A)
         for sign, bound in ((1.0, rows.lower), (-1.0, rows.upper)):
             given = np.isfinite(bound)
             self.at_least_zero(sign * A[given], sign * (b - bound)[given])
 
-    def within_ball(self, M: Array, z: Array, radius: float) -> None:
-        """||M chi - z|| <= radius."""
-        A, b = self.of_chi(M)
-        self.constraints.append(
-            (
-                clarabel.SecondOrderConeT(1 + len(z)),
-                np.vstack([self.unknowns(1), A]),
-                np.concatenate([[radius], b - z]),
-            )
+    def more(self, count: int) -> Array:
+        """Numbers of `count` further unknowns."""
+        first = len(self.linear)
+        self.linear, self.diagonal = (
+            np.append(x, np.zeros(count)) for x in (self.linear, self.diagonal)
         )
+        return np.arange(first, first + count)
+
+    def of_chi(self, M: Array) -> tuple[Array, Array]:
+        """M chi as A x + b, M of shape (k, p): A and b."""
+        A = np.zeros((len(M), len(self.linear)))
+        A[:, : self.m] = M @ self.space.basis
+        return A, M @ self.space.origin
 
     def at_least_zero(self, A: Array, b: Array) -> None:
         """A x + b >= 0, row by row."""
         if len(b):
             self.constraints.append((clarabel.NonnegativeConeT(len(b)), A, b))
 
-    def add_squares(self, first: int, M: Array, z: Array, weight: float) -> None:
-        """weight ||M chi - z||^2 in the criterion; the residual are unknowns from number `first`
-        on.
-        """
+    def add_squares(self, M: Array, z: Array, weight: float) -> None:
+        """weight ||M chi - z||^2 in the criterion; the residual are further unknowns."""
+        own = self.more(len(z))
         A, b = self.of_chi(M)
-        own = np.arange(first, first + len(z))
         A[np.arange(len(z)), own] = -1.0
-        self.quadratic[own, own] = 2 * weight
+        self.diagonal[own] = 2 * weight
         self.constraints.append((clarabel.ZeroConeT(len(z)), A, b - z))
 
-    def add_squared(self, M: Array, z: Array, weight: float) -> None:
-        """weight ||M chi - z||^2 in the criterion, M'M well conditioned."""
-        A, b = self.of_chi(M)
-        self.quadratic += 2 * weight * A.T @ A
-        self.linear += 2 * weight * A.T @ (b - z)
-
-    def add_entropy(self, first: int, B: Array, numbers: Sequence[int], weight: float) -> None:
+    def add_entropy(self, B: Array, numbers: Sequence[int], weight: float) -> None:
         """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n);
-        Z and log Z_ii are unknowns from `first` on.
+        Z and log Z_ii are further unknowns.
         """
         n, p = B.shape[1], len(self.space.origin)
         i, j = np.tril_indices(n)
+        entries, logarithms = self.more(len(i)), self.more(n)
         A, b = self.of_chi(on_standard(triangle(np.pad(B, ((0, 0), (0, n), (0, n)))), numbers, p))
         Z = np.zeros((len(i), 2 * n, 2 * n))
         Z[np.arange(len(i)), i, n + j] = Z[np.arange(len(i)), n + j, i] = 1.0
         Z[i == j, n + i[i == j], n + i[i == j]] = 1.0
-        A[:, first : first + len(i)] = triangle(Z)
+        A[:, entries] = triangle(Z)
         self.constraints.append((clarabel.PSDTriangleConeT(2 * n), A, b))
-        for k, place in enumerate(np.flatnonzero(i == j)):
-            logarithm, E = first + len(i) + k, self.unknowns(3)
-            E[0, logarithm] = E[2, first + place] = 1.0
+        for entry, logarithm in zip(entries[i == j], logarithms, strict=True):
+            E = np.zeros((3, len(self.linear)))
+            E[0, logarithm] = E[2, entry] = 1.0
             self.constraints.append((clarabel.ExponentialConeT(), E, np.array([0.0, 1.0, 0.0])))
-            self.linear[logarithm] = -weight
+        self.linear[logarithms] = -weight
         self.linear[: self.m] += (
             weight * np.trace(B, axis1=1, axis2=2) @ self.space.basis[list(numbers)]
         )
 
-    def solve(self) -> tuple[str, Array, dict[str, float]]:
-        """Status, x, and the trace of the multiplier of each condition."""
+    def solve(self) -> Optimum:
+        """The optimum, by the tightest of TOLERANCES that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
-        Q, given = sparse.csc_matrix(np.triu(self.quadratic)), sparse.csc_matrix(-np.vstack(A))
-        status = ""
+        count, status = len(self.linear), ""
+        Q = np.diag(self.diagonal)
+        Q[: self.m, : self.m] += self.squares
+        whole = np.vstack([np.pad(part, ((0, 0), (0, count - part.shape[1]))) for part in A])
         for gap, feasible in TOLERANCES:
             settings = clarabel.DefaultSettings()
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
             solution = clarabel.DefaultSolver(
-                Q, self.linear, given, np.concatenate(b), list(cones), settings
+                sparse.csc_matrix(np.triu(Q)),
+                self.linear,
+                sparse.csc_matrix(-whole),
+                np.concatenate(b),
+                list(cones),
+                settings,
             ).solve()
             status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
             if status in SOLVED:
-                z = np.array(solution.z)
-                return (
-                    status,
-                    np.array(solution.x),
-                    {name: trace(z[rows]) for name, rows in self.multipliers.items()},
+                x, z = np.array(solution.x), np.array(solution.z)
+                multipliers = np.split(z, np.cumsum([len(part) for part in b]))
+                duals = {
+                    c.name: trace(of_c)
+                    for c, of_c in zip(self.conditions, multipliers, strict=False)
+                }
+                chi = self.space.origin + self.space.basis @ x[: self.m]
+                return Optimum(
+                    status, chi, float(x[self.m]) if self.with_margin else np.nan, duals
                 )
-        return status, np.full(len(self.linear), np.nan), {}
+        return Optimum(status, np.full(len(self.space.origin), np.nan), np.nan, {})
 
 
 def closest(
@@ -312,39 +307,25 @@ def closest(
 
     least : smallest eigenvalue of every condition, SI, not zero.
     """
-    space, rows = within(space, rows)
-    squares, entropies = [(R, z, 1.0)], []
-    if pull is not None and pull.kind != "euclidean":
+    program = Program(space, rows, conditions, least)
+    program.add_squares(R, z, 1.0)
+    if pull is not None and pull.kind == "euclidean":  # M'M well conditioned: no residuals
+        numbers, p = list(pull.numbers), len(pull.chi0)
+        A, b = program.of_chi(np.eye(p)[numbers] / pull.scale[numbers, None])
+        of_w, rest = A[:, : program.m], b - (pull.chi0 / pull.scale)[numbers]
+        program.squares += 2 * pull.weight * of_w.T @ of_w
+        program.linear[: program.m] += 2 * pull.weight * of_w.T @ rest
+    elif pull is not None:
         for c in (c for c in conditions if c.name.startswith("link ")):
             L = np.linalg.inv(np.linalg.cholesky(c.matrix(pull.chi0)))
             B = L @ c.B @ L.T  # the identity at chi0
             B = (B + B.swapaxes(1, 2)) / 2
             if pull.kind == "entropic":
-                entropies.append((B, c.numbers))
+                program.add_entropy(B, c.numbers, pull.weight)
             else:
                 M = on_standard(triangle(B), c.numbers, len(pull.chi0))
-                squares.append((M, triangle(np.eye(4)[None])[:, 0], pull.weight / 2))
-    residuals = sum(len(value) for _, value, _ in squares)
-    program = Program(space, residuals + sum(14 for _ in entropies))
-    program.conditions_hold(conditions, least)
-    program.rows_hold(rows)
-    if pull is not None and pull.kind == "euclidean":
-        numbers = list(pull.numbers)
-        program.add_squared(
-            np.eye(len(pull.chi0))[numbers] / pull.scale[numbers, None],
-            (pull.chi0 / pull.scale)[numbers],
-            pull.weight,
-        )
-    first = program.m
-    for M, value, weight in squares:
-        program.add_squares(first, M, value, weight)
-        first += len(value)
-    for B, numbers_of_link in entropies:
-        assert pull is not None
-        program.add_entropy(first, B, numbers_of_link, pull.weight)
-        first += 14  # Z of a pseudo-inertia, (4, 4), and four logarithms
-    status, x, duals = program.solve()
-    return Optimum(status, space.origin + space.basis @ x[: program.m], float("nan"), duals)
+                program.add_squares(M, triangle(np.eye(4)[None])[:, 0], pull.weight / 2)
+    return program.solve()
 
 
 def extreme(
@@ -361,34 +342,28 @@ def extreme(
     """The chi of `space` with the smallest direction'chi, direction of shape (p,), among those with
     ||R chi - z|| <= radius; scaled as for `closest`.
     """
-    space, rows = within(space, rows)
-    program = Program(space, 0)
-    program.linear[:] = direction @ space.basis
-    program.conditions_hold(conditions, least)
-    program.rows_hold(rows)
-    program.within_ball(R, z, radius)
+    program = Program(space, rows, conditions, least)
+    program.linear += direction @ program.space.basis
+    A, b = program.of_chi(R)
+    ball = np.vstack([np.zeros(program.m), A]), np.concatenate([[radius], b - z])
+    program.constraints.append((clarabel.SecondOrderConeT(1 + len(z)), *ball))
     bounds = np.full(program.m, LIMIT.LARGEST_UNKNOWN)
     program.at_least_zero(-np.eye(program.m), bounds)
     program.at_least_zero(np.eye(program.m), bounds)
-    status, x, duals = program.solve()
-    return Optimum(status, space.origin + space.basis @ x, float("nan"), duals)
+    return program.solve()
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
     """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical
     robot is in `space`.
     """
-    space, rows = within(space, rows)
-    program = Program(space, 1)
+    program = Program(space, rows, conditions, None)
     program.linear[-1] = -1.0
-    program.conditions_hold(conditions, 0.0)
-    program.rows_hold(rows)
     bounds = np.full(program.m + 1, LIMIT.LARGEST_UNKNOWN)
     bounds[-1] = LIMIT.LARGEST_MARGIN
     program.at_least_zero(-np.eye(program.m + 1), bounds)
     program.at_least_zero(np.eye(program.m + 1)[:-1], bounds[:-1])
-    status, x, duals = program.solve()
-    return Optimum(status, space.origin + space.basis @ x[:-1], float(x[-1]), duals)
+    return program.solve()
 
 
 def triangle(B: Array) -> Array:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -274,62 +274,47 @@ def round_function(
     return ca.Function(f"round_{whole}", inputs, results)
 
 
-def plant_inputs(model: SymbolicModel, friction: DryFriction) -> list[MX]:
-    """q, qd, tau, Xs, plus, minus, h."""
-    n, m = friction.G.shape[1], len(friction.G)
-    names = {
-        "q": n,
-        "qd": n,
-        "tau": n,
-        "X": len(model.BASE_PARAMETERS),
-        "plus": m,
-        "minus": m,
-        "h": 1,
-    }
-    return [ca.MX.sym(name, rows) for name, rows in names.items()]
+def plant_inputs(model: SymbolicModel, friction: DryFriction | None = None) -> list[MX]:
+    """q, qd, tau, Xs, plus, minus, h; without dry friction, plus and minus are empty."""
+    n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
+    names = ("q", "qd", "tau", "X", "plus", "minus", "h")
+    sizes = (n, n, n, len(model.BASE_PARAMETERS), m, m, 1)
+    return [ca.MX.sym(name, rows) for name, rows in zip(names, sizes, strict=True)]
 
 
-def _flow_inputs(model: SymbolicModel) -> tuple[list[MX], Any]:
-    n = len(model.JOINTS)
-    inputs = [
-        ca.MX.sym(name, rows)
-        for name, rows in (
-            ("q", n),
-            ("qd", n),
-            ("tau", n),
-            ("X", len(model.BASE_PARAMETERS)),
-            ("h", 1),
-        )
-    ]
-    return inputs, n
+def runge_kutta(
+    rates: Callable[..., Sequence[MX]], state: Sequence[MX], h: MX
+) -> tuple[list[MX], Sequence[MX]]:
+    """The state after h by Runge-Kutta of order 4, and its derivative at the start; rates(*state)
+    gives the derivative.
+    """
+
+    def moved(share: MX, slope: Sequence[MX]) -> list[MX]:
+        return [x + share * k for x, k in zip(state, slope, strict=True)]
+
+    k1 = rates(*state)
+    k2 = rates(*moved(h / 2, k1))
+    k3 = rates(*moved(h / 2, k2))
+    k4 = rates(*moved(h, k3))
+    slopes = zip(k1, k2, k3, k4, strict=True)
+    return moved(h / 6, [a + 2 * b + 2 * c + d for a, b, c, d in slopes]), k1
 
 
 def _runge_kutta(model: SymbolicModel, constants: dict[str, float]) -> Any:
     """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start; order 4."""
-    inputs, _ = _flow_inputs(model)
-    q, qd, tau, X, h = inputs
+    q, qd, tau, X, _, _, h = plant_inputs(model)
 
-    def qdd(q: MX, qd: MX) -> MX:
-        return model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+    def rates(q: MX, qd: MX) -> tuple[MX, MX]:
+        return qd, model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
 
-    a1 = qdd(q, qd)
-    v2 = qd + h / 2 * a1
-    a2 = qdd(q + h / 2 * qd, v2)
-    v3 = qd + h / 2 * a2
-    a3 = qdd(q + h / 2 * v2, v3)
-    v4 = qd + h * a3
-    a4 = qdd(q + h * v3, v4)
-    return ca.Function(
-        "runge_kutta",
-        inputs,
-        [q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4), qd + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), a1],
-    )
+    end, start = runge_kutta(rates, [q, qd], h)
+    return ca.Function("runge_kutta", [q, qd, tau, X, h], [*end, start[1]])
 
 
 def _cvodes(model: SymbolicModel, constants: dict[str, float]) -> Any:
     """The same by CVODES, variable order and step."""
-    inputs, n = _flow_inputs(model)
-    q, qd, tau, X, h = inputs
+    q, qd, tau, X, _, _, h = plant_inputs(model)
+    n = len(model.JOINTS)
     x = ca.MX.sym("x", 2 * n)
     a = model.forward_dynamics(q=x[:n], qd=x[n:], tau=tau, X=X, **constants)["qdd"]
     problem = {"x": x, "p": ca.vertcat(tau, X, h), "ode": h * ca.vertcat(x[n:], a)}
@@ -337,7 +322,7 @@ def _cvodes(model: SymbolicModel, constants: dict[str, float]) -> Any:
         x0=ca.vertcat(q, qd), p=ca.vertcat(tau, X, h)
     )["xf"]
     start = model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
-    return ca.Function("flow", inputs, [end[:n], end[n:], start])
+    return ca.Function("flow", [q, qd, tau, X, h], [end[:n], end[n:], start])
 
 
 def compiled(function: Any, cache: Path | None = None) -> Any:

@@ -29,6 +29,7 @@ from runtime.loop.controller_tick import (
     keeps_sliding,
     plant_inputs,
     round_function,
+    runge_kutta,
     sliding_friction,
 )
 from runtime.loop.dry_friction import DryFriction
@@ -203,25 +204,16 @@ def _runge_kutta_tangent(
 ) -> Any:
     """(q, qd, tau, Xs, h, dq, dqd, dtau) -> dq, dqd after h; tau without dry friction."""
     n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
-    q, qd, tau, X, h = (
-        ca.MX.sym(name, k) for name, k in (("q", n), ("qd", n), ("tau", n), ("X", b), ("h", 1))
-    )
+    q, qd, tau, X, _, _, h = plant_inputs(model)
     dq, dqd, dtau = (ca.MX.sym(name, n, b) for name in ("dq", "dqd", "dtau"))
     linear = _linear_function(model, friction, constants)
 
-    def rates(q: MX, qd: MX, dq: MX, dqd: MX) -> tuple[MX, MX]:
+    def rates(q: MX, qd: MX, dq: MX, dqd: MX) -> tuple[MX, ...]:
         qdd, inverse, K, C, D = linear(q, qd, tau, X)
-        return qdd, inverse @ (dtau - K @ dq - C @ dqd - D)
+        return qd, qdd, dqd, inverse @ (dtau - K @ dq - C @ dqd - D)
 
-    a1, d1 = rates(q, qd, dq, dqd)
-    v2, w2 = qd + h / 2 * a1, dqd + h / 2 * d1
-    a2, d2 = rates(q + h / 2 * qd, v2, dq + h / 2 * dqd, w2)
-    v3, w3 = qd + h / 2 * a2, dqd + h / 2 * d2
-    a3, d3 = rates(q + h / 2 * v2, v3, dq + h / 2 * w2, w3)
-    v4, w4 = qd + h * a3, dqd + h * d3
-    _, d4 = rates(q + h * v3, v4, dq + h * w3, w4)
-    results = [dq + h / 6 * (dqd + 2 * w2 + 2 * w3 + w4), dqd + h / 6 * (d1 + 2 * d2 + 2 * d3 + d4)]
-    return ca.Function("runge_kutta_tangent", [q, qd, tau, X, h, dq, dqd, dtau], results)
+    end, _ = runge_kutta(rates, [q, qd, dq, dqd], h)
+    return ca.Function("runge_kutta_tangent", [q, qd, tau, X, h, dq, dqd, dtau], end[2:])
 
 
 def _linear_function(
