@@ -286,9 +286,7 @@ class Program:
                     for c, of_c in zip(self.conditions, multipliers, strict=False)
                 }
                 chi = self.space.origin + self.space.basis @ x[: self.m]
-                return Optimum(
-                    status, chi, float(x[self.m]) if self.with_margin else np.nan, duals
-                )
+                return Optimum(status, chi, float(x[self.m]) if self.with_margin else np.nan, duals)
         return Optimum(status, np.full(len(self.space.origin), np.nan), np.nan, {})
 
 

@@ -29,8 +29,8 @@ from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.linear import percent, standard_deviations
 from runtime.estimators.method import Beginning, Fitted
 from runtime.loop import iv
-from runtime.loop.closed_loop import ClosedLoop, loop_of
-from runtime.loop.fixed_point import FixedPointOptions, LoopOptions, full, initial
+from runtime.loop.closed_loop import ClosedLoop, LoopOptions, loop_of
+from runtime.loop.fixed_point import FixedPointOptions, full, initial
 from runtime.progress import at
 from runtime.rows.factor import Array
 from runtime.rows.observation import Observation, split_rows

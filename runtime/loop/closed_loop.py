@@ -5,9 +5,11 @@ CLOE compare the record with.
     observation = loop.measured()             Y = W X + rho, to which the loop stays attached
     runs = loop.run(X, g)                     one simulation per record, exact states, no noise, no
                                               steps
-    loop.instruments(runs, observation)       Z = F_p[W(q_s, ...)], q_s through the filters of the
+    loop.simulated(runs, observation, exact=False)
+                                              Z = F_p[W(q_s, ...)], q_s through the filters of the
                                               record                   IDIM-IV
-    loop.motion(runs, observation)            Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the
+    loop.simulated(runs, observation, exact=True)
+                                              Z = F_p[W(q_s, qd_s, qdd_s)], exact states through the
                                               decimation alone       DIDIM
 
 g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands
@@ -29,7 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
@@ -46,6 +48,7 @@ from runtime.rows.observation import LoopRows, Observation, stack
 from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states, prepared
 from runtime.rows.selection import Selection, certain_rows, select_rows
 from runtime.settings.controller import Controller
+from runtime.settings.schema import NotNegative, Settings, structure
 from runtime.settings.study import Study
 from runtime.signals.counts.reading import REACH
 from runtime.signals.filters import States, decimated, filtered_states
@@ -61,6 +64,22 @@ ASSUMED = (
     "and a simulated motion is compared with itself: bias is removed only as far as the noise does "
     "not pass the loop."
 )
+
+
+class LoopOptions(Settings):
+    """estimate.options of every method that simulates the closed loop.
+
+    Attributes
+    ----------
+    reference : str
+        known (that of the settings, or the columns qr1 ... of each record), or measured where the
+        reference has to be inferred.
+    around : float, s
+        Rows so near to slow ones (`rows.low_speed`) are left out with them.
+    """
+
+    reference: Literal["known", "measured"] = "known"
+    around: NotNegative = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +121,13 @@ class LoopPart:
             "disturbance": self.disturbance,
             "feedforward": self.feedforward,
         }
+
+    def decimated(self, x: Array) -> Array:
+        """Signals of the record, shape (N, n, ...), decimated like Y: (n, ..., K)."""
+        window = np.moveaxis(x[: len(self.record)][self.selection.samples], 0, -1)
+        return decimated(
+            np.ascontiguousarray(window), self.selection.factor, self.selection.signals.decimate
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,31 +181,23 @@ class ClosedLoop:
         ]
         return observation.where(np.concatenate(used))
 
-    def instruments(self, runs: Sequence[Simulation], observation: Observation) -> Observation:
-        """The rows and columns of `observation` with Z of the simulated positions, through the
-        filters of the record, in place of W.
+    def simulated(
+        self, runs: Sequence[Simulation], observation: Observation, *, exact: bool
+    ) -> Observation:
+        """The rows and columns of `observation` with Z of the simulated motion in place of W: of
+        its positions through the filters of the record, or of its exact states.
         """
-        pairs = zip(runs, self.parts, strict=True)
-        return self._like(
-            observation,
-            [
-                filtered_states(run.q[: len(p.record)], p.record.rate, p.selection.signals)
-                for run, p in pairs
-            ],
-        )
-
-    def motion(self, runs: Sequence[Simulation], observation: Observation) -> Observation:
-        """The rows and columns of `observation` with Z of the exact simulated states in
-        place of W.
-        """
-        sizes = [len(part.record) for part in self.parts]
-        return self._like(
-            observation,
-            [
-                States(run.q[:N], run.qd[:N], run.qdd[:N])
-                for run, N in zip(runs, sizes, strict=True)
-            ],
-        )
+        assert observation.closed_loop is not None
+        states = [
+            States(run.q, run.qd, run.qdd)[: len(part.record)]
+            if exact
+            else filtered_states(
+                run.q[: len(part.record)], part.record.rate, part.selection.signals
+            )
+            for run, part in zip(runs, self.parts, strict=True)
+        ]
+        Z = self._observed(states).columns(observation.names).W
+        return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def sensitivity(self, X: Array) -> list[tuple[Simulation, Any]]:
         """One simulation per record, with its derivatives by X."""
@@ -191,20 +209,13 @@ class ClosedLoop:
         """
         assert observation.closed_loop is not None
         by_joint: list[Array] = []
-        kept = [self._decimated(x, part) for x, part in zip(signals, self.parts, strict=True)]
+        kept = [part.decimated(x) for x, part in zip(signals, self.parts, strict=True)]
         for j in range(len(self.model.JOINTS)):
             by_joint += [
                 x[j][..., part.selection.mask[j]].T
                 for x, part in zip(kept, self.parts, strict=True)
             ]
         return np.asarray(np.concatenate(by_joint)[observation.closed_loop.rows])
-
-    def _decimated(self, x: Array, part: LoopPart) -> Array:
-        """(N, n, ...) to (n, ..., K)."""
-        chosen = np.moveaxis(x[: len(part.record)][part.selection.samples], 0, -1)
-        return decimated(
-            np.ascontiguousarray(chosen), part.selection.factor, part.selection.signals.decimate
-        )
 
     def inertia(self, X: Array) -> Array:
         """J_j, shape (n,): mean of A_jj over the references."""
@@ -213,11 +224,6 @@ class ClosedLoop:
             [part.reference.q[:: max(1, len(part.reference) // 500)] for part in self.parts]
         )
         return np.asarray(np.einsum("tjj->j", functions.inertia_matrix(q, X)) / len(q))
-
-    def _like(self, observation: Observation, states: Sequence[States]) -> Observation:
-        assert observation.closed_loop is not None
-        Z = self._observed(states).columns(observation.names).W
-        return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
     def _observed(self, states: Sequence[States]) -> Observation:
         observation = [
@@ -235,85 +241,53 @@ def closed_loop(
     study: Study,
     simulator: Simulator,
     *,
-    reference: str = "known",
-    around: float = 0.0,
     keep: Sequence[Array] = (),
+    **options: Any,
 ) -> ClosedLoop:
     """The loop of a study with a section `controller`.
 
-    reference : "known" (that of the settings, or the columns qr1 ... of each record), or
-    "measured".
-    around : s; rows so near to slow ones (`rows.low_speed`) are left out too.
     keep : bool, shape (N,) or (N, n) per record: samples that may be used.
+    options : those of LoopOptions.
     """
-    if reference not in ("known", "measured"):
-        raise SettingsError(
-            f"{reference!r}; expected known or measured", path=("estimate", "options", "reference")
-        )
-    if not around >= 0:
-        raise SettingsError(
-            f"{around} s; expected 0 or more", path=("estimate", "options", "around")
-        )
+    asked = structure(LoopOptions, options, ("estimate", "options"))
     controller = simulator.controller
     parts = []
     measured = [prepared(model, record, study) for record in records]
+    every, rate = controller.record_every, controller.rate / controller.record_every
     for k, own in enumerate(measured):
         record = own.record
         require_rate(record, controller)
-        rate = controller.rate / controller.record_every
-        if controller.feedforward == "record" and record.tau_ff is None:
+        fed = record.tau_ff if controller.feedforward == "record" else None
+        if controller.feedforward == "record" and fed is None:
             raise SettingsError(
-                (
-                    f"{record.file} holds no feed-forward torque; name its columns in "
-                    "record.columns.tau_ff"
-                ),
+                f"{record.file} holds no feed-forward torque; name its columns in "
+                "record.columns.tau_ff",
                 path=("controller", "feedforward"),
             )
-        followed = _reference(model, measured, k, controller, reference)
-        every = controller.record_every
-        if len(followed) // every + (len(followed) % every > 0) < len(record):
+        followed = _reference(model, measured, k, controller, asked.reference)
+        if -(-len(followed) // every) < len(record):
             raise InputError(
-                (
-                    f"the reference ends after {len(followed) / controller.rate:g} s, the record "
-                    "after "
-                    f"{record.t[-1] - record.t[0]:g} s"
-                ),
+                f"the reference ends after {len(followed) / controller.rate:g} s, the record "
+                f"after {record.t[-1] - record.t[0]:g} s",
                 file=record.file,
             )
-        wanted = slowest(
-            slips(followed.qd[::every][: len(record)], simulator.friction.G), round(around * rate)
-        )
+        speed = slips(followed.qd[::every][: len(record)], simulator.friction.G)
         selection = select_rows(
             record,
-            wanted,
+            slowest(speed, round(asked.around * rate)),
             study.signals,
             study.rows,
             keep=_usable(simulator, record, keep[k] if k < len(keep) else None),
         )
-        known = (
-            None if record.tau_known is None else -_at_ticks(record.tau_known, every, len(followed))
-        )
-        fed = (
-            _at_ticks(record.tau_ff, every, len(followed))
-            if controller.feedforward == "record" and record.tau_ff is not None
-            else None
-        )
-        parts.append(
-            LoopPart(
-                own, followed, selection, decimated_torque(record.torque, selection), fed, known
-            )
-        )
-    if reference == "measured":
+        torques = [
+            None if x is None else _at_ticks(x, every, len(followed))
+            for x in (fed, None if record.tau_known is None else -record.tau_known)
+        ]
+        torque = decimated_torque(record.torque, selection)
+        parts.append(LoopPart(own, followed, selection, torque, *torques))
+    if asked.reference == "measured":
         return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED)
-    references, selections = [part.reference for part in parts], [part.selection for part in parts]
-    fits = law_fits(
-        simulator.law,
-        [own.record for own in measured],
-        references,
-        selections,
-        controller,
-        model.JOINTS,
-    )
+    fits = law_fits(simulator.law, parts, controller, model.JOINTS)
     at(law_text(fits))
     return ClosedLoop(model, study, simulator, tuple(parts), "", fits)
 
@@ -336,15 +310,12 @@ def _reference(
     """What the controller followed in record k, at its rate."""
     record = records[k].record
     if reference == "measured":
-        states = records[k].states
-        if controller.record_every == 1:
-            return Reference(controller.rate, states.q, states.qd, states.qdd)
-        ticks = np.arange((len(record) - 1) * controller.record_every + 1) / controller.record_every
-        each = [
-            np.column_stack([np.interp(ticks, np.arange(len(x)), column) for column in x.T])
-            for x in (states.q, states.qd, states.qdd)
-        ]
-        return Reference(controller.rate, *each)
+        states, every = records[k].states, controller.record_every
+        ticks = (len(record) - 1) * every + 1
+        return Reference(
+            controller.rate,
+            *(_at_ticks(x, every, ticks) for x in (states.q, states.qd, states.qdd)),
+        )
     if record.q_r is not None:
         return of_record(record, controller)
     given = controller.reference

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import cont2discrete
 
 from runtime.errors import SettingsError
 from runtime.model.drives import Drives
@@ -194,31 +195,20 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
     State: q, qd, y1, y2, I, u. An integral that acts on nothing is left out.
     """
     n, T = law.joints, 1 / law.rate
-    Phi, Gamma = _held(A, B, T)
+    one, zero, inverse = np.eye(n), np.zeros((n, n)), np.linalg.inv(A)
+    free = np.block([[zero, one], [zero, -inverse @ B]])
+    driven = np.vstack([zero, inverse])
+    outputs = np.eye(2 * n), np.zeros((2 * n, n))
+    Phi, Gamma, *_ = cont2discrete((free, driven, *outputs), T)  # q, qd after T
+    P, Vm, K, Ie, Im, gain = (
+        x[:, None] for x in (law.P, law.Vm, law.K, law.Ie, law.Im, np.asarray(g))
+    )
     last, average = law.flags[2:]
-    one, zero = np.eye(n), np.zeros((n, n))
-    difference = np.hstack(
-        [(last + average) / T * one, zero, -last / T * one, -average / T * one, zero, zero]
-    )  # qd_m
-    position = np.hstack([one, *[zero] * 5])
-    u = (
-        -law.P[:, None] * position
-        - law.Vm[:, None] * difference
-        + law.K[:, None] * np.hstack([*[zero] * 4, one, zero])
-    )
-    tau = g[:, None] * (np.hstack([*[zero] * 5, one]) if law.delay else u)
-    integral = np.hstack([*[zero] * 4, one, zero]) - T * (
-        law.Ie[:, None] * position + law.Im[:, None] * difference
-    )
-    following = np.vstack(
-        [
-            np.hstack([Phi, np.zeros((2 * n, 4 * n))]) + Gamma @ tau,
-            position,
-            np.hstack([zero, zero, one, *[zero] * 3]),
-            integral,
-            u,
-        ]
-    )
+    q, qd, y1, y2, I, before = np.split(np.eye(6 * n), 6)
+    qd_m = (last + average) / T * q - last / T * y1 - average / T * y2
+    u = -P * q - Vm * qd_m + K * I
+    moved = Phi @ np.vstack([q, qd]) + Gamma @ (gain * (before if law.delay else u))
+    following = np.vstack([moved, q, y1, I - T * (Ie * q + Im * qd_m), u])
     acting = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, law.delay == 1)])
     return np.asarray(np.linalg.eigvals(following[np.ix_(acting, acting)]))
 
@@ -237,19 +227,3 @@ def continuous_pole(law: ControlLaw, A: Array, B: Array, g: Array) -> float:
         ]
     )
     return float(np.abs(np.linalg.eigvals(rates)).max())
-
-
-def _held(A: Array, B: Array, T: float) -> tuple[Array, Array]:
-    """q, qd after T at constant torque: Phi (2n, 2n), Gamma (2n, n), by the exponential of one
-    matrix.
-    """
-    from scipy.linalg import expm
-
-    n = len(A)
-    inverse = np.linalg.inv(A)
-    rates = np.zeros((3 * n, 3 * n))
-    rates[:n, n : 2 * n] = np.eye(n)
-    rates[n : 2 * n, n : 2 * n] = -inverse @ B
-    rates[n : 2 * n, 2 * n :] = inverse
-    E = expm(T * rates)
-    return E[: 2 * n, : 2 * n], E[: 2 * n, 2 * n :]

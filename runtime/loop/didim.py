@@ -36,7 +36,7 @@ def fit(start: Beginning) -> Fitted:
     loop, observation = loop_of(start.observation, start.settings.method), start.observation
 
     def update(runs: Sequence[Simulation], X: Array) -> Step:
-        rows = loop.motion(runs, observation)
+        rows = loop.simulated(runs, observation, exact=True)
         system = weighted(rows, EstimateSettings("wls"), LinearOptions())
         solution = system.solve()
         C = standard_deviations(system, solution)[1]

@@ -26,30 +26,15 @@ from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Status
 from runtime.estimators.method import Beginning
 from runtime.limits import LIMIT
-from runtime.loop.closed_loop import ClosedLoop
+from runtime.loop.closed_loop import ClosedLoop, LoopOptions
 from runtime.loop.result import Simulation
 from runtime.progress import at
-from runtime.settings.schema import Count, Positive, Real, Settings
+from runtime.settings.schema import Count, Positive, Real
 
 Array = np.ndarray
 
 # the stop of passes with rescaled gains, which only lead to the last ones, over that of the last
 PASS = ("norm", "g", "change")  # of a pass, in `details`
-
-
-class LoopOptions(Settings):
-    """estimate.options of every method that simulates the closed loop.
-
-    Attributes
-    ----------
-    reference : str
-        known, or measured where the reference has to be inferred.
-    around : float, s
-        Time about slow rows that is left out with them (`runtime.loop.closed_loop`).
-    """
-
-    reference: Literal["known", "measured"] = "known"
-    around: Real = 0.0
 
 
 class FixedPointOptions(LoopOptions):

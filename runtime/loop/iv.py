@@ -48,7 +48,7 @@ def fit(start: Beginning) -> Fitted:
     raw = start.system.raw
 
     def update(runs: Sequence[Simulation], X: Array) -> Step:
-        Z = loop.instruments(runs, observation).W
+        Z = loop.simulated(runs, observation, exact=False).W
         s = floored(raw, common_scales(raw, X, len(X)))
         solution = _solved(observation, Z, s)
         rest = observation.Y - observation.W @ solution[0]

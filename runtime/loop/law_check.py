@@ -26,9 +26,7 @@ import numpy as np
 from runtime.limits import LIMIT
 from runtime.loop.reference import Reference
 from runtime.records.record import Record
-from runtime.rows.selection import Selection
 from runtime.settings.controller import Controller
-from runtime.signals.filters import decimated
 
 Array = np.ndarray
 
@@ -58,33 +56,22 @@ class LawFit:
 
 
 def law_fits(
-    law: Any,
-    records: Sequence[Record],
-    references: Sequence[Reference],
-    selections: Sequence[Selection],
-    controller: Controller,
-    joints: Sequence[int],
+    law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[int]
 ) -> tuple[LawFit, ...]:
-    """Each joint of the records; `references` at the rate of the controller."""
-    torques = [
-        law_torque(law, record, reference, controller)
-        for record, reference in zip(records, references, strict=True)
-    ]
-    fits = []
+    """Each joint of the records; parts : of `ClosedLoop`, references at the rate of the
+    controller.
+    """
+    torques = [law_torque(law, part.record, part.reference, controller) for part in parts]
+    rate, fits = parts[0].record.rate, []
     for j, label in enumerate(joints):
         shares: list[tuple[float, float, float]] = []
-        rate = records[0].rate
         for lag in range(round(LIMIT.LAW_DELAYS * rate) + 1):
-            y, x = [], []
-            for record, tau, selection in zip(records, torques, selections, strict=True):
+            pairs = []
+            for part, tau in zip(parts, torques, strict=True):
                 late = np.concatenate([np.full(lag, tau[0, j]), tau[: len(tau) - lag, j]])
-                both = np.column_stack([record.tau[:, j], late])[selection.samples].T
-                kept = decimated(
-                    np.ascontiguousarray(both), selection.factor, selection.signals.decimate
-                )
-                y.append(kept[0][selection.mask[j]])
-                x.append(kept[1][selection.mask[j]])
-            shares.append(_share(np.concatenate(y), np.concatenate(x)))
+                both = part.decimated(np.column_stack([part.record.tau[:, j], late]))
+                pairs.append(both[:, part.selection.mask[j]])
+            shares.append(_share(*(np.concatenate(rows) for rows in zip(*pairs, strict=True))))
         share, factor, _ = shares[0]
         lag = int(np.argmax([best for _, _, best in shares]))
         fits.append(

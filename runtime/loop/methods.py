@@ -70,8 +70,6 @@ def estimate(
     model: GeneratedModel,
     records: Source | Sequence[Source] | Observation,
     study: Study | None = None,
-    *,
-    simulator: Simulator | None = None,
 ) -> Estimate:
     """All parameters of records, or of their Observation, by the method of the study.
 
@@ -83,8 +81,6 @@ def estimate(
         Joint side, SI.
     study : Study, optional
         Settings; default: Study().
-    simulator : Simulator, optional
-        Closed loop of iv, didim and cloe; default: that of study.controller.
 
     Returns
     -------
@@ -100,7 +96,7 @@ def estimate(
     """
     study = study or Study()
     if not isinstance(records, Observation):
-        records = observed(model, records, study, simulator=simulator or simulator_of(model, study))
+        records = observed(model, records, study, simulator=simulator_of(model, study))
     return estimate_of(records, study.estimate, model=model)
 
 

@@ -14,10 +14,9 @@ and what to try.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from math import ceil
 from pathlib import Path
-from types import ModuleType
 from typing import Any, cast
 
 import casadi as ca
@@ -36,7 +35,6 @@ from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
 from runtime.model.generated import GeneratedModel, constants_of
 from runtime.records.provenance import SIMULATED
 from runtime.records.reading import read_records
-from runtime.records.record import Record
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study
 
@@ -336,9 +334,7 @@ def simulate(
     model: GeneratedModel,
     study: Study,
     *,
-    records: Sequence[Record] | None = None,
     folder: str | Path | None = None,
-    symbolic: str | Path | ModuleType | SymbolicModel | None = None,
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
@@ -351,12 +347,8 @@ def simulate(
         With values of its standard parameters, or with all of them in `values` of the controller.
     study : Study
         With a section `controller`.
-    records : sequence of Record, optional
-        Those of the study; default: read from its files, where the reference is that of a record.
     folder : str or Path, optional
         Where file names of the study start; default: the current folder.
-    symbolic : str, Path or module, optional
-        CasADi model of the same robot; default: the file beside that of `model`.
     ideal : bool
         No noise, no steps of encoder and converter.
     name : str, optional
@@ -376,19 +368,15 @@ def simulate(
             "loop"
         )
     folder, index = Path(folder or ""), controller.reference.record
-    if records is None:
-        records = (
-            read_records(study.record, model, folder=folder, missing=study.signals.admits_missing)
-            if index is not None
-            else ()
-        )
+    records = (
+        read_records(study.record, model, folder=folder, missing=study.signals.admits_missing)
+        if index is not None
+        else ()
+    )
     X = parameters_of(model, controller)
     reference = reference_of(controller, model, records=records, folder=folder)
     start = records[index].q[0] if index is not None and controller.start is None else None
-    simulator = Simulator(
-        model, controller, symbolic=None if symbolic is None else load_symbolic(symbolic, of=model)
-    )
-    return simulator.run(
+    return Simulator(model, controller).run(
         X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}"
     )
 
@@ -414,18 +402,6 @@ def parameters_of(model: GeneratedModel, controller: Controller | None = None) -
     if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
         raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
     return np.asarray(emitted.base_parameters(values), dtype=float)
-
-
-def inertia_ratio(
-    model: GeneratedModel, X: Array, X_reference: Array, reference: Reference
-) -> Array:
-    """g_j = J_j(X)/J_j(X_reference), J_j the mean of A_jj over the reference: gains times g keep
-    the bandwidth of the loop. Shape (n,).
-    """
-    J, J_reference = (
-        np.einsum("tjj->j", model.inertia_matrix(reference.q, x)) for x in (X, X_reference)
-    )
-    return np.asarray(J / J_reference)
 
 
 def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:

@@ -251,7 +251,7 @@ def test_instruments_of_another_motion_are_weak(emps, axes):
 
 
 def test_rows_of_stacked_records(emps, axes):
-    """`outputs` and `motion` have the rows of the observation, of two records together, of one of
+    """`outputs` and `simulated` have the rows of the observation, of two records together, of one of
     them and of a window.
     """
     model, study, records = emps
@@ -266,7 +266,7 @@ def test_rows_of_stacked_records(emps, axes):
             len(part.Y),
             3,
         )
-        Z = loop.motion(runs, part)
+        Z = loop.simulated(runs, part, exact=True)
         assert Z.rows == part.rows and np.linalg.norm(Z.W - part.W) < 0.2 * np.linalg.norm(part.W)
     assert set(seen.record) == {0, 1}
 
@@ -348,7 +348,7 @@ def test_unknown_reference(arm, clean):
         closed_loop(model, [record], study, blind)
     with pytest.raises(SettingsError, match="expected known or measured"):
         closed_loop(model, [record], study, blind, reference="guessed")
-    with pytest.raises(SettingsError, match="expected 0 or more"):
+    with pytest.raises(SettingsError, match="expected at least 0"):
         closed_loop(model, [record], study, simulator, around=-1.0)
     with pytest.raises(InputError, match="the reference ends after"):
         longer = replace(
