@@ -11,7 +11,7 @@ weights of the first fit stay.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -124,7 +124,6 @@ def essential_of(
     estimate: EstimateSettings | None = None,
     *,
     model: GeneratedModel | None = None,
-    thresholds: Sequence[float] = THRESHOLDS,
     provenance: Mapping[str, Any] | None = None,
 ) -> Essential:
     """Essential parameters of an observation.
@@ -139,22 +138,16 @@ def essential_of(
         A method that is one linear system.
     model : GeneratedModel, optional
         Gives units, joint numbers and the hash of the robot file.
-    thresholds : sequence of float
-        Further thresholds, counted on the same trail.
     provenance : mapping, optional
         Further entries for Estimate.provenance.
     """
     settings = settings or EssentialSettings()
     system = linear_system(observation, estimate or EstimateSettings())
-    wanted = sorted({*thresholds, settings.threshold})
+    wanted = sorted({*THRESHOLDS, settings.threshold})
     steps = _trail(system, wanted[-1])
-    counts = {threshold: len(system.names) - _accepted(steps, threshold) for threshold in wanted}
-    accepted = _accepted(steps, settings.threshold)
-    removals = tuple(
-        Removal(name, relative, ratio, k < accepted)
-        for k, (name, relative, ratio) in enumerate(steps)
-    )
-    trail, further = removals[: accepted + 1], removals[accepted + 1 :]
+    removed = {threshold: _accepted(steps, threshold) for threshold in wanted}
+    accepted = removed[settings.threshold]
+    trail = tuple(replace(step, removed=k < accepted) for k, step in enumerate(steps))
     gone = {step.name for step in trail if step.removed}
     kept = tuple(name for name in system.names if name not in gone)
     reduced = system.select(kept)
@@ -162,26 +155,23 @@ def essential_of(
         names=kept,
         estimate=assemble(reduced, reduced.solve(), model=model, provenance=provenance),
         all_parameters=assemble(system, system.solve(), model=model, provenance=provenance),
-        trail=trail,
+        trail=trail[: accepted + 1],
         threshold=settings.threshold,
-        counts=counts,
-        further=further,
+        counts={threshold: len(system.names) - count for threshold, count in removed.items()},
+        further=trail[accepted + 1 :],
     )
 
 
-def _accepted(steps: Sequence[tuple[str, float, float]], threshold: float) -> int:
+def _accepted(steps: Sequence[Removal], threshold: float) -> int:
     """Removals before the first whose ratio reaches the threshold."""
-    for k, (_, _, ratio) in enumerate(steps):
-        if not ratio < threshold:
-            return k
-    return len(steps)
+    return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
 
 
-def _trail(system: System, threshold: float) -> list[tuple[str, float, float]]:
-    """(name, %sigma before it goes, sigma_rho ratio after) until the ratio reaches `threshold` or
+def _trail(system: System, threshold: float) -> list[Removal]:
+    """%sigma before a parameter goes, sigma_rho ratio after, until the ratio reaches `threshold` or
     one parameter is left.
     """
-    steps: list[tuple[str, float, float]] = []
+    steps: list[Removal] = []
     fit = system.solve()
     first, C = standard_deviations(system, fit)
     while len(system.names) > 1 and np.isfinite(first):
@@ -191,7 +181,7 @@ def _trail(system: System, threshold: float) -> list[tuple[str, float, float]]:
         fit = system.solve()
         sigma_rho, C = standard_deviations(system, fit)
         ratio = sigma_rho / first if first > 0 else (1.0 if sigma_rho == 0 else np.inf)
-        steps.append((worst, float(relative.max()), float(ratio)))
+        steps.append(Removal(worst, float(relative.max()), float(ratio), False))
         if ratio >= threshold:
             break
     return steps

@@ -226,8 +226,8 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
         ten = physical.link(_link(physical, key, "centre"))
         for axis, (low, high) in enumerate(box):
             moment, mass = ten[6 + axis], ten[9]
-            entries.append((f"centre of link {key}", {moment: 1.0, mass: -low}, 0.0, np.inf))
-            entries.append((f"centre of link {key}", {moment: -1.0, mass: high}, 0.0, np.inf))
+            sides = {moment: 1.0, mass: -low}, {moment: -1.0, mass: high}
+            entries += [(f"centre of link {key}", side, 0.0, np.inf) for side in sides]
     for key, ellipsoid in limits.ellipsoid.items():
         j = _link(physical, key, "ellipsoid")
         condition = next(c for c in physical.conditions if c.name == f"link {j}")
@@ -245,28 +245,6 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
         A[row, list(weights_of)] = list(weights_of.values())
     lower, upper = (np.array([entry[k] for entry in entries], dtype=float) for k in (2, 3))
     return LinearBounds(tuple(entry[0] for entry in entries), A, lower, upper)
-
-
-def plausible(physical: PhysicalModel, limits: RobotLimits, reach: float) -> RobotLimits:
-    """The limits with those that the size of a robot, m, sets where nothing is said about its
-    masses.
-
-    No centre of mass lies further from the origin of its frame, along any axis, and all links
-    together weigh less than a fifth of the water in a cube of that side.
-    """
-    if not np.isfinite(reach):
-        return limits
-    box = ((-reach, reach),) * 3
-    said = limits.total_mass is not None or any(
-        name in limits.bounds for name in (f"M{j}" for j in physical.links)
-    )
-    own = {str(j): box for j in physical.links if str(j) not in limits.ellipsoid}
-    return RobotLimits(
-        bounds=limits.bounds,
-        total_mass=limits.total_mass if said else (0.0, LIMIT.ROBOT_DENSITY * reach**3),
-        centre={**own, **limits.centre},
-        ellipsoid=limits.ellipsoid,
-    )
 
 
 def scales(physical: PhysicalModel) -> Array:

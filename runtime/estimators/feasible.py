@@ -20,7 +20,7 @@ options (all of `runtime.estimators.feasibility.RobotLimits` too):
                the fifth that is left out best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres
-               (`runtime.estimators.feasibility.plausible`); "auto": from its frames; null
+               "auto": from its frames; null
     bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
     explain    whether every condition in the way of least squares is named, and the ranges of
                masses are given; true
@@ -34,9 +34,6 @@ sigma and covariance are those of least squares without conditions, eq. (10): th
 estimates on the boundary of a cone has no such
 formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by
 an active condition is told by `details`.
-
-`fitted` takes any R and z: the feasible form of instrumental variables has R = L^-1 Z'V W and z' =
-L^-1 Z'V Y, L L' = Z'V Z.
 
 Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020)
 for the distances.
@@ -59,7 +56,6 @@ from runtime.estimators.feasibility import (
     known_inertia,
     limit_rows,
     nearest_standard,
-    plausible,
     pulled,
     scales,
     unsolved,
@@ -229,27 +225,22 @@ def within_limits(
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
     """chi of a factored system, and the weight of D."""
-    K = physical.rows(rows.names)
-    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
-
-    def at(weight: float) -> Array:
-        return fitted(rows.R11 @ K / size, rows.r12 / size, physical, options, weight)
-
     if options.prior == "none":
-        return at(0.0), 0.0
+        return fitted(rows, physical, options, 0.0), 0.0
     if not isinstance(options.weight, str):
-        return at(options.weight), options.weight
-    allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ at(0.0))
-    for weight in WEIGHTS:
+        return fitted(rows, physical, options, options.weight), options.weight
+    K, free = physical.rows(rows.names), fitted(rows, physical, options, 0.0)
+    allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ free)
+    for weight in map(float, WEIGHTS):
         try:
-            chi = at(float(weight))
+            chi = fitted(rows, physical, options, weight)
         except SettingsError:
             raise
         except InputError:  # as in `held_out_weight`
             continue
         if residual_norm(rows, K @ chi) <= allowed:
-            return chi, float(weight)
-    return at(0.0), 0.0
+            return chi, weight
+    return free, 0.0
 
 
 def held_out_weight(
@@ -261,8 +252,6 @@ def held_out_weight(
     Errors of the fifths add up, and none is below that of the least squares of its own rows: a
     weight is left as soon as it cannot be the best.
     """
-    if options.prior == "none":
-        return 0.0
     t0, t1 = observation.span
     number = np.minimum(
         (LIMIT.HELD_OUT_PARTS * (observation.t - t0) / (t1 - t0)).astype(int),
@@ -303,7 +292,11 @@ def held_out_weight(
 def decided(
     options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
 ) -> FeasibleOptions:
-    """The options with the prior and the bounds that they leave to the robot."""
+    """The options with the prior and the bounds that they leave to the robot.
+
+    No centre of mass lies further from the origin of its frame, along any axis, than the robot
+    reaches, and all links together weigh less than a fifth of the water in a cube of that side.
+    """
     prior = (
         ("euclidean" if known_inertia(physical) else "none")
         if options.prior == "auto"
@@ -317,12 +310,19 @@ def decided(
         prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight"
     )
     reach = reach_of(model) if options.reach == "auto" else options.reach
-    if reach is not None and np.isfinite(reach):
-        limits = plausible(physical, options, reach)
-        return replace(
-            options, prior=prior, reach=reach, total_mass=limits.total_mass, centre=limits.centre
-        )
-    return replace(options, prior=prior, reach=None)
+    if reach is None or not np.isfinite(reach):
+        return replace(options, prior=prior, reach=None)
+    masses = [f"M{j}" for j in physical.links]
+    said = options.total_mass is not None or any(name in options.bounds for name in masses)
+    box = ((-reach, reach),) * 3
+    own = {str(j): box for j in physical.links if str(j) not in options.ellipsoid}
+    return replace(
+        options,
+        prior=prior,
+        reach=reach,
+        total_mass=options.total_mass if said else (0.0, LIMIT.ROBOT_DENSITY * reach**3),
+        centre={**own, **options.centre},
+    )
 
 
 def mass_ranges(
@@ -415,22 +415,21 @@ def part_factor(part: Observation, system: System) -> Factor:
     )
 
 
-def fitted(
-    R: Array, z: Array, physical: PhysicalModel, options: FeasibleOptions, weight: float = 0.0
-) -> Array:
-    """chi, shape (p,), of min ||R chi - z||^2 + weight D(chi) under the conditions; R (m, p), z
-    (m,), ||z|| about 1.
+def fitted(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
+    """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a
+    factored system.
     """
-    rows, space = limit_rows(physical, options), everything(scales(physical))
-    prior = "none" if options.prior == "auto" else options.prior
-    pull = pulled(physical, prior, weight)
+    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
+    R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
+    bounds, space = limit_rows(physical, options), everything(scales(physical))
+    pull = pulled(physical, "none" if options.prior == "auto" else options.prior, weight)
 
     def attempt(within: LinearBounds) -> Optimum:
         return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
 
-    optimum = attempt(rows)
+    optimum = attempt(bounds)
     if not optimum.solved:
-        raise InputError(unsolved(optimum.status, rows, attempt))
+        raise InputError(unsolved(optimum.status, bounds, attempt))
     return optimum.chi
 
 

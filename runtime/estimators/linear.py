@@ -133,25 +133,15 @@ def ordinary(
     """Ordinary least squares, eq. (7): the rows as they are, in N m.
 
     X = argmin ||Y - W X||,    C = sigma_rho^2 (W'W)^-1,    sigma_rho^2 = ||Y - W X||^2 / (r - b)
+
+    SettingsError where `settings` asks for a column that the observation lacks.
     """
-    raw = raw_factor(observation, settings)
-    return System(observation, settings, raw, raw, (1.0,) * observation.n, options=options)
-
-
-def raw_factor(observation: Observation, settings: EstimateSettings) -> Factor:
-    """Factor of [W Y] on the columns that `settings` asks for."""
-    names = columns_asked(observation, settings)
-    return observation.factor if names == observation.names else observation.factor.select(names)
-
-
-def columns_asked(observation: Observation, settings: EstimateSettings) -> tuple[str, ...]:
-    """The columns that `settings` asks for; SettingsError where the observation lacks one."""
-    if settings.columns == "all":
-        return observation.names
-    if unknown := [name for name in settings.columns if name not in observation.names]:
+    names = observation.names if settings.columns == "all" else tuple(settings.columns)
+    if unknown := [name for name in names if name not in observation.names]:
         message = f"no parameter {', '.join(unknown)}; the model has {', '.join(observation.names)}"
         raise SettingsError(message, path=("estimate", "columns"))
-    return tuple(settings.columns)
+    raw = observation.factor if names == observation.names else observation.factor.select(names)
+    return System(observation, settings, raw, raw, (1.0,) * observation.n, options=options)
 
 
 def standard_deviations(system: System, fit: Solution) -> tuple[float, Array]:
@@ -178,7 +168,9 @@ def assemble(
     """
     observation, names = system.observation, system.names
     sigma_rho, C = standard_deviations(system, fit)
-    corrected = np.sqrt(np.diag(correlated_covariance(system, fit)))
+    corrected = np.full(len(names), np.nan)  # as without redundancy
+    if system.raw.rows > len(names):
+        corrected = np.sqrt(np.diag(block_covariance(system.block_rows(), fit.X, fit.T)))
     corrected[_undetermined(system, fit)] = np.nan
     norms, measured = system.norms(fit.X)
     share = 1 - fit.rank / system.raw.rows
@@ -232,16 +224,6 @@ def assemble(
 def labels_of(model: GeneratedModel | None, n: int) -> tuple[str, ...]:
     """Names of the joints, their numbers where there is no model."""
     return tuple(map(str, range(1, n + 1))) if model is None else joint_labels(model)
-
-
-def correlated_covariance(system: System, fit: Solution) -> Array:
-    """The covariance that takes blocks of residuals as independent, shape (b, b); nan without
-    redundancy.
-    """
-    b = len(system.names)
-    if system.raw.rows <= b:
-        return np.full((b, b), np.nan)
-    return block_covariance(system.block_rows(), fit.X, fit.T)
 
 
 def condition(factor: Factor, rank: int) -> float:

@@ -95,19 +95,15 @@ def solve(factor: Factor, tolerance: float | None = None) -> Solution:
     return Solution(T @ z, T, residual, rank, np.inf, null_groups(Vt[rank:], factor.names))
 
 
-def null_groups(
-    V2t: Array, names: Sequence[str], participation: float = LIMIT.NULL_PARTICIPATION
-) -> tuple[tuple[str, ...], ...]:
+def null_groups(V2t: Array, names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     """Names that trade against each other along the null directions V2t, shape (b - rank, b),
-    orthonormal rows.
-
-    participation : |entry| of P = V_2 V_2' (diagonal: its square root) below which a parameter
-    takes no part.
+    orthonormal rows: entries of P = V_2 V_2' (diagonal: its square root) above
+    LIMIT.NULL_PARTICIPATION.
     """
     P = V2t.T @ V2t
-    part = np.flatnonzero(np.sqrt(np.diag(P)) > participation)
+    part = np.flatnonzero(np.sqrt(np.diag(P)) > LIMIT.NULL_PARTICIPATION)
     count, label = connected_components(
-        np.abs(P[np.ix_(part, part)]) > participation, directed=False
+        np.abs(P[np.ix_(part, part)]) > LIMIT.NULL_PARTICIPATION, directed=False
     )
     return tuple(tuple(names[i] for i in part[label == g]) for g in range(count))
 

@@ -523,12 +523,12 @@ def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, wei
         "feasible", options={**PLAIN, "prior": "entropic", "weight": weight, "explain": False}
     )
 
-    def failing(R, z, physical, options, weight=0.0):
+    def failing(rows, physical, options, weight):
         if weight > 1e-3:
             raise InputError(
                 "the semidefinite program was not solved (Clarabel: InsufficientProgress)"
             )
-        return whole(R, z, physical, options, weight)
+        return whole(rows, physical, options, weight)
 
     monkeypatch.setattr(method, "fitted", failing)
     found = estimate_of(seen, settings, model=solid)
