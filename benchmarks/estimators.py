@@ -39,9 +39,10 @@ import symgen
 from runtime import InputError, load_model
 from runtime.estimators.estimate import Estimate
 from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
-from runtime.loop.simulation import Simulator, parameters_of
+from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
 from runtime.records.datasets import dataset_study

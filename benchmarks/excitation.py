@@ -28,9 +28,10 @@ from simulation import LAW
 from runtime import load_model
 from runtime.excitation.criteria import excesses, kept_correlation, planned, weights_of
 from runtime.excitation.search import excite
+from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
-from runtime.loop.simulation import Simulator, parameters_of
+from runtime.loop.simulation import Simulator
 from runtime.records.named import study_of
 from runtime.records.reading import read_records
 from runtime.rows.observe import observe

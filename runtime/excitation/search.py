@@ -33,9 +33,9 @@ from runtime.excitation.criteria import (
 from runtime.excitation.optimiser import Problem, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.limits import LIMIT
+from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.methods import estimate_of
-from runtime.loop.simulation import parameters_of
 from runtime.model.casadi import casadi_path
 from runtime.model.generated import GeneratedModel, require
 from runtime.model.loading import is_trusted

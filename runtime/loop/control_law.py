@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.signal import cont2discrete
 
-from runtime.errors import SettingsError
+from runtime.errors import InputError, SettingsError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of
 from runtime.settings.controller import Controller
@@ -186,6 +186,29 @@ def _saturation(controller: Controller, limits: Mapping[str, Any]) -> PerJoint[f
     if given != "limits":
         return given
     return tuple(limits["tau"]) if "tau" in limits else None
+
+
+def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
+    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in
+    their place; 0 for those without effect.
+    """
+    changed = {} if controller is None else controller.values
+    emitted, where = cast(Any, model), ("controller", "values")
+    values = {**dict.fromkeys(emitted.NO_EFFECT, 0.0), **model.VALUES, **changed}
+    if missing := [name for name in emitted.STANDARD_PARAMETERS if name not in values]:
+        message = (
+            f"{model.NAME} has no value of "
+            f"{', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the "
+            "robot file"
+        )
+        if controller is None:
+            raise InputError(
+                f"{message} (0 where one is zero), or a record whose estimate tells the parameters"
+            )
+        raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
+    if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
+        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
+    return np.asarray(emitted.base_parameters(values), dtype=float)
 
 
 def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:

@@ -27,6 +27,7 @@ from runtime.estimators.estimate import Status
 from runtime.estimators.method import Beginning
 from runtime.limits import LIMIT
 from runtime.loop.closed_loop import ClosedLoop, LoopOptions
+from runtime.loop.control_law import parameters_of
 from runtime.loop.result import Simulation
 from runtime.progress import at
 from runtime.settings.schema import Count, Positive, Real
@@ -108,16 +109,10 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
     if which == "ols":
         return start.solution.X
     model: Any = loop.model
-    standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
     if which == "values":
-        values = dict.fromkeys(model.NO_EFFECT, 0.0) | dict(model.VALUES)
-        if missing := [name for name in standard if name not in values]:
-            raise SettingsError(
-                f"{model.NAME} has no value of {', '.join(missing[:6])}; use start and gains: ols",
-                path=("estimate", "options"),
-            )
-        standard.update({name: values[name] for name in standard})
+        base = parameters_of(model)
     else:
+        standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
         for j in model.JOINTS:
             own = next((name for name in (f"Ia{j}", f"ZZ{j}", f"M{j}") if name in standard), None)
             if own is None:
@@ -126,7 +121,8 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
                     path=("estimate", "options", "start"),
                 )
             standard[own] = 1.0
-    X = dict(zip(model.BASE_PARAMETERS, model.base_parameters(standard), strict=True))
+        base = model.base_parameters(standard)
+    X = dict(zip(model.BASE_PARAMETERS, base, strict=True))
     return np.array([X[name] for name in names])
 
 

@@ -48,17 +48,19 @@ def fit(start: Beginning) -> Fitted:
     raw = start.system.raw
 
     def update(runs: Sequence[Simulation], X: Array) -> Step:
-        Z = loop.simulated(runs, observation, exact=False).W
         s = floored(raw, common_scales(raw, X, len(X)))
-        solution = _solved(observation, Z, s)
-        rest = observation.Y - observation.W @ solution[0]
+        rows = np.repeat(1 / s, observation.rows)
+        Z = loop.simulated(runs, observation, exact=False).W * rows[:, None]
+        W = observation.W * rows[:, None]
+        X, C, A = _solved(W, Z, observation.Y * rows)
+        rest = observation.Y - observation.W @ X
         norm = float(np.linalg.norm(rest / np.repeat(s, observation.rows)))
-        return Step(solution[0], solution[1], norm, (Z, s, solution[2]))
+        return Step(X, C, norm, (W, Z, s, A))
 
     fixed = iterate(loop, start, update)
     status, message, details = outcome_of(loop, fixed, start.settings.method)
-    X, (Z, s, A) = fixed.step.X, fixed.step.result
-    quality = _quality(observation, Z, s)
+    X, (W, Z, s, A) = fixed.step.X, fixed.step.result
+    quality = _quality(W, Z)
     if quality["cond"] > LIMIT.WEAK_CONDITION or quality["correlation"] < LIMIT.WEAK_CORRELATION:
         status = "weak-instruments" if status == "ok" else status
         weak = (
@@ -76,10 +78,9 @@ def fit(start: Beginning) -> Fitted:
         iterations=len(fixed.trail),
     )
     least = system.solve()
-    rows = np.repeat(1 / s, observation.rows)
-    residual = (observation.Y - observation.W @ X) * rows
-    U = _by_block(observation, Z * rows[:, None], residual, A)
-    U_least = _by_block(observation, observation.W * rows[:, None], residual, least.T @ least.T.T)
+    residual = (observation.Y - observation.W @ X) * np.repeat(1 / s, observation.rows)
+    U = _by_block(observation, Z, residual, A)
+    U_least = _by_block(observation, W, residual, least.T @ least.T.T)
     test = hausman(observation.names, X - least.X, U - U_least)
     return Fitted(
         system,
@@ -104,38 +105,34 @@ def hausman(names: Sequence[str], d: Array, U: Array) -> dict[str, Any]:
     return statistics
 
 
-def _solved(observation: Observation, Z: Array, s: Array) -> tuple[Array, Array, Array]:
-    """X, C and A = (Z'VW)^-1."""
-    rows = np.repeat(1 / s, observation.rows)
-    W, Zw, Y = observation.W * rows[:, None], Z * rows[:, None], observation.Y * rows
+def _solved(W: Array, Z: Array, Y: Array) -> tuple[Array, Array, Array]:
+    """X, C and A = (Z'VW)^-1 of weighted rows."""
     size = np.linalg.norm(W, axis=0)
-    W, Zw = W / size, Zw / size
+    W, Z = W / size, Z / size
     try:
-        A = np.linalg.inv(Zw.T @ W)
+        A = np.linalg.inv(Z.T @ W)
     except LinAlgError:
         raise InputError(
             "the instruments do not explain W: Z'VW is singular; the simulated motion excites less "
             "than the measured one. Check controller and reference"
         ) from None
-    X = A @ (Zw.T @ Y)
-    X += A @ (Zw.T @ (Y - W @ X))
-    C = A @ (Zw.T @ Zw) @ A.T
+    X = A @ (Z.T @ Y)
+    X += A @ (Z.T @ (Y - W @ X))
+    C = A @ (Z.T @ Z) @ A.T
     return X / size, C / np.outer(size, size), A / np.outer(size, size)
 
 
-def _quality(observation: Observation, Z: Array, s: Array) -> dict[str, float]:
+def _quality(W: Array, Z: Array) -> dict[str, float]:
     """Condition of Z'VW with unit columns, smallest correlation of the two column spaces, smallest
-    of a column with its own instrument.
+    of a column with its own instrument; rows are weighted.
     """
-    rows = np.repeat(1 / s, observation.rows)[:, None]
-    W, Zw = observation.W * rows, Z * rows
-    norms = np.linalg.norm(W, axis=0), np.maximum(np.linalg.norm(Zw, axis=0), 1e-300)
-    own = np.abs(np.einsum("ik,ik->k", W / norms[0], Zw / norms[1]))
-    spaces = np.linalg.svd(np.linalg.qr(Zw)[0].T @ np.linalg.qr(W)[0], compute_uv=False)
+    unit_W = W / np.linalg.norm(W, axis=0)
+    unit_Z = Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
+    spaces = np.linalg.svd(np.linalg.qr(Z)[0].T @ np.linalg.qr(W)[0], compute_uv=False)
     return {
-        "cond": float(np.linalg.cond((Zw / norms[1]).T @ (W / norms[0]))),
+        "cond": float(np.linalg.cond(unit_Z.T @ unit_W)),
         "correlation": float(spaces[-1]),
-        "column_correlation": float(own.min()),
+        "column_correlation": float(np.abs(np.einsum("ik,ik->k", unit_W, unit_Z)).min()),
     }
 
 

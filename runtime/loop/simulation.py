@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import ceil
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -25,7 +25,13 @@ from scipy.signal import butter, lfilter
 
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
-from runtime.loop.control_law import ControlLaw, continuous_pole, control_law, discrete_poles
+from runtime.loop.control_law import (
+    ControlLaw,
+    continuous_pole,
+    control_law,
+    discrete_poles,
+    parameters_of,
+)
 from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_function
 from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
@@ -379,29 +385,6 @@ def simulate(
     return Simulator(model, controller).run(
         X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}"
     )
-
-
-def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:
-    """Base parameters (b,) of the standard ones of the robot file, with `values` of the settings in
-    their place; 0 for those without effect.
-    """
-    changed = {} if controller is None else controller.values
-    emitted, where = cast(Any, model), ("controller", "values")
-    values = {**dict.fromkeys(emitted.NO_EFFECT, 0.0), **model.VALUES, **changed}
-    if missing := [name for name in emitted.STANDARD_PARAMETERS if name not in values]:
-        message = (
-            f"{model.NAME} has no value of "
-            f"{', '.join(missing[:6])}{' ...' if len(missing) > 6 else ''}; give them in the "
-            "robot file"
-        )
-        if controller is None:
-            raise InputError(
-                f"{message} (0 where one is zero), or a record whose estimate tells the parameters"
-            )
-        raise SettingsError(f"{message} or here, 0 where one is zero", path=where)
-    if unknown := sorted(set(changed) - set(emitted.STANDARD_PARAMETERS)):
-        raise SettingsError(f"no standard parameter {', '.join(unknown)}", path=where)
-    return np.asarray(emitted.base_parameters(values), dtype=float)
 
 
 def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:

@@ -32,6 +32,7 @@ import numpy as np
 
 from runtime.errors import SettingsError
 from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import CLOSED_LOOP
 from runtime.loop.reference import Reference, reference_of
 from runtime.model.casadi import SymbolicModel
@@ -97,8 +98,6 @@ class Loop:
     @cached_property
     def truth(self) -> Array:
         """Base parameters of the simulated arm, shape (b,)."""
-        from runtime.loop.simulation import parameters_of
-
         return parameters_of(self.model, self.simulator.controller)
 
     @cached_property

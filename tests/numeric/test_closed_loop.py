@@ -16,10 +16,11 @@ from runtime import InputError, Record, identify, load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.loop.closed_loop import closed_loop, loop_of, slips, slowest
+from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulated_motion import judged, simulated_motion
-from runtime.loop.simulation import Simulator, parameters_of
+from runtime.loop.simulation import Simulator
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.rows.observe import observe

@@ -12,8 +12,9 @@ import pytest
 from campaign import campaign
 
 from runtime import load_model
+from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
-from runtime.loop.simulation import Simulator, parameters_of
+from runtime.loop.simulation import Simulator
 from runtime.settings.controller import Controller
 from runtime.settings.schema import structure
 

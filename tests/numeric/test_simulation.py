@@ -14,12 +14,12 @@ from scipy.integrate import solve_ivp
 
 from runtime import InputError, load_model
 from runtime.errors import SettingsError
-from runtime.loop.control_law import control_law, discrete_poles
+from runtime.loop.control_law import control_law, discrete_poles, parameters_of
 from runtime.loop.controller_tick import plant_function
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import SimulationError
-from runtime.loop.simulation import Simulator, parameters_of
+from runtime.loop.simulation import Simulator
 from runtime.loop.simulation import simulate as simulate_study
 from runtime.loop.stick_slip import friction_function
 from runtime.model.casadi import load_symbolic
