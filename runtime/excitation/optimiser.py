@@ -84,18 +84,11 @@ def improved(problem: Problem, number: int, guess: Motion) -> Start:
     )
     nlp = {"x": ca.vertcat(*(ca.vec(part) for part in p)), "g": g}
     x = np.concatenate([part.p.ravel(order="F") for part in guess.parts])
-    reached = _minimised(
-        {**nlp, "f": _logdet(A)}, x, (least, most), (lower, upper), settings.iterations
-    )
-    if settings.criterion != "logdet":
-        reached = _minimised(
-            {**nlp, "f": _spread(A, settings.criterion)},
-            reached[0],
-            (least, most),
-            (lower, upper),
-            settings.iterations,
+    further = () if settings.criterion == "logdet" else (_spread(A, settings.criterion),)
+    for f in (_logdet(A), *further):
+        x, criterion, violation, message = _minimised(
+            {**nlp, "f": f}, x, (least, most), (lower, upper), settings.iterations
         )
-    x, criterion, violation, message = reached
     sizes = np.cumsum([part.p.size for part in guess.parts])[:-1]
     parts = [
         Part(part.family, values.reshape(part.p.shape, order="F"))

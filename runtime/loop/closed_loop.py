@@ -253,7 +253,8 @@ def closed_loop(
     controller = simulator.controller
     parts = []
     measured = [prepared(model, record, study) for record in records]
-    every, rate = controller.record_every, controller.rate / controller.record_every
+    every = controller.record_every
+    around = 2 * round(asked.around * (controller.rate / every)) + 1  # samples
     for k, own in enumerate(measured):
         record = own.record
         require_rate(record, controller)
@@ -274,7 +275,7 @@ def closed_loop(
         speed = slips(followed.qd[::every][: len(record)], simulator.friction.G)
         selection = select_rows(
             record,
-            slowest(speed, round(asked.around * rate)),
+            minimum_filter1d(speed, around, axis=0, mode="nearest"),
             study.signals,
             study.rows,
             keep=_usable(simulator, record, keep[k] if k < len(keep) else None),
@@ -347,15 +348,6 @@ def slips(qd: Array, G: Array) -> Array:
         acts = np.flatnonzero(element)
         speed[:, acts] = np.minimum(speed[:, acts], np.abs(qd @ element)[:, None])
     return speed
-
-
-def slowest(speed: Array, samples: int) -> Array:
-    """Smallest of each column of speed, (N, n), so many samples before and after."""
-    return (
-        speed
-        if samples == 0
-        else np.asarray(minimum_filter1d(speed, 2 * samples + 1, axis=0, mode="nearest"))
-    )
 
 
 def _usable(simulator: Simulator, record: Record, keep: Array | None) -> Array | None:

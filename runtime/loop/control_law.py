@@ -58,11 +58,9 @@ class ControlLaw:
         Step and deviation of the noise, on the side of R.
     ca : ndarray, shape (n,)
         Gain of qdd_r.
-    rate : float, Hz
-    delay : int
-        Ticks from the position to its torque, 0 or 1.
-    averaged : bool
-        Whether the velocity is the mean difference over two ticks.
+    flags : ndarray, shape (4,)
+        T, ticks from the position to its torque (0 or 1), weights of (y_k - y_(k-1))/T and
+        (y_k - y_(k-2))/T in qd_m.
     R, offset : ndarray, shape (n, n) and (n,)
         The encoder shows R (q - offset).
     """
@@ -80,9 +78,7 @@ class ControlLaw:
     encoder_step: Array
     encoder_noise: Array
     ca: Array
-    rate: float
-    delay: int
-    averaged: bool
+    flags: Array
     R: Array
     offset: Array
 
@@ -111,18 +107,6 @@ class ControlLaw:
                 self.R, np.where(self.encoder_step > 0, step * np.floor(qm / step + 0.5), qm)
             )
             + self.offset
-        )
-
-    @property
-    def flags(self) -> Array:
-        """T, delay, weights of (y_k - y_(k-1))/T and (y_k - y_(k-2))/T in qd_m."""
-        return np.array(
-            [
-                1 / self.rate,
-                self.delay,
-                0.0 if self.averaged else 1.0,
-                0.5 if self.averaged else 0.0,
-            ]
         )
 
 
@@ -164,6 +148,7 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
         raise SettingsError(
             f"motor; {model.NAME} has no drives", path=("controller", "encoder", "side")
         )
+    weights = (0.0, 0.5) if controller.velocity == "averaged" else (1.0, 0.0)
     return ControlLaw(
         **{key: gain * x for key, x in gains.items()},
         **integral,
@@ -173,9 +158,7 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
         encoder_step=each("encoder.step", controller.encoder.step),
         encoder_noise=each("encoder.noise", controller.encoder.noise),
         ca=gain * ca,
-        rate=controller.rate,
-        delay=controller.delay,
-        averaged=controller.velocity == "averaged",
+        flags=np.array([1 / controller.rate, controller.delay, *weights]),
         R=drives.ratio,
         offset=drives.offset,
     )
@@ -217,7 +200,8 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
 
     State: q, qd, y1, y2, I, u. An integral that acts on nothing is left out.
     """
-    n, T = law.joints, 1 / law.rate
+    n = law.joints
+    T, delay, last, average = law.flags
     one, zero, inverse = np.eye(n), np.zeros((n, n)), np.linalg.inv(A)
     free = np.block([[zero, one], [zero, -inverse @ B]])
     driven = np.vstack([zero, inverse])
@@ -226,13 +210,12 @@ def discrete_poles(law: ControlLaw, A: Array, B: Array, g: Array) -> Array:
     P, Vm, K, Ie, Im, gain = (
         x[:, None] for x in (law.P, law.Vm, law.K, law.Ie, law.Im, np.asarray(g))
     )
-    last, average = law.flags[2:]
     q, qd, y1, y2, I, before = np.split(np.eye(6 * n), 6)
     qd_m = (last + average) / T * q - last / T * y1 - average / T * y2
     u = -P * q - Vm * qd_m + K * I
-    moved = Phi @ np.vstack([q, qd]) + Gamma @ (gain * (before if law.delay else u))
+    moved = Phi @ np.vstack([q, qd]) + Gamma @ (gain * (before if delay else u))
     following = np.vstack([moved, q, y1, I - T * (Ie * q + Im * qd_m), u])
-    acting = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, law.delay == 1)])
+    acting = np.concatenate([np.ones(4 * n, bool), law.K != 0, np.full(n, delay == 1)])
     return np.asarray(np.linalg.eigvals(following[np.ix_(acting, acting)]))
 
 

@@ -143,13 +143,9 @@ def iterate(
         )
     trail: list[dict[str, Any]] = []
     step: Step | None = None
-    changes: list[float] = []
-    converged, message = False, ""
+    converged = False
     for rescaled in (True, False) if J is not None else (False,):
-        previous: Step | None = None
-        converged = False
-        points: list[Array] = []
-        steps: list[Array] = []
+        first, converged = len(trail), False
         for _ in range(options.passes):
             at(
                 f"pass {len(trail) + 1}"
@@ -159,32 +155,24 @@ def iterate(
                 loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None
             )
             if step is not None and message:
-                return Fixed(step, tuple(trail), False, _contraction(changes), message)
+                return Fixed(step, tuple(trail), False, _contraction(trail), message)
             step = update(runs, X)
             sigma = np.sqrt(np.maximum(np.diag(step.covariance), 0.0))
             size = np.where(sigma > 0, sigma, np.inf)
             moved = np.abs(step.X - X)
             change = float(np.max(moved / size, initial=0.0))
-            changes.append(float(np.linalg.norm(moved / np.maximum(np.abs(step.X), 1e-12))))
             trail.append({"X": X, "next": step.X, "norm": step.norm, "g": g, "change": change})
-            still = (
-                previous is not None
-                and abs(step.norm - previous.norm) <= options.residual * previous.norm
-            )
+            last = trail[first:][-LIMIT.ANDERSON_MEMORY - 1 :]
+            before = last[-2]["norm"] if len(last) > 1 else np.nan
+            still = abs(step.norm - before) <= options.residual * before
             rounding = bool(np.all(moved <= 1e-9 * np.max(np.abs(step.X))))
-            points, steps, previous = (
-                [*points, X][-LIMIT.ANDERSON_MEMORY - 1 :],
-                [*steps, step.X - X][-LIMIT.ANDERSON_MEMORY - 1 :],
-                step,
-            )
-            X = _accelerated(points, steps, size)
-            if (
-                change < options.change * (LIMIT.ROUGH_STOP if rescaled else 1) and still
-            ) or rounding:
+            X = _accelerated(last, size)
+            near = change < options.change * (LIMIT.ROUGH_STOP if rescaled else 1)
+            if (near and still) or rounding:
                 converged = True
                 break
     assert step is not None  # options.passes >= 1
-    return Fixed(step, tuple(trail), converged, _contraction(changes))
+    return Fixed(step, tuple(trail), converged, _contraction(trail))
 
 
 def _simulated(
@@ -226,20 +214,26 @@ def _simulated(
     )
 
 
-def _accelerated(points: Sequence[Array], steps: Sequence[Array], size: Array) -> Array:
-    """The next X from the last ones and the steps that were found there; distances in units of
-    `size`, shape (c,).
+def _accelerated(last: Sequence[Mapping[str, Any]], size: Array) -> Array:
+    """The next X from the last passes, each from X to `next`; distances in units of `size`, shape
+    (c,).
     """
+    points = np.array([own["X"] for own in last])
+    steps = np.array([own["next"] - own["X"] for own in last])
     if len(points) < 3:
         return np.asarray(points[-1] + steps[-1])
-    dX, dF = np.diff(np.array(points), axis=0).T, np.diff(np.array(steps), axis=0).T
+    dX, dF = np.diff(points, axis=0).T, np.diff(steps, axis=0).T
     gamma = np.linalg.lstsq(dF / size[:, None], steps[-1] / size, rcond=1e-6)[0]
     return np.asarray(points[-1] + steps[-1] - (dX + dF) @ gamma)
 
 
-def _contraction(changes: Sequence[float]) -> float:
+def _contraction(trail: Sequence[Mapping[str, Any]]) -> float:
     """Ratio of the last two changes; nan before there are two."""
-    return changes[-1] / changes[-2] if len(changes) > 1 and changes[-2] > 0 else float("nan")
+    changes = [
+        float(np.linalg.norm((own["next"] - own["X"]) / np.maximum(np.abs(own["next"]), 1e-12)))
+        for own in trail[-2:]
+    ]
+    return changes[1] / changes[0] if len(changes) > 1 and changes[0] > 0 else float("nan")
 
 
 def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str, dict[str, Any]]:

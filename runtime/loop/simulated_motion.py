@@ -13,7 +13,7 @@ about this robot. Limits are conventions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +25,6 @@ from runtime.estimators.linear import percent
 from runtime.limits import LIMIT
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.law_check import law_text
-from runtime.loop.result import Simulation
 from runtime.rows.observation import Observation
 
 Array = np.ndarray
@@ -77,12 +76,7 @@ def simulated_motion(
     """Each joint of the simulation with all base parameters X, shape (b,), beside the records;
     InputError where it cannot be made.
     """
-    return _compared(loop, observation, loop.run(X))
-
-
-def _compared(
-    loop: ClosedLoop, observation: Observation, runs: Sequence[Simulation]
-) -> tuple[JointMotion, ...]:
+    runs = loop.run(X)
     gaps = [
         False if part.record.missing is None else part.record.missing.at_joints()
         for part in loop.parts

@@ -164,8 +164,12 @@ class Simulator:
         seed: int | None,
     ) -> LoopInputs:
         """seed : None for an ideal run."""
-        n, N = len(self.model.JOINTS), len(reference)
-        X, g = self._parameters(X), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
+        n, b, N = len(self.model.JOINTS), len(self.model.BASE_PARAMETERS), len(reference)
+        X, g = np.asarray(X, dtype=float), np.broadcast_to(np.asarray(g, dtype=float), (n,)).copy()
+        if X.shape != (b,) or not np.isfinite(X).all():
+            raise InputError(
+                f"X of shape {X.shape}; expected {b} finite base parameters of {self.model.NAME}"
+            )
         _check_shapes(reference, self.controller.rate, n, N, disturbance, feedforward)
         substeps = self.substeps(X, reference, g)
         noise, pushed, torque_noise = (
@@ -325,15 +329,6 @@ class Simulator:
             size * pushed,
             np.asarray(torque.noise, dtype=float) * recorded,
         )
-
-    def _parameters(self, X: Array) -> Array:
-        X = np.asarray(X, dtype=float)
-        b = len(self.model.BASE_PARAMETERS)
-        if X.shape != (b,) or not np.isfinite(X).all():
-            raise InputError(
-                f"X of shape {X.shape}; expected {b} finite base parameters of {self.model.NAME}"
-            )
-        return X
 
 
 def simulate(

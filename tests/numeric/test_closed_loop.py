@@ -15,7 +15,7 @@ from campaign import campaign
 from runtime import InputError, Record, identify, load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
-from runtime.loop.closed_loop import closed_loop, loop_of, slips, slowest
+from runtime.loop.closed_loop import closed_loop, loop_of, slips
 from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
@@ -284,7 +284,6 @@ def test_slow_rows_are_those_where_a_friction_rests():
     qd = np.array([[1.0, 0.5, -0.5], [0.1, 2.0, 3.0], [1.0, 1.0, 1.0]])
     G = np.array([[1, 0, 0], [0, 1, 0], [0, 1, 1]])
     assert slips(qd, G).tolist() == [[1.0, 0.0, 0.0], [0.1, 2.0, 3.0], [1.0, 1.0, 1.0]]
-    assert slowest(qd[:, :1], 1).ravel().tolist() == [0.1, 0.1, 0.1] and slowest(qd, 0) is qd
 
 
 def test_slow_rows_around(arm, clean):
