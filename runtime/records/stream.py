@@ -63,9 +63,9 @@ class Stream(ABC):
         """What known torques take from the record, a sentence; "" where there are none."""
         return known_text(self.largest_known)
 
-    @abstractmethod
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
+        return (t for t, *_ in self.blocks())
 
     @abstractmethod
     def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
@@ -99,9 +99,6 @@ class RecordStream(Stream):
             largest_known=known,
         )
         object.__setattr__(self, "record", record)
-
-    def times(self) -> Iterator[Array]:
-        return (t for t, *_ in self.blocks())
 
     def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
         missing = (

@@ -109,7 +109,7 @@ class BlockTask:
         """Positions at the encoders, shape (B, n), nan where they are missing."""
         _, q, _, missing, motors = self.read(number, begin, end)
         drives = encoder_drives(self.study.signals.side, motors)
-        return encoder_position(q, drives, missing and missing.at_encoders(drives))
+        return encoder_position(q, drives, missing)
 
     def states(self, piece: Piece) -> tuple[Array, States, Array, CountStage | None]:
         """Time (N,), states (N, n) and measured torques (N, n) of a piece, and the reader of its
@@ -120,7 +120,7 @@ class BlockTask:
         counts = None
         if signals.reader == "counts":
             whole = self.skimmed.get(piece.record)
-            start = whole and whole.starts[piece.begin]
+            start = None if whole is None else whole.starts[piece.begin]
             counts = CountStage(piece.stretches, stream.rate, signals, stream.name, start)
         name = stream.name
         states = observed_states(
@@ -135,8 +135,8 @@ def row_counts(task: BlockTask, piece: Piece) -> tuple[Array, float, float]:
     """
     at, stream = piece.instants, task.streams[piece.record]
     if not task.filters_choose:
-        ends = [piece.begin + at.sample(k) for k in (at.used[0], at.used[1] - 1)]
-        return np.full(stream.n, at.used[1] - at.used[0]), *_times(stream, ends)
+        t0, t1 = _times(stream, [at.sample(k) for k in (at.used[0], at.used[1] - 1)])
+        return np.full(stream.n, at.used[1] - at.used[0]), t0, t1
     t, states, *_ = task.states(piece)
     study = task.study
     fast = selected(at, t, states.qd, stream.rate, study.signals, study.rows)

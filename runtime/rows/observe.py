@@ -183,10 +183,10 @@ def _observed_by_blocks(
     parts: list[list[Observation]] = [[] for _ in streams]
     segments: list[Segment] = []
     counts = dict(task.skimmed)
-    for piece, (own, reduced, stage) in zip(
+    for piece, (chunks, reduced, stage) in zip(
         every, in_order(piece_rows, task, every, workers), strict=True
     ):
-        parts[piece.record] += own
+        parts[piece.record] += chunks
         segments += reduced
         if stage is not None:
             counts.setdefault(piece.record, stage).join(stage)
@@ -199,11 +199,10 @@ def _observed_by_blocks(
         found = sentences(counts[k].findings, stream.name) if k in counts else ()
         records.append(replace(own, dropped=dropped, files=stream.origin.files, findings=found))
     observation = stack(records)
-    stream = {"block": max(stream.block for stream in streams)}
-    observation = replace(observation, settings={**observation.settings, "stream": stream})
+    block = {"block": max(stream.block for stream in streams)}
+    observation = replace(observation, settings={**observation.settings, "stream": block})
     if held:
         return observation
-    reduced = Reduced(joined(segments), cuts, span, length, observation)
-    return replace(
-        observation.where(np.zeros(len(observation.Y), dtype=bool)), rows=in_all, reduced=reduced
-    )
+    none = observation.where(np.zeros(len(observation.Y), dtype=bool))
+    factors = Reduced(joined(segments), cuts, span, length, observation)
+    return replace(none, rows=in_all, reduced=factors)

@@ -37,7 +37,7 @@ from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, prepared
 from runtime.rows.selection import Selection
 from runtime.rows.sign_errors import Kernels, Switch, Switched, kernels, switched, switches
-from runtime.settings.study import Signals, Study, to_mapping
+from runtime.settings.study import Study, to_mapping
 from runtime.signals.filters import States
 from runtime.signals.noise_gain import Bandwidth, bandwidth
 from runtime.signals.states import encoder_drives, encoder_root
@@ -170,7 +170,8 @@ def perturbation(
     constants : values in place of the robot file's.
     """
     signals = replace(study.signals, median=study.cestac.median)
-    own = prepared(model, record, replace(study, signals=lowpass_alone(signals)))
+    positions = replace(signals, reader="lowpass", step=None, side="joint", lines="detected")
+    own = prepared(model, record, replace(study, signals=positions))
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of steps on them", own.record.file)
     selection = own.selection
@@ -249,11 +250,6 @@ def with_errors(
     )
     total = deviation**2 * part.errors.sum(axis=0)
     return replace(observation, errors=total / np.maximum(observation.rows, 1)[:, None, None])
-
-
-def lowpass_alone(signals: Signals) -> Signals:
-    """The same filters on positions as they are."""
-    return replace(signals, reader="lowpass", step=None, side="joint", lines="detected")
 
 
 def _rows(observation: Observation, j: int) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -70,39 +71,6 @@ def decimated_columns(
     return store
 
 
-class DistinctSignals:
-    """The distinct signals of a regressor, in room that the next call uses again."""
-
-    def __init__(
-        self, model: GeneratedModel, entries: Entries, constants: Mapping[str, float]
-    ) -> None:
-        self.model, self.place, self.constants = model, entries.place, constants
-        self._room: dict[int, tuple[Array, Array]] = {}  # by number of samples: values, signals
-
-    def __call__(self, states: States) -> Array:
-        """Signals of the states (B, n), shape (S, B)."""
-        B, model = len(states), self.model
-        if B not in self._room:
-            compiled = isinstance(model, CompiledSignals)
-            values = np.empty((model.signals.count, B)) if compiled else model.store(B)
-            self._room[B] = values, np.empty((len(self.place), B))
-        values, signals = self._room[B]
-        if isinstance(model, CompiledSignals):  # without a store
-            model.signal_rows(states.q, states.qd, states.qdd, values, **self.constants)
-            if np.array_equal(self.place, np.arange(len(values))):
-                return values
-        else:
-            try:
-                D = model.regressor(states.q, states.qd, states.qdd, out=values, **self.constants)
-            except ValueError as e:  # what an emitted module of a general loop raises
-                raise InputError(
-                    f"{model.NAME}: {e}; look at units and zeros of the positions, and at the "
-                    "lengths of the robot file"
-                ) from None
-            values = D.transpose(2, 1, 0).reshape(-1, B)
-        return np.take(values, self.place, axis=0, out=signals, mode="clip")
-
-
 def decimated_signals(
     model: GeneratedModel,
     entries: Entries,
@@ -114,14 +82,46 @@ def decimated_signals(
 
     plan : None keeps every sample.
     """
-    signals = DistinctSignals(model, entries, constants)
+    signals, N = partial(_signals, model, entries, constants, {}), len(states)
     if plan is None:
-        blocks = [signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, len(states), BLOCK)]
+        blocks = [signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, N, BLOCK)]
         return np.concatenate(blocks, axis=1)
     decimation = Decimation(plan, len(entries.source))
     for t0, t1 in plan.pieces(BLOCK):
         decimation.take(signals(states[t0:t1]), t0)
     return decimation.result()
+
+
+def _signals(
+    model: GeneratedModel,
+    entries: Entries,
+    constants: Mapping[str, float],
+    room: dict[int, tuple[Array, Array]],
+    states: States,
+) -> Array:
+    """Distinct signals of the states (B, n), shape (S, B).
+
+    room : what the model evaluates and the signals, by B, which the next call uses again.
+    """
+    B, compiled = len(states), model if isinstance(model, CompiledSignals) else None
+    if B not in room:
+        values = model.store(B) if compiled is None else np.empty((compiled.signals.count, B))
+        room[B] = values, np.empty((len(entries.place), B))
+    values, signals = room[B]
+    if compiled is not None:  # without a store
+        compiled.signal_rows(states.q, states.qd, states.qdd, values, **constants)
+        if np.array_equal(entries.place, np.arange(len(values))):
+            return values
+    else:
+        try:
+            D = model.regressor(states.q, states.qd, states.qdd, out=values, **constants)
+        except ValueError as e:  # what an emitted module of a general loop raises
+            raise InputError(
+                f"{model.NAME}: {e}; look at units and zeros of the positions, and at the "
+                "lengths of the robot file"
+            ) from None
+        values = D.transpose(2, 1, 0).reshape(-1, B)
+    return np.take(values, entries.place, axis=0, out=signals, mode="clip")
 
 
 def distinct_entries(

@@ -66,7 +66,7 @@ def observed_states(
         require_positions(missing, "reader: lowpass", name, COUNTS)
         return filtered_states(q, rate, signals)
     drives = encoder_drives(signals.side, drives)
-    position = encoder_position(q, drives, None if missing is None else missing.at_encoders(drives))
+    position = encoder_position(q, drives, missing)
     if counts is not None:
         return joint_states(*counts.read(position), rate, signals, drives)
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
@@ -123,12 +123,10 @@ def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -
     return drives
 
 
-def encoder_position(q: Array, drives: Drives | None, missing: Array | None = None) -> Array:
-    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing,
-    bool of that shape or (N, 0).
-    """
+def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
+    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing."""
     x = q if drives is None else drives.motor_position(q)
-    return x if missing is None or not missing.any() else np.where(missing, np.nan, x)
+    return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)
 
 
 def encoder_root(drives: Drives | None, n: int) -> Array:

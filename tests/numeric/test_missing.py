@@ -252,7 +252,7 @@ def test_coupled_motors():
         np.zeros_like(q),
         missing=at_motors,
     )
-    known = encoder_position(record.q, drives, at_motors.at_encoders(drives))
+    known = encoder_position(record.q, drives, at_motors)
     np.testing.assert_allclose(known[~samples], motor[~samples], atol=1e-9)
     assert np.isnan(known[samples]).all()
     signals = Signals(lowpass=Lowpass(cutoff=20), reader="counts", step=step, side="motor")

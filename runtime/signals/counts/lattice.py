@@ -75,14 +75,12 @@ class Lattice:
 def lattice(
     position: Array,
     step: Array | Sequence[float] | float | None = None,
-    phase: Array | None = None,
     *,
     name: str = "record",
 ) -> Lattice:
     """The lattice of positions, shape (N, n), at the encoder side.
 
     step : rad or m, one or one for each encoder; default: from the record.
-    phase : shape (n,); default: from the record.
 
     Raises InputError where a step is not positive, is larger than the motion, or positions do not
     lie on its lattice.
@@ -99,10 +97,6 @@ def lattice(
                 file=name,
             )
         step = np.broadcast_to(given, (n,))
-    if phase is not None and np.shape(phase) != (n,):
-        raise InputError(
-            f"phase {np.shape(phase)}; expected ({n},), one for each encoder", file=name
-        )
     if not any(np.nanmax(x) > np.nanmin(x) for x in position.T if np.isfinite(x).any()):
         raise InputError(
             "no position changes: counts that never change say nothing of a motion; record one",
@@ -120,7 +114,7 @@ def lattice(
                 file=name,
             )
         steps[j], said = _step(x, None if step is None else float(step[j]), label, name)
-        phases[j] = _phase(x, steps[j]) if phase is None else phase[j]
+        phases[j] = _phase(x, steps[j])
         counts = np.round((x - phases[j]) / steps[j])
         findings += [*said, *_speed(np.diff(counts), label)]
         shares[j] = shaken_share(counts)
@@ -262,14 +256,13 @@ class Unwrapping:
 def unwrapped_counts(
     position: Array,
     step: Array | Sequence[float] | float | None = None,
-    phase: Array | None = None,
     *,
     name: str = "record",
 ) -> tuple[Lattice, Array, Unwrapping]:
     """The lattice of positions (see `lattice`), their counts without wraps, shape (N, n), and what
     wrapped.
     """
-    known = lattice(position, step, phase, name=name)
+    known = lattice(position, step, name=name)
     unwrapping = Unwrapping(known, name)
     return known, unwrapping(known.counts(position)), unwrapping
 

@@ -144,7 +144,6 @@ def read_counts(
     position: Array,
     rate: float,
     step: Array | Sequence[float] | float | None = None,
-    phase: Array | None = None,
     *,
     lines: Lines = "detected",
     name: str = "record",
@@ -159,9 +158,6 @@ def read_counts(
         Sampling rate.
     step : float or ndarray, shape (n,), rad or m, optional
         Step of the encoders; default: from the record.
-    phase : ndarray, shape (n,), rad or m, optional
-        A position of the lattice of each encoder, the middle of an interval; default: from the
-        record.
     lines : "detected", "estimated" or float
         Lines at unequal distances: their deviation is detected, and bounds are widened by it; lines
         are estimated with the motion; or their
@@ -179,7 +175,7 @@ def read_counts(
         No count changes; a step that is not positive or larger than the motion; positions off the
         lattice; counts that jump.
     """
-    known, counts, unwrapping = unwrapped_counts(position, step, phase, name=name)
+    known, counts, unwrapping = unwrapped_counts(position, step, name=name)
     return _reading(counts, rate, known, lines, unwrapping.findings)
 
 
