@@ -29,6 +29,8 @@ EXPECTED = {  # by the type of an error of pydantic
     "mapping_type": "a mapping",
     "dict_type": "a mapping",
     "dataclass_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "union_tag_not_found": "a mapping with the key {discriminator}",
     "string_type": "a text",
     "tuple_type": "a list",
 }
@@ -196,6 +198,10 @@ def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...
             if isinstance(key, str)
             else f"{len(given)} values; expected at least {key + 1}"
         )
+    elif kind == "union_tag_invalid":
+        path.append(context["discriminator"].strip("'"))
+        names = context["expected_tags"].replace("'", "")
+        reason = f"no {path[-1]} {context['tag']!r}; there are {names}"
     elif kind == "too_long":
         reason = f"{context['actual_length']} values; expected {context['max_length']}"
     elif kind == "literal_error":

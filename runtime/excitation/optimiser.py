@@ -65,7 +65,7 @@ def one_start(problem: Problem, number: int) -> Start:
     """The motion that IPOPT reaches from the random start `number`."""
     rng = np.random.default_rng([problem.settings.seed, number])
     guess = Motion(
-        tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.families)
+        tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.parts)
     )
     return improved(problem, number, guess)
 
@@ -74,12 +74,12 @@ def improved(problem: Problem, number: int, guess: Motion) -> Start:
     """The motion that IPOPT reaches from `guess`."""
     settings, n = problem.settings, len(problem.weights.s)
     symbolic = load_symbolic(problem.path, trust=problem.trust)
-    p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.families)]
+    p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.parts)]
     q, qd, qdd = _states(settings, p)
     A = _information(symbolic, settings, problem.weights, q, qd, qdd)
     g, lower, upper = _constraints(symbolic, problem, p, q, qd, qdd)
     least, most = (
-        np.concatenate([np.tile(family.bounds()[k], n) for family in settings.families])
+        np.concatenate([np.tile(family.bounds()[k], n) for family in settings.parts])
         for k in (0, 1)
     )
     nlp = {"x": ca.vertcat(*(ca.vec(part) for part in p)), "g": g}
@@ -100,7 +100,7 @@ def improved(problem: Problem, number: int, guess: Motion) -> Start:
 def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, Any]:
     """q, qd, qdd at the points of the grid, part after part, shape (M, n)."""
     parts = []
-    for family, coefficients in zip(settings.families, p, strict=True):
+    for family, coefficients in zip(settings.parts, p, strict=True):
         t = np.linspace(0.0, family.duration, max(3, round(family.duration * settings.grid) + 1))
         parts.append(_at(family, coefficients, t))
     q, qd, qdd = (ca.vertcat(*(part[k] for part in parts)) for k in range(3))
@@ -157,7 +157,7 @@ def _constraints(
     rows += _torques(symbolic, problem, limits, q, qd, qdd)
     rows += _distances(symbolic, settings, q)
     ends = []
-    for k, (family, coefficients) in enumerate(zip(settings.families, p, strict=True)):
+    for k, (family, coefficients) in enumerate(zip(settings.parts, p, strict=True)):
         begin, end = (
             [x.T for x in _at(family, coefficients, np.array([t]))] for t in (0.0, family.duration)
         )

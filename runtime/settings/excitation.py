@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from runtime.settings.families import Family, family_from_mapping
+from runtime.settings.families import AnyFamily, Fourier, PointToPoint
 from runtime.settings.schema import Count, Many, Positive, Real, Settings, Text, Whole, require
 
 
@@ -35,9 +35,8 @@ class ExcitationSettings(Settings):
 
     Attributes
     ----------
-    parts : tuple of mapping
-        Families in the order of the motion (`runtime.settings.trajectories`), each a mapping with
-        its `family`.
+    parts : tuple of Family
+        Families in the order of the motion (`runtime.settings.trajectories`).
     criterion : str
         record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
         largest predicted %sigma over that of the motion of
@@ -78,9 +77,9 @@ class ExcitationSettings(Settings):
         Seed of the starts.
     """
 
-    parts: Annotated[Many[Mapping[str, Any]], Field(min_length=1)] = (
-        {"family": "fourier", "period": 10.0, "harmonics": 5},
-        {"family": "point-to-point", "points": 7, "travel": 1.0, "blend": 0.25},
+    parts: Annotated[Many[AnyFamily], Field(min_length=1)] = (
+        Fourier(),
+        PointToPoint(points=7, travel=1.0, blend=0.25),
     )
     criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"
     columns: Literal["essential", "all"] | Many[Text] = "essential"
@@ -107,12 +106,6 @@ class ExcitationSettings(Settings):
                 f"{list(pair)}; there are {len(self.spheres)} spheres",
                 "apart",
             )
-        _ = self.families
-
-    @property
-    def families(self) -> tuple[Family, ...]:
-        """Families of the parts."""
-        return tuple(family_from_mapping(part, ("parts", k)) for k, part in enumerate(self.parts))
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:

@@ -19,16 +19,16 @@ acceleration are continuous. SI, rad.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import field
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from runtime.errors import SettingsError
 from runtime.limits import LIMIT
-from runtime.settings.schema import Path, Positive, Settings, Whole, require, structure
+from runtime.settings.schema import Positive, Settings, Whole, require
 
 Array = np.ndarray
 States = tuple[Any, Any, Any]  # q, qd, qdd
@@ -37,7 +37,9 @@ Corners = Annotated[Whole, Field(ge=2, le=LIMIT.PART_SIZE)]
 
 
 class Family:
-    """A form of motion; subclasses are settings."""
+    """A form of motion; subclasses are settings, `family` their name in files."""
+
+    family: str
 
     @property
     def duration(self) -> float:
@@ -72,6 +74,8 @@ class Fourier(Family, Settings):
 
     Attributes
     ----------
+    family : str
+        fourier.
     period : float, s
         Period of the first harmonic.
     harmonics : int
@@ -80,6 +84,7 @@ class Fourier(Family, Settings):
         Number of periods.
     """
 
+    family: Literal["fourier"] = field(default="fourier", kw_only=True)
     period: Positive = 10.0
     harmonics: Terms = 5
     periods: Terms = 1
@@ -118,6 +123,8 @@ class Sinusoids(Family, Settings):
 
     Attributes
     ----------
+    family : str
+        sinusoids.
     length : float, s
         Length of the motion.
     terms : int
@@ -128,6 +135,7 @@ class Sinusoids(Family, Settings):
         Time in which the sinusoids rise, and in which they fall.
     """
 
+    family: Literal["sinusoids"] = field(default="sinusoids", kw_only=True)
     length: Positive = 10.0
     terms: Terms = 3
     highest: Positive = 1.0
@@ -227,6 +235,8 @@ class PointToPoint(Polyline, Settings):
 
     Attributes
     ----------
+    family : str
+        point-to-point.
     points : int
         Number of positions.
     travel : float, s
@@ -235,6 +245,7 @@ class PointToPoint(Polyline, Settings):
         Part of `travel` in which speed is gained, and in which it is lost.
     """
 
+    family: Literal["point-to-point"] = field(default="point-to-point", kw_only=True)
     points: Corners = 8
     travel: Positive = 1.2
     blend: Positive = 0.3
@@ -266,6 +277,8 @@ class Triangular(Polyline, Settings):
 
     Attributes
     ----------
+    family : str
+        triangular.
     points : int
         Number of positions.
     travel : float, s
@@ -276,6 +289,7 @@ class Triangular(Polyline, Settings):
         Largest velocity of a guess.
     """
 
+    family: Literal["triangular"] = field(default="triangular", kw_only=True)
     points: Corners = 6
     travel: Positive = 2.0
     blend: Positive = 0.2
@@ -300,36 +314,9 @@ class Triangular(Polyline, Settings):
         return 0.8 * min(speed, self.speed) * self.travel
 
 
-FAMILIES: Mapping[str, type[Family]] = {
-    "fourier": Fourier,
-    "sinusoids": Sinusoids,
-    "point-to-point": PointToPoint,
-    "triangular": Triangular,
-}
-
-
-def family_from_mapping(mapping: Mapping[str, Any], path: Path = ()) -> Family:
-    """A family from {"family": "fourier", "period": 10 ...}; settings that are left out have their
-    defaults.
-
-    Parameters
-    ----------
-    path : tuple of str and int
-        Keys that lead to the mapping in its file.
-    """
-    settings = dict(mapping)
-    kind = FAMILIES.get(str(settings.pop("family", None)))
-    if kind is None:
-        raise SettingsError(
-            f"no family {mapping.get('family')!r} of trajectories; there are {', '.join(FAMILIES)}",
-            path=(*path, "family"),
-        )
-    return structure(kind, settings, path)
-
-
-def label(family: Family) -> str:
-    """The name of a family in files."""
-    return next(name for name, kind in FAMILIES.items() if isinstance(family, kind))
+AnyFamily = Annotated[
+    Fourier | Sinusoids | PointToPoint | Triangular, Field(discriminator="family")
+]
 
 
 def _linear(basis: Sequence[Array], p: Any, math: Any) -> States:

@@ -12,8 +12,8 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
-from runtime.settings.families import Array, Family, family_from_mapping, label
-from runtime.settings.schema import require, to_mapping
+from runtime.settings.families import AnyFamily, Array, Family
+from runtime.settings.schema import require, structure, to_mapping
 
 BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them for each time
 
@@ -30,7 +30,7 @@ class Part:
         if p.ndim != 2 or len(p) != len(self.family.names) or not np.all(np.isfinite(p)):
             expected = f"({len(self.family.names)}, joints)"
             raise InputError(
-                f"coefficients of shape {p.shape} of a {label(self.family)} part; expected "
+                f"coefficients of shape {p.shape} of a {self.family.family} part; expected "
                 f"{expected}, finite"
             )
         object.__setattr__(self, "p", p)
@@ -88,10 +88,7 @@ class Motion:
     def to_mapping(self) -> dict[str, Any]:
         """The parts with their coefficients, by joint, for a file."""
         return {
-            "parts": [
-                {"family": label(part.family), **to_mapping(part.family), "p": part.p.T.tolist()}
-                for part in self.parts
-            ]
+            "parts": [{**to_mapping(part.family), "p": part.p.T.tolist()} for part in self.parts]
         }
 
 
@@ -116,9 +113,8 @@ def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
             raise SettingsError(
                 f"part {k + 1} of the trajectory has no coefficients `p`", path=path
             )
-        family = family_from_mapping(
-            {key: value for key, value in part.items() if key != "p"}, path
-        )
+        settings = {key: value for key, value in part.items() if key != "p"}
+        family: Family = structure(AnyFamily, settings, path)
         try:
             made.append(Part(family, np.array(part["p"], dtype=float).T))
         except InputError as e:

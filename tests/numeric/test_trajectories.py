@@ -8,13 +8,13 @@ import pytest
 
 from runtime.errors import InputError, SettingsError
 from runtime.settings.families import (
-    FAMILIES,
+    AnyFamily,
     Fourier,
     PointToPoint,
     Sinusoids,
     Triangular,
-    family_from_mapping,
 )
+from runtime.settings.schema import structure
 from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 
 EVERY = [
@@ -30,7 +30,7 @@ def coefficients(family: object, seed: int = 0) -> np.ndarray:
     return np.array([family.guess(rng, -1.0, 2.0, 3.0) for _ in range(2)]).T  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("family", EVERY, ids=list(FAMILIES))
+@pytest.mark.parametrize("family", EVERY, ids=[own.family for own in EVERY])
 def test_velocity_and_acceleration_are_derivatives(family: object) -> None:
     motion = Motion((Part(family, coefficients(family)),))  # type: ignore[arg-type]
     t = np.linspace(0.0, motion.duration, 40001)
@@ -43,7 +43,7 @@ def test_velocity_and_acceleration_are_derivatives(family: object) -> None:
     assert np.abs(np.diff(qdd, axis=0)).max() < 2e-2  # but no steps
 
 
-@pytest.mark.parametrize("family", EVERY, ids=list(FAMILIES))
+@pytest.mark.parametrize("family", EVERY, ids=[own.family for own in EVERY])
 def test_rest_at_both_ends(family: object) -> None:
     motion = Motion((Part(family, coefficients(family)),))  # type: ignore[arg-type]
     _, qd, qdd = motion.states(np.array([0.0, motion.duration]))
@@ -51,7 +51,7 @@ def test_rest_at_both_ends(family: object) -> None:
     assert np.abs(qdd).max() < 1e-11
 
 
-@pytest.mark.parametrize("family", EVERY, ids=list(FAMILIES))
+@pytest.mark.parametrize("family", EVERY, ids=[own.family for own in EVERY])
 def test_casadi_says_the_same(family: object) -> None:
     p = coefficients(family)[:, 0]
     t = np.linspace(0.0, family.duration, 37)  # type: ignore[attr-defined]
@@ -94,15 +94,15 @@ def test_chain_and_file() -> None:
 
 def test_bad_input() -> None:
     with pytest.raises(InputError, match="no family 'spline'"):
-        family_from_mapping({"family": "spline"})
+        structure(AnyFamily, {"family": "spline"})
     with pytest.raises(SettingsError, match="unknown key order"):
-        family_from_mapping({"family": "fourier", "order": 3})
+        structure(AnyFamily, {"family": "fourier", "order": 3})
     with pytest.raises(SettingsError, match="expected more than 0"):
-        family_from_mapping({"family": "fourier", "period": 0})
+        structure(AnyFamily, {"family": "fourier", "period": 0})
     with pytest.raises(SettingsError, match="shorten it"):
-        family_from_mapping({"family": "point-to-point", "travel": 1, "blend": 0.6})
+        structure(AnyFamily, {"family": "point-to-point", "travel": 1, "blend": 0.6})
     with pytest.raises(SettingsError, match="shorten it"):
-        family_from_mapping({"family": "sinusoids", "length": 1, "ramp": 0.6})
+        structure(AnyFamily, {"family": "sinusoids", "length": 1, "ramp": 0.6})
     with pytest.raises(InputError, match="coefficients of shape"):
         Part(Fourier(), np.zeros((3, 2)))
     with pytest.raises(InputError, match="parts"):
