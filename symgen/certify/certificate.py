@@ -37,7 +37,7 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values
-from symgen.derive.angles import units_of
+from symgen.derive.angles import rows_of, units_of
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
 from symgen.description.expression import Call, Expression, Number, quarter_turns
@@ -352,17 +352,10 @@ def degree(regrouping: Regrouping) -> int:
     path = max(
         (sum(frame(robot.frame(i)) for i in robot.path(f.j)) for f in robot.frames), default=0
     )
-    rows = [
-        g
-        for e in robot.elements
-        for table in (e.along, e.form)
-        for row in table.values()
-        for g in row.values()
-    ]
     coefficients = max(
         (constant(c) for b in regrouping.base for c in b.combination.values()), default=0
     )
-    return 3 * path + 3 + 2 * max(map(constant, rows), default=0) + coefficients
+    return 3 * path + 3 + 2 * max(map(constant, rows_of(robot)), default=0) + coefficients
 
 
 def _modulo(

@@ -119,14 +119,12 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
             f"target {target!r}; Python imports {', '.join(PYTHON)}; `symgen generate --target c` "
             "writes C"
         )
-    files = generate_files(robot, targets=(target,))
-    if not files:
+    path = _certified_path(robot, target)
+    if path is None:
         raise SymgenError(
             f"{robot.name}: no {target} module, since its loops are closed by iteration; the NumPy "
             "module serves"
         )
-    ((file, text),) = files.items()
-    path = _cached(regroup(robot), file, text)
     module = imported(path)
     if target == "numpy":  # runtime asks for it where it simulates
         vars(module)["casadi_file"] = lambda: str(model(robot, target="casadi").__file__)
@@ -138,11 +136,14 @@ def c_file(robot: str | Path | Robot) -> Path:
     loops are closed by iteration, which has none.
     """
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    for file, text in generate_files(robot, targets=("c",)).items():
-        return _cached(regroup(robot), file, text)
-    return stored_path(f"{robot.name}.c", "")
+    return _certified_path(robot, "c") or stored_path(f"{robot.name}.c", "")
 
 
-def _cached(regrouping: Regrouping, file: str, text: str) -> Path:
-    """Path of a text in the cache: what lies there has been certified."""
-    return cached_path(file, text) or stored_path(file, _certified(regrouping, {file: text})[file])
+def _certified_path(robot: Robot, target: str) -> Path | None:
+    """Path of a text in the cache: what lies there has been certified. None where the robot has no
+    text of the target.
+    """
+    for file, text in generate_files(robot, targets=(target,)).items():
+        cached = cached_path(file, text)
+        return cached or stored_path(file, _certified(regroup(robot), {file: text})[file])
+    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from types import ModuleType
 from typing import Any
 
@@ -10,15 +11,14 @@ import numpy as np
 
 from symgen.certify.printed import definitions, equations, evaluated
 from symgen.certify.witness import Witness
-from symgen.derive.columns import element_names, inertial_names
+from symgen.derive.columns import element_names, unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
-from symgen.description.robot import KINDS, PRISMATIC, Element, Robot
+from symgen.description.robot import Element
 from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping
 
 EVALUATED_TWICE = 1e-9  # of the largest: formulas and rows evaluated twice
-UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
 
 
 def table_errors(module: ModuleType, witness: Witness) -> dict[str, float]:
@@ -99,7 +99,6 @@ def _defaults(function: Any) -> list[tuple[str, float]]:
 
 def _expected(witness: Witness) -> dict[str, Any]:
     robot, regrouping = witness.robot, witness.regrouping
-    d = robot.drives
     return {
         "SCHEMA": 1,
         "NAME": robot.name,
@@ -113,20 +112,10 @@ def _expected(witness: Witness) -> dict[str, Any]:
         "STANDARD_PARAMETERS": robot.parameters,
         "UNITS": {b.name: unit(robot, b.own) for b in regrouping.base},
         "NO_EFFECT": regrouping.no_effect,
-        "DRIVES": d
-        and {"ratio": d.ratio, "offset": d.offset, "torque_constant": d.torque_constant},
+        "DRIVES": robot.drives and asdict(robot.drives),
         "LIMITS": robot.limits,
         "VALUES": robot.values,
     }
-
-
-def unit(robot: Robot, name: str) -> str:
-    """Unit of a standard parameter."""
-    inertial = inertial_names(robot)
-    if name in inertial:
-        return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
-    e, j = element_names(robot)[name]
-    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
 
 
 def formulas_hold(formulas: Any, witness: Witness) -> bool:

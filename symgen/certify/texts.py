@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,6 +29,7 @@ from symgen.certify.importing import END, HEAD, below, imported
 from symgen.certify.tables import table_errors
 from symgen.certify.witness import STATES, Check, Witness
 from symgen.derive.exact import Array
+from symgen.derive.models import MODELS
 from symgen.version import VERSION
 
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
@@ -203,23 +204,20 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     rows = np.arange(TILES) % STATES
     own, constants = witness.own[rows], [*witness.constants.values(), 0.0]
     N, n, b = own.shape
-    known = {f"{name}_{f}": check for f, (check, *_) in witness.checks.items()}
-    found = re.findall(rf"^int32_t ({name}_\w+)\(", text, re.MULTILINE)
-    calls: list[tuple[str, list[Any], int]] = [
-        (
-            f,
-            [
-                N,
-                *(_flat(a[rows] if a.ndim > 1 else a) for a in known[f].arguments),
-                constants,
-                None,
-                flags,
-            ],
-            known[f].expected[rows].size,
+    found = re.findall(rf"^int32_t {name}_(\w+)\(", text, re.MULTILINE)
+    checks = {
+        f: replace(
+            c,
+            arguments=tuple(a[rows] if a.ndim > 1 else a for a in c.arguments),
+            expected=c.expected[rows],
         )
         for f in found
-        for flags in (0, 1)
-        if f in known
+        for c in witness.checks.get(f, ())[:1]
+    }
+    asked = [(f, check, flags) for f, check in checks.items() for flags in (0, 1)]
+    calls: list[tuple[str, list[Any], int]] = [
+        (f"{name}_{f}", [N, *map(_flat, c.arguments), constants, None, flags], c.expected.size)
+        for f, c, flags in asked
     ]
     columns = [_flat(x[rows].T) for x in (witness.q, witness.qd, witness.qdd)]
     try:
@@ -244,20 +242,16 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
         store[row] = sign[:, None] * np.reshape(computed, (signals, N))[signal]
     except (OSError, subprocess.SubprocessError, ValueError, IndexError):
         return {"compile": float("inf")}
-    apart = {f"{name}_{f}" for f in ("abi", "signals", *witness.left_out)}
-    errors = dict.fromkeys({*found} - {*known, *apart}, float("inf"))
-    errors[last[0]] = difference(store.T.reshape(N, b, n).swapaxes(1, 2), own, 1.0)
+    apart = {"abi", "signals", *witness.left_out}
+    errors = dict.fromkeys({*found} - {*checks, *apart}, float("inf"))
+    errors["signals"] = difference(store.reshape(b, n, N).T, own, 1.0)
     store[row[:varying]] = 0.0  # the functions leave to their caller what is constant
-    for (f, _, _), (status, numbers) in zip(2 * calls, results, strict=True):
-        value = np.reshape(numbers, (-1, N)) + (store if f == f"{name}_regressor" else 0.0)
-        if f == f"{name}_regressor":
-            value = value.T.reshape(N, b, n).swapaxes(1, 2).reshape(N, -1).T
-        expected, scale = known[f].expected[rows], known[f].scale
-        worst = (
-            float("inf") if status else difference(value.T.reshape(expected.shape), expected, scale)
-        )
+    for (f, check, _), (status, numbers) in zip(2 * asked, results, strict=True):
+        value = np.reshape(numbers, (*check.expected.shape[:0:-1], N)).T
+        if MODELS[f].by_columns:
+            value = value + store.reshape(b, n, N).T
+        worst = float("inf") if status else difference(value, check.expected, check.scale)
         errors[f] = max(errors.get(f, 0.0), worst)
-    errors = {f.removeprefix(f"{name}_"): error for f, error in errors.items()}
     return errors | {"SOURCE_SHA256": 0.0 if f'"{witness.robot.sha256}"' in text else float("inf")}
 
 

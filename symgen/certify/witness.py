@@ -100,12 +100,17 @@ class Witness:
                 self.chi[self.robot.parameters.index(X[name][0])] += value - X[name][1]
         self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
-        self.A = self.model.actuated_inertia(self.q, self.chi)  # (N, n, n)
+        self.A = self._inertia()  # (N, n, n)
         massless = np.linalg.matrix_rank(self.A).min() < self.q.shape[1]
         self.left_out = {
             *["gravity"] * absorbing,
             *["forward_dynamics", "forward_dynamics_derivatives"] * bool(massless),
         }
+
+    def _inertia(self) -> Array:
+        from symgen.derive.lagrange import by_columns  # CasADi, loaded late
+
+        return by_columns(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:
         """Gamma of the actuated joints, (..., n)."""

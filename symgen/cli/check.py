@@ -9,7 +9,7 @@ import typer
 
 from runtime.result_files import write_all
 from symgen.cli import options
-from symgen.cli.session import NEGATIVE, described_robot, reported_errors
+from symgen.cli.session import described_robot, end, reported_errors
 
 
 def check(
@@ -38,5 +38,4 @@ def check(
             text = dumps(claimed(regrouping, certificate), indent=1)
             write_all(claim.parent, {claim.name: text + "\n"})
         typer.echo(dumps(certificate.mapping(), indent=2) if json else str(certificate))
-    if not certificate.valid:
-        raise typer.Exit(NEGATIVE)
+    end(good=certificate.valid)

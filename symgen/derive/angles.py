@@ -186,22 +186,27 @@ def _angles(robot: Robot) -> Iterator[Expression]:
     yield from (a.argument for a in _calls(robot) if a.function in ("cos", "sin"))
 
 
-def _calls(robot: Robot) -> Iterator[Call]:
-    """Functions in lengths, gravity and the rows of elements."""
-    lengths = [e for f in robot.frames for e in (f.b, f.d, f.r0)]
-    rows = [
-        c
-        for e in robot.elements
-        for table in (e.along, e.form)
-        for row in table.values()
-        for c in row.values()
-    ]
-    pending = [*robot.gravity, *lengths, *rows, *robot.constraints.values()]
-    while pending:
-        for a in pending.pop().atoms:
+def rows_of(robot: Robot) -> list[Expression]:
+    """The entries of the rows and forms of elements."""
+    tables = [table for e in robot.elements for table in (e.along, e.form)]
+    return [c for table in tables for row in table.values() for c in row.values()]
+
+
+def atoms_of(robot: Robot) -> Iterator[str | Number | Call]:
+    """Atoms of lengths, gravity, relations and rows of elements, and of what functions among them
+    are of.
+    """
+    pending = [e for f in robot.frames for e in (f.b, f.d, f.r)]
+    pending += [*robot.gravity, *robot.constraints.values(), *rows_of(robot)]
+    for e in pending:
+        for a in (a for m in e.terms for a, _ in m):
+            yield a
             if isinstance(a, Call):
-                yield a
                 pending.append(a.argument)
+
+
+def _calls(robot: Robot) -> Iterator[Call]:
+    return (a for a in atoms_of(robot) if isinstance(a, Call))
 
 
 def radicands(robot: Robot) -> tuple[int, ...]:

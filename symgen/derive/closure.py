@@ -56,10 +56,6 @@ class Closure:
     def independent(self) -> tuple[int, ...]:
         return (*self.robot.joints, *self.tied)
 
-    @property
-    def is_trivial(self) -> bool:
-        return not self.robot.passive
-
     def formula(self, j: int) -> Expression:
         """q_j by q of the independent joints."""
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
@@ -80,13 +76,6 @@ class Closure:
             turn.append((i, int(c)))
         return tuple(turn), self.offset[j]
 
-    def linear(self, algebra: Algebra, j: int, value: Mapping[int, Scalar]) -> Scalar:
-        """sum_i n_ji value_i."""
-        total: Scalar = 0
-        for i, g in self.row[j].items():
-            total = add(total, mul(algebra.constant(g), value[i]))
-        return total
-
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
         """s = row q + c in the independent joints: its row, and its constant."""
         total: dict[int, Expression] = {}
@@ -102,7 +91,7 @@ class Closure:
 
     def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """G' Gamma_tree, by actuated joint."""
-        if self.is_trivial:
+        if not self.robot.passive:
             return dict(torque)
         total: dict[int, Scalar] = dict.fromkeys(self.independent, 0)
         for j, value in torque.items():

@@ -14,7 +14,9 @@ from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Scalar
 from symgen.derive.time_limit import require_time
-from symgen.description.robot import INERTIAL, Element, Robot, parameter
+from symgen.description.robot import INERTIAL, KINDS, PRISMATIC, Element, Robot, parameter
+
+UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
 
 
 def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
@@ -25,6 +27,15 @@ def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
 def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
     """{name: (element, key)}."""
     return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
+
+
+def unit(robot: Robot, name: str) -> str:
+    """Unit of a standard parameter, by family and by what its joint does."""
+    inertial = inertial_names(robot)
+    if name in inertial:
+        return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
+    e, j = element_names(robot)[name]
+    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
 
 
 def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:
@@ -46,15 +57,11 @@ def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:
     )
 
 
-def columns(
-    motion: Motion, names: Iterable[str], axes: Axes | None = None
-) -> dict[str, dict[int, Scalar]]:
-    """{name: {actuated joint: D}} of the standard parameters `names`; `axes` are those of `motion`,
-    where they have been carried outward already.
-    """
+def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:
+    """{name: {actuated joint: D}} of the standard parameters `names`."""
     robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
     inertial, elements = inertial_names(robot), element_names(robot)
-    axes = axes or Axes(motion)
+    axes = Axes(motion)
     algebra.section("Contributions that several joints share")
     result: dict[str, dict[int, Scalar]] = {}
     for name in names:

@@ -23,7 +23,6 @@ from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
-from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Matrix, Scalar, Vector, add, mul
 from symgen.description.robot import Robot
 
@@ -47,8 +46,6 @@ class Derivation:
         Rotations and positions of the frames.
     motion : Motion
         Velocities and accelerations of the links.
-    axes : Axes
-        Axes of the joints, and velocities per unit rate, in the frames of later links.
     chi : mapping
         Scalar of each standard parameter.
     torque : mapping
@@ -64,7 +61,6 @@ class Derivation:
     algebra: GraphAlgebra
     geometry: Geometry
     motion: Motion
-    axes: Axes
     chi: Mapping[str, Scalar]
     torque: Mapping[int, Scalar]
     columns: Mapping[str, Mapping[int, Scalar]]
@@ -97,9 +93,8 @@ def derived(robot: Robot, closure: Closure) -> Derivation:
             torque[i] = add(torque[i], mul(chi[name], x))
     actuated = closure.project(algebra, torque)
     last = [name for name in robot.parameters if name.rstrip("0123456789") in ABSORBED]
-    axes = Axes(motion)
-    D = columns(motion, [*(name for name in robot.parameters if name not in last), *last], axes)
+    D = columns(motion, [*(name for name in robot.parameters if name not in last), *last])
     poses = frame_poses(geometry)
     algebra.graph.seal()
     joints = {i: actuated.get(i, 0) for i in robot.joints}
-    return Derivation(robot, closure, algebra, geometry, motion, axes, chi, joints, D, poses)
+    return Derivation(robot, closure, algebra, geometry, motion, chi, joints, D, poses)

@@ -8,7 +8,7 @@ form B:             Gamma += c B x,    x = qdd | qd | q
 from __future__ import annotations
 
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import Scalar, add, mul
+from symgen.derive.scalar import Scalar, add, linear, mul
 from symgen.description.robot import Element, Form, parameter
 
 
@@ -40,10 +40,7 @@ def _along(motion: Motion, e: Element, j: int) -> Scalar:
     if e.kind == "offset":
         return 1
     row = e.along[j]
-    rate: Scalar = 0
-    for i, g in row.items():
-        x = _coordinate(motion, e.kind, i)
-        rate = rate if type(x) is int and x == 0 else add(rate, mul(motion.algebra.constant(g), x))
+    rate = linear(motion.algebra, row, {i: _coordinate(motion, e.kind, i) for i in row})
     if e.kind in ("viscous", "coulomb"):
         if len(row) > 1:
             rate = motion.algebra.name(rate, f"{motion.named('QP')}{parameter(e.family, j)}")

@@ -40,6 +40,7 @@ from symgen.derive.scalar import (
     apply,
     cross,
     dot,
+    linear,
     mul,
     scale,
     sub,
@@ -99,27 +100,16 @@ def potential_energy(d: Derivation) -> Scalar:
         if e.kind == "stiffness":
             total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, positions))))
         elif e.kind == "offset":
-            total = add(total, mul(d.chi[name], _along(d, e.along[j], positions)))
-    return total
-
-
-def _along(d: Derivation, row: Mapping[int, Expression], x: Mapping[int, Scalar]) -> Scalar:
-    """G x."""
-    total: Scalar = 0
-    for i, g in row.items():
-        total = add(total, mul(d.algebra.constant(g), x[i]))
+            total = add(total, mul(d.chi[name], linear(d.algebra, e.along[j], positions)))
     return total
 
 
 def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scalar:
     """(G x)**2, or x' B x."""
     if j in e.along:
-        s = _along(d, e.along[j], x)
+        s = linear(d.algebra, e.along[j], x)
         return mul(s, s)
-    total: Scalar = 0
-    for (i, m), b in e.form[j].items():
-        total = add(total, mul(d.algebra.constant(b), mul(x[i], x[m])))
-    return total
+    return linear(d.algebra, e.form[j], {(i, m): mul(x[i], x[m]) for i, m in e.form[j]})
 
 
 class UnitRate(Motion):

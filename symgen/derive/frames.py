@@ -7,7 +7,7 @@ differences of angles that a product of rotations has are there from the start.
 
 from __future__ import annotations
 
-from symgen.derive.geometry import Geometry, Rotation
+from symgen.derive.geometry import Geometry, Rotation, summed
 from symgen.derive.scalar import E3, ZERO3, Algebra, Matrix, Turn, Vector, cross, sub, vadd
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
@@ -94,10 +94,7 @@ class Frames:
     def _between(self, j: int, i: int) -> tuple[Turn, Expression]:
         """The angle of frame j less that of frame i."""
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
-        total = dict(turn)
-        for k, n in other:
-            total[k] = total.get(k, 0) - n
-        return tuple((k, n) for k, n in sorted(total.items()) if n), offset - other_offset
+        return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 
     def register_angles(self, algebra: Algebra) -> None:
         """Make the angle of every frame against every other one about the same direction an angle

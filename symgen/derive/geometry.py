@@ -25,6 +25,7 @@ from symgen.derive.scalar import (
     apply,
     apply_transposed,
     is_zero,
+    linear,
     mul,
     sub,
 )
@@ -138,7 +139,7 @@ class Geometry:
         self.P[j] = displacement(A, b, d, r)
         if parallel and f.ant:
             inner = self.carrier[f.ant]
-            turn, offset = _sum(self.turn[f.ant][0] + turn), self.turn[f.ant][1] + offset
+            turn, offset = summed(self.turn[f.ant][0] + turn), self.turn[f.ant][1] + offset
             self.carrier[j] = Carrier(inner.m, self._rotation(inner.rotation.A, turn, offset), turn)
         else:
             self.carrier[j] = Carrier(f.ant, self.rotation[j], turn)
@@ -152,7 +153,8 @@ class Geometry:
         """q_j of any moving joint, from the independent ones."""
         q = {i: self.algebra.q(i) for i in self.closure.row[j]}
         return add(
-            self.closure.linear(self.algebra, j, q), self.algebra.constant(self.closure.offset[j])
+            linear(self.algebra, self.closure.row[j], q),
+            self.algebra.constant(self.closure.offset[j]),
         )
 
     def from_carrier(self, j: int, v: Vector) -> Vector:
@@ -164,7 +166,7 @@ class Geometry:
         return i in self.robot.path(self.carrier[j].m)
 
 
-def _sum(turn: Turn) -> Turn:
+def summed(turn: Turn) -> Turn:
     """Equal joints of a turn added up; what cancels is left out."""
     total: dict[int, int] = {}
     for j, n in turn:

@@ -104,10 +104,10 @@ class Scalar:
     __rmul__ = __mul__
 
     def __truediv__(self, other: Scalar) -> Scalar | int:
-        return self.graph.mul(self, self.graph.inverse(other))
+        return self.graph.mul(self, self.graph.call(INV, other))
 
     def __rtruediv__(self, other: int) -> Scalar | int:
-        return self.graph.mul(self.graph.lift(other), self.graph.inverse(self))
+        return self.graph.mul(self.graph.lift(other), self.graph.call(INV, self))
 
     def __repr__(self) -> str:
         return f"{'-' if self.sign < 0 else ''}{self.node!r}"
@@ -159,10 +159,9 @@ class Graph:
         c = Fraction(c)
         if c in (0, 1, -1):
             return int(c)
-        s = self._scalar((CONST, abs(c)), CONST, (), abs(c), True)
-        return s if c > 0 else -s
+        return self.lift(c)
 
-    def lift(self, value: Scalar | int) -> Scalar:
+    def lift(self, value: Scalar | Fraction | int) -> Scalar:
         if isinstance(value, Scalar):
             return value
         c = Fraction(value)
@@ -205,28 +204,12 @@ class Graph:
         )
         return s if sign > 0 else -s
 
-    def cos(self, x: Scalar) -> Scalar:
-        return self._scalar((COS, x.node.index), COS, (_positive(x),), None, x.node.fixed)
-
-    def sin(self, x: Scalar) -> Scalar:
-        s = self._scalar((SIN, x.node.index), SIN, (_positive(x),), None, x.node.fixed)
-        return s if x.sign > 0 else -s
-
-    def sign(self, x: Scalar) -> Scalar:
-        s = self._scalar((SIGN, x.node.index), SIGN, (_positive(x),), None, x.node.fixed)
-        return s if x.sign > 0 else -s
-
-    def positive_part(self, x: Scalar) -> Scalar:
-        """max(x, 0)."""
-        return self._scalar((POS, x.node.index, x.sign), POS, (x,), None, x.node.fixed)
-
-    def sqrt(self, x: Scalar) -> Scalar:
-        return self._scalar((SQRT, x.node.index, x.sign), SQRT, (x,), None, x.node.fixed)
-
-    def inverse(self, x: Scalar) -> Scalar:
-        """1/x."""
-        s = self._scalar((INV, x.node.index), INV, (_positive(x),), None, x.node.fixed)
-        return s if x.sign > 0 else -s
+    def call(self, op: str, x: Scalar) -> Scalar:
+        """A function of one operand: cos is even; sin, sign and 1/x are odd."""
+        apart = op not in (POS, SQRT)
+        operand, kept = (_positive(x), 1) if apart else (x, x.sign)
+        s = self._scalar((op, x.node.index, kept), op, (operand,), None, x.node.fixed)
+        return -s if apart and op != COS and x.sign < 0 else s
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""

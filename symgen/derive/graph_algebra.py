@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from symgen.derive.graph import Graph, Symbol
+from symgen.derive.graph import COS, INV, POS, SIGN, SIN, SQRT, Graph, Symbol
 from symgen.derive.names import Names
 from symgen.derive.scalar import Scalar, Turn
 from symgen.description.expression import Expression, call, quarter_turns
@@ -47,15 +47,15 @@ class GraphAlgebra:
     def _call(self, function: str, argument: Expression) -> Scalar:
         x = self.graph.lift(self.constant(argument))
         if function in ("cos", "sin"):
-            value = self.graph.cos(x) if function == "cos" else self.graph.sin(x)
+            value = self.graph.call(function, x)
             self.angles[value.node.index] = (
                 (),
                 argument if value.sign > 0 or function == "cos" else -argument,
             )
             return value
         if function == "inv":
-            return self.graph.inverse(x)
-        root = self.graph.sqrt(x)
+            return self.graph.call(INV, x)
+        root = self.graph.call(SQRT, x)
         self.roots[root.node.index] = call("sqrt", argument)
         return root
 
@@ -75,7 +75,7 @@ class GraphAlgebra:
         while self.labels.setdefault(label, (turn, rest)) != (turn, rest):
             label += "b"  # the same joints with another constant
         self.graph.name(angle, "th" + label)
-        c, s = self.graph.cos(angle), self.graph.sin(angle)
+        c, s = self.graph.call(COS, angle), self.graph.call(SIN, angle)
         for value, letter in ((c, "C"), (s, "S")):
             backward = value.sign < 0
             self.angles[value.node.index] = (
@@ -107,12 +107,14 @@ class GraphAlgebra:
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
-        return self.graph.sign(rate)
+        return self.graph.call(SIGN, rate)
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
-        if when == "positive":
-            return self.graph.positive_part(self.graph.sign(rate)), self.graph.positive_part(rate)
-        return -self.graph.positive_part(-self.graph.sign(rate)), -self.graph.positive_part(-rate)
+        way = 1 if when == "positive" else -1
+        direction, speed = (
+            self.graph.call(POS, x * way) * way for x in (self.graph.call(SIGN, rate), rate)
+        )
+        return direction, speed
 
     def name(self, value: Scalar, name: str) -> Scalar:
         return self.graph.name(value, name)

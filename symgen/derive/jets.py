@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul, sub
+from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul, sub, turned
 from symgen.description.expression import Expression
 
 
@@ -65,9 +65,7 @@ class JetAlgebra:
 
     def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
         c, s = self.inner.cos_sin(turn, offset)
-        rate: Scalar = 0
-        for j, n in turn:
-            rate = add(rate, mul(self.inner.constant(Expression.number(n)), self._rate.get(j, 0)))
+        rate = turned(self.inner, turn, self._rate)
         if type(rate) is int and rate == 0:
             return Jet(c), Jet(s)
         cd, sd = -mul(s, rate), mul(c, rate)

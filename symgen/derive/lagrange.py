@@ -36,7 +36,7 @@ University, 1965.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -44,19 +44,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symgen.derive.loop_residual import newton
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
 from symgen.errors import DescriptionError
 
 Array = np.ndarray[Any, Any]
-NEWTON_STEPS, NEWTON_STEP, CLOSED = (
-    50,
-    0.5,
-    1e-11,
-)  # iterations, rad or m per iteration, defect of a closed loop
-SETTLED = 1e-15  # rad or m: further iterations change nothing
-ON_THE_WAY, FOLLOWED = 1e-6, 8  # the same on the way from `start`, and places on that way
+NEWTON_STEPS, CLOSED = 50, 1e-11  # iterations, defect of a closed loop
+SETTLED, FOLLOWED = 1e-15, 8  # defect where iterations end; places on the way from `start`
 # of the smallest singular value of the closure at `start`, over its largest: less is near a dead
 # point
 REGULAR = 0.05
@@ -221,32 +217,11 @@ class Lagrange:
         """Gamma, (..., n)."""
         return np.asarray((self.regressor(q, qd, qdd) @ np.asarray(chi)[..., None])[..., 0])
 
-    def gravity(self, q: Array, chi: Array) -> Array:
-        """dU/dq, (..., n): Gamma at rest without friction; gravity, offsets and springs."""
-        return self.torque(q, 0 * q, 0 * q, chi)
-
     def inertia_matrix(self, q: Array, chi: Array) -> Array:
-        """A = d2E/dqd2, (..., n, n): sum_j trace(d0Tj/dq_i Sigma_j d0Tj'/dq_l), and the inertias
-        along rows of elements.
+        """A = d2E/dqd2, (..., n, n): column i is Gamma for qdd_i = 1 from rest, less that at
+        rest.
         """
-        slope, robot, n = self.slopes(q), self.robot, np.shape(q)[-1]
-        value = {name: np.asarray(chi)[..., k] for k, name in enumerate(self.names)}
-        A = np.zeros((*np.shape(q), n))
-        for j in robot.links:
-            Sigma = sum(
-                value[parameter(name, j)][..., None, None] * unit
-                for name, unit in zip(INERTIAL, LINK, strict=True)
-            )
-            A += np.einsum(
-                "...iab,...bc,...lac->...il",
-                slope[..., j - 1, :, :],
-                Sigma,
-                slope[..., j - 1, :, :],
-            )
-        for e in robot.elements:
-            for j in e.keys if e.kind == "inertia" else ():
-                A += value[parameter(e.family, j)][..., None, None] * self._form(e, j)
-        return A
+        return by_columns(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
         """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame`
@@ -255,14 +230,7 @@ class Lagrange:
         j = frame or self.robot.frames[-1].j
         slope, R = self.slopes(q)[..., j - 1, :3, :], self.poses(q)[..., j - 1, :3, :3]
         W = slope[..., :3] @ np.swapaxes(R, -1, -2)[..., None, :, :]
-        return np.swapaxes(
-            np.concatenate(
-                [slope[..., 3], np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)],
-                axis=-1,
-            ),
-            -1,
-            -2,
-        )
+        return np.swapaxes(np.concatenate([slope[..., 3], _axial(W)], axis=-1), -1, -2)
 
     def acceleration(self, q: Array, qd: Array, qdd: Array, frame: int) -> Array:
         """Acceleration of the origin of `frame`, then angular acceleration wd from hat(wd) =
@@ -274,8 +242,7 @@ class Lagrange:
         rate = np.einsum("...iab,...i->...ab", self.slopes(q)[..., frame - 1, :3, :3], qd)
         second = _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, frame - 1, :3, :]
         W = second[..., :3] @ np.swapaxes(R, -1, -2) + rate @ np.swapaxes(rate, -1, -2)
-        angular = np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
-        return np.concatenate([second[..., 3], angular], axis=-1)
+        return np.concatenate([second[..., 3], _axial(W)], axis=-1)
 
     def potential_energy(self, q: Array, chi: Array) -> Array:
         """U of gravity, springs and offsets, (...)."""
@@ -313,13 +280,7 @@ class Lagrange:
         first = self._home[actuated] if self._home is not None else wanted
         for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
             x[..., actuated] = first + share * (wanted - first)
-            for _ in range(NEWTON_STEPS):
-                step = np.linalg.pinv(
-                    self._floats("loop_jacobian", x)[..., passive]
-                ) @ self._floats("loop", x)
-                x[..., passive] -= np.clip(step[..., 0], -NEWTON_STEP, NEWTON_STEP)
-                if np.abs(step[regular]).max(initial=0.0) < (SETTLED if share == 1 else ON_THE_WAY):
-                    break
+            x = newton(self._gap, x, passive, steps=NEWTON_STEPS, tolerance=SETTLED)
             if self._home is not None:
                 regular &= self._regularity(x, passive) > REGULAR * self._regularity(
                     self._home, passive
@@ -332,8 +293,12 @@ class Lagrange:
         xdd[..., passive] -= (inverse @ self._floats("loop_rate", x, xd))[
             ..., 0
         ]  # Jp qddp + Ja qdda + Jdot qd = 0
-        x[(np.abs(self._floats("loop", x)).max(axis=(-2, -1)) > CLOSED) | ~regular] = np.nan
+        x[(np.abs(self._gap(x)).max(axis=-1) > CLOSED) | ~regular] = np.nan
         return x, xd, xdd, G
+
+    def _gap(self, x: Array) -> Array:
+        """phi, (..., equations)."""
+        return self._floats("loop", x)[..., 0]
 
     def _regularity(self, x: Array, passive: list[int]) -> Array:
         """Smallest over largest singular value of the closure's derivatives by the passive
@@ -347,10 +312,16 @@ class Lagrange:
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
 
-    def actuated_inertia(self, q: Array, chi: Array) -> Array:
-        """G' A G at actuated q (..., n_a): (..., n_a, n_a)."""
-        x, _, _, G = self.motion(q, 0 * q, 0 * q)
-        return np.asarray(np.swapaxes(G, -1, -2) @ self.inertia_matrix(x, chi) @ G)
+
+def by_columns(torque: Callable[[Array], Array], q: Array) -> Array:
+    """A (..., n, n) of torques that are A qdd + b in qdd (..., n); q gives their shape."""
+    rest = torque(0 * q)
+    return np.stack([torque(0 * q + e) - rest for e in np.eye(q.shape[-1])], axis=-1)
+
+
+def _axial(W: Array) -> Array:
+    """w of hat(w), (..., 3)."""
+    return np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
 
 
 @lru_cache(maxsize=8)

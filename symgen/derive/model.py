@@ -97,8 +97,6 @@ class Model:
         What works in the place of a recursion that it does not have.
     denominator : str
         What its entries are still to be divided by, where the closed form says that apart.
-    steps : callable or None
-        Its entries by recursion, where that is another way than its closed form.
     result : str
         What emitted text calls the array; empty where no target has the function.
     symbolic : bool
@@ -125,7 +123,6 @@ class Model:
     meaning: str
     cases: Callable[[Derivation, Request], Iterable[Case]] | None
     result: str = ""
-    steps: Callable[[Derivation, Request], Iterable[Case]] | None = None
     symbolic: bool = True
     of_frames: bool = False
     symmetric: bool = False
@@ -161,16 +158,14 @@ class Model:
         d: Derivation,
         request: Request,
         rewrite: Rewrite | None = None,
-        by_steps: bool = False,
     ) -> Values:
         """The entries that may differ from zero, rewritten with what the request gives; over the
         graph of `rewrite`, of the same request, where several models share one.
         """
-        cases = self.steps if by_steps and self.steps else self.cases
-        assert cases is not None
+        assert self.cases is not None
         rewrite = rewrite or rewriting(d, request)
         entries = []
-        for case in cases(d, request):
+        for case in self.cases(d, request):
             values = rewrite.copied([e.value for e in case.entries], case.inputs, case.tag)
             entries += [
                 Entry(e.place, value, e.heading, e.comment)

@@ -138,21 +138,6 @@ def _jacobian(d: Derivation, r: Request) -> Iterator[Case]:
         yield Case([Entry((k, column), x) for column, x in enumerate(row.values())])
 
 
-def _carried_jacobian(d: Derivation, r: Request) -> Iterator[Case]:
-    """The same by recursion: axes Z and velocities V carried outward to frame `of`, then turned
-    into `frame`.
-    """
-    frames, axes = Frames(d.geometry), d.axes
-    columns = {
-        k: [frames.rotated(x[k, j], j, r.frame) for x in (axes.v, axes.z)]
-        for k, j in axes.z
-        if j == r.of
-    }
-    for k in range(6):
-        row = d.actuated({j: (*v, *w)[k] for j, (v, w) in columns.items()})
-        yield Case([Entry((k, column), x) for column, x in enumerate(row.values())])
-
-
 def _twist(d: Derivation, r: Request, linear: Vector, angular: Vector) -> list[Entry]:
     frames = Frames(d.geometry)
     both = (*frames.rotated(linear, r.of, r.frame), *frames.rotated(angular, r.of, r.frame))
@@ -255,7 +240,7 @@ MODELS = {
         Model(
             "jacobian", "J", ("q",), ("twist", "joints"), "m/s, rad/s by rad/s | m/s",
             "velocity of the origin of frame `of`, then its angular velocity, per joint rate, "
-            "in frame `frame`", _jacobian, result="J", steps=_carried_jacobian, of_frames=True,
+            "in frame `frame`", _jacobian, result="J", of_frames=True,
             page=2,
         ),
         Model(

@@ -34,9 +34,11 @@ from symgen.derive.scalar import (
     cross,
     dot,
     is_zero,
+    linear,
     mul,
     scale,
     sub,
+    turned,
     vadd,
 )
 from symgen.description.expression import Expression
@@ -107,11 +109,11 @@ class Motion:
 
     def qd(self, j: int) -> Scalar:
         """Velocity of any moving joint."""
-        return self.geometry.closure.linear(self.algebra, j, self._qd)
+        return linear(self.algebra, self.geometry.closure.row[j], self._qd)
 
     def qdd(self, j: int) -> Scalar:
         """Acceleration of any moving joint."""
-        return self.geometry.closure.linear(self.algebra, j, self._qdd)
+        return linear(self.algebra, self.geometry.closure.row[j], self._qdd)
 
     def vector(self, family: str, value: Vector, *indices: int) -> Vector:
         """The same vector, its components named family + component + indices."""
@@ -134,14 +136,8 @@ class Motion:
         self.algebra.section(f"Link {j}")
         carrier = geometry.carrier[j]
         inner, i = self.link[carrier.m], self.link[f.ant]
-        rate: Scalar = 0
-        acceleration: Scalar = 0
-        for k, multiple in carrier.turn:
-            n = self.algebra.constant(Expression.number(multiple))
-            rate, acceleration = (
-                add(rate, mul(n, self._qd[k])),
-                add(acceleration, mul(n, self._qdd[k])),
-            )
+        rate = turned(self.algebra, carrier.turn, self._qd)
+        acceleration = turned(self.algebra, carrier.turn, self._qdd)
         slides = (self.qd(j), self.qdd(j)) if f.sigma == PRISMATIC else (0, 0)
         if (
             inner is REST

@@ -13,36 +13,15 @@ z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its dire
 
 from __future__ import annotations
 
-from symgen.derive.newton_euler import LinkMotion, Motion
+from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
 from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, add, cross, dot, vadd
-from symgen.description.robot import FIXED, REVOLUTE
+from symgen.description.robot import FIXED, INERTIAL, REVOLUTE
 
 
 def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:
     """(F, N) of a link whose only inertial parameter is `parameter` = 1."""
-    (w1, w2, w3), DV, DW, U, a = m.wd, m.DV, m.DW, m.U, m.a
-    match parameter:
-        case "XX":
-            return ZERO3, (w1, DV[0][2], -DV[0][1])
-        case "XY":
-            return ZERO3, (-U[2][0], U[2][1], DW[2])
-        case "XZ":
-            return ZERO3, (U[1][0], DW[1], -U[1][2])
-        case "YY":
-            return ZERO3, (-DV[1][2], w2, DV[0][1])
-        case "YZ":
-            return ZERO3, (DW[0], -U[0][1], U[0][2])
-        case "ZZ":
-            return ZERO3, (DV[1][2], -DV[0][2], w3)
-        case "MX":
-            return (U[0][0], U[1][0], U[2][0]), (0, -a[2], a[1])
-        case "MY":
-            return (U[0][1], U[1][1], U[2][1]), (a[2], 0, -a[0])
-        case "MZ":
-            return (U[0][2], U[1][2], U[2][2]), (-a[1], a[0], 0)
-        case "M":
-            return a, ZERO3
-    raise KeyError(parameter)
+    K = dict.fromkeys(INERTIAL, 0) | {parameter: 1}
+    return force(m, K), moment(m, K)
 
 
 class Axes:

@@ -21,8 +21,6 @@ from symgen.derive.graph import (
     ADD,
     CONST,
     COS,
-    INV,
-    POS,
     SIGN,
     SIN,
     SQRT,
@@ -58,15 +56,7 @@ class Rewrite:
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
         self.source, self.inputs, self.algebra = source, inputs, GraphAlgebra(source.robot)
         self.algebra.labels |= source.labels  # one name, one angle, here as there
-        graph = self.graph = self.algebra.graph
-        self._calls = {
-            COS: graph.cos,
-            SIN: graph.sin,
-            SIGN: graph.sign,
-            POS: graph.positive_part,
-            SQRT: graph.sqrt,
-            INV: graph.inverse,
-        }
+        self.graph = self.algebra.graph
         self.draw = Draw(source.robot, 7, SAMPLES)
         self._rng = np.random.default_rng(5)
         self._drawn: dict[object, Array] = {}  # of symbols that are no states, and of directions
@@ -149,7 +139,7 @@ class Rewrite:
             case "sign" | "pos" if type(x[0]) is int and x[0] == 0:
                 return 0
         operand = graph.lift(x[0])
-        image = self._calls[node.op](operand)
+        image = graph.call(node.op, operand)
         if node.op in (COS, SIN):
             turn, offset = self.source.angles[node.index]
             if operand.sign < 0:

@@ -10,12 +10,13 @@ receives the name of each step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, TypeVar
 
 from symgen.description.expression import Expression
 from symgen.description.robot import Robot
 
+K = TypeVar("K")
 Scalar = Any
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]  # rows
@@ -122,6 +123,17 @@ def dot(u: Sequence[Scalar], v: Sequence[Scalar]) -> Scalar:
     for a, b in zip(u, v, strict=True):
         total = add(total, mul(a, b))
     return total
+
+
+def linear(algebra: Algebra, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
+    """sum_i row_i x_i."""
+    return dot([algebra.constant(g) for g in row.values()], [x[i] for i in row])
+
+
+def turned(algebra: Algebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
+    """sum n_j x_j of a turn; 0 for a joint that x leaves out."""
+    row = {j: Expression.number(n) for j, n in turn}
+    return linear(algebra, row, {j: x.get(j, 0) for j in row})
 
 
 def cross(u: Vector, v: Vector) -> Vector:

@@ -10,12 +10,11 @@ no sample stands before the loops.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 
-from symgen.derive.graph import CONST, COS, SIGN, SIN, SQRT, SYM, Node, Scalar
+from symgen.derive.graph import CONST, COS, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
 from symgen.description.namespace import Namespace
-from symgen.emit.printers import Language, Section, Text
+from symgen.emit.printers import Language, Section, Text, under_titles
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto
 if inline int long register restrict return short signed sizeof static struct switch typedef union
@@ -57,13 +56,19 @@ class CText(Text):
         names: Namespace,
         labels: Sequence[str],
     ) -> None:
-        self.fixed: tuple[str, ...] = ()
-        self.angles: tuple[str, ...] = ()
-        self.trigonometry_of: dict[str, str] = {}  # name: call
-        self.trigonometry_inputs: set[str] = set()
-        self.main_inputs: set[str] = set()
-        self.outputs = [o.node for o in outputs if isinstance(o, Scalar)]
+        self._calls = [n for n in reachable(outputs) if n.op in (COS, SIN) and not n.fixed]
+        self._under = set(_needed([x.node for n in self._calls for x in n.operands]))
+        self._main = set(_needed([o.node for o in outputs if isinstance(o, Scalar)]))
         super().__init__(outputs, headings, names, labels)
+        lines = [n for n in self.nodes if n.index in self.named]
+        self.fixed = tuple(self._line(n) for n in lines if n.fixed)
+        self.angles = tuple(self._line(n) for n in lines if n.index in self._under and not n.fixed)
+        self.trigonometry_of = {  # name: call
+            self.called[n.index]: self._body(self._as_named(n)) for n in self._calls
+        }
+        symbols = {n.index: str(n.value) for n in self.nodes if n.op == SYM}
+        self.trigonometry_inputs = {symbols[i] for i in self._under & symbols.keys()}
+        self.main_inputs = {symbols[i] for i in self._main & symbols.keys()}
 
     def _has_line(self, node: Node) -> bool:
         return super()._has_line(node) or (node.op in (COS, SIN) and not node.fixed)
@@ -71,30 +76,14 @@ class CText(Text):
     def _line(self, node: Node) -> str:
         return f"const double {super()._line(node)};"
 
-    def _sections(self, headings: Sequence[tuple[int, str]]) -> tuple[Section, ...]:
-        calls = [n for n in self.nodes if n.op in (COS, SIN) and not n.fixed]
-        under = set(_needed([x.node for n in calls for x in n.operands]))
-        main = set(_needed(self.outputs))
-        self.fixed = tuple(self._line(n) for n in self.nodes if n.index in self.named and n.fixed)
-        self.angles = tuple(
-            self._line(n) for n in self.nodes if n.index in self.named & under and not n.fixed
-        )
-        self.trigonometry_of = {self.called[n.index]: self._body(self._as_named(n)) for n in calls}
-        symbols = {n.index: str(n.value) for n in self.nodes if n.op == SYM}
-        self.trigonometry_inputs = {symbols[i] for i in under & symbols.keys()}
-        self.main_inputs = {symbols[i] for i in main & symbols.keys()}
-        marks = [(0, "Inputs"), *headings]
-        starts = [start for start, _ in marks]
-        # A title may come again further down: the order of the lines must stay.
-        lines: dict[tuple[int, str], list[str]] = {}
-        for node in self.nodes:
-            if node.index in self.named & main and not node.fixed and node.op not in (COS, SIN):
-                mark = bisect_right(starts, node.index) - 1
-                lines.setdefault(
-                    (-1, "Angles") if node.index in under else (mark, marks[mark][1]), []
-                ).append(self._line(node))
-        return tuple(
-            Section(title, tuple(under_title)) for (_, title), under_title in lines.items()
+    def _sections(self) -> tuple[Section, ...]:
+        lines = [
+            n
+            for n in self.nodes
+            if n.index in self.named & self._main and not n.fixed and n.op not in (COS, SIN)
+        ]
+        return under_titles(
+            ("Angles" if n.index in self._under else self._title(n), self._line(n)) for n in lines
         )
 
 

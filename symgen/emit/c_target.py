@@ -9,18 +9,18 @@ iteration stays in the NumPy module.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from symgen.derive.graph import Scalar
-from symgen.derive.model import Entry, Model
+from symgen.derive.model import Model
 from symgen.description.namespace import Namespace
 from symgen.emit.c_printer import CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
-from symgen.emit.printers import Section, Text
-from symgen.emit.python_target import label
+from symgen.emit.printers import Section, under_titles
+from symgen.emit.python_target import label, signature
 from symgen.emit.render import WIDTH, laid_out
-from symgen.emit.spec import STATES, Function, ModuleSpec
+from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION
 
 ABI = 2
@@ -35,57 +35,6 @@ RESULTS = (
 )  # axes of the models that have a kernel: torques and matrices over the joints
 
 
-@dataclass(frozen=True)
-class Kernel:
-    """One function of the C file.
-
-    Attributes
-    ----------
-    function : Function
-        What it evaluates.
-    text : Text
-        Its printed values.
-    result : str
-        The array of a tile that it fills.
-    used : tuple of str
-        Among q, qd, qdd: those that it reads.
-    needs_X, needs_constants : bool
-        Whether it reads base parameters and constants.
-    before : tuple of str
-        Lines before its loops.
-    trigonometry : tuple of Section
-        Loops of their own: compilers merge sin(x) and cos(x) of one loop into a call that has no
-        vector form.
-    calls : int
-        Number of sines and cosines.
-    sections : tuple of Section
-        The loop over a tile.
-    rows : tuple of str
-        {row of the store, signal, sign}, as source.
-    entries, count, computed : int
-        Entries of the store, those that the function writes, and distinct signals.
-    """
-
-    function: Function
-    text: Text
-    result: str
-    used: tuple[str, ...]
-    needs_X: bool
-    needs_constants: bool
-    before: tuple[str, ...]
-    trigonometry: tuple[Section, ...]
-    calls: int
-    sections: tuple[Section, ...]
-    rows: tuple[str, ...]
-    entries: int
-    count: int
-    computed: int
-
-    @property
-    def model(self) -> Model:
-        return self.function.model
-
-
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The C file of `spec`. Same robot file, same version: same bytes."""
     robot = spec.robot
@@ -95,11 +44,11 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         for f in spec.functions.values()
         if {*f.model.axes} <= {*RESULTS}
     ]
-    most = max(kernel.computed for kernel in kernels)
+    most = max(kernel["computed"] for kernel in kernels)
     lines = [
         line
         for kernel in kernels
-        for section in (*kernel.sections, Section("", kernel.before))
+        for section in (*kernel["sections"], Section("", kernel["before"]))
         for line in section.lines
     ]
     return laid_out(
@@ -117,8 +66,8 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "tile": 16
             if 8 * 16 * most <= SCRATCH
             else 8,  # the rows of a short tile stay in the first cache
-            "kernels": [_layout(spec, kernel) for kernel in kernels],
-            "signals": _signals_layout(spec, kernels[0]),
+            "kernels": kernels,
+            "signals": _signals_layout(spec, spec.functions["regressor"].model),
             "helpers": {
                 name: any(f"{name}(" in line for line in lines)
                 for name in ("sign", "above", "below")
@@ -133,7 +82,12 @@ def _comment(text: str) -> str:
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", shown)
 
 
-def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> Kernel:
+def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
+    """A function over a tile: its lines before the loops, those of sines and cosines, each a loop
+    of its own (compilers merge sin(x) and cos(x) of one loop into a call that has no vector form),
+    those of the loop over a tile; its rows {row of the store, signal, sign}, the first `count` of
+    them written by the function; its C signatures.
+    """
     robot, model, result = spec.robot, f.model, names.own(f.model.result)
     entries = [
         e
@@ -146,11 +100,17 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> Kernel:
         names,
         [label(f, e) for e in entries],
     )
-    signals = Signals(f, entries)
-    under: dict[str, list[str]] = {}  # heading: lines
-    for k, (heading, value, comments) in enumerate(signals.computed):
-        lines = _result(result, k, text.expression(value), comments)
-        under.setdefault(heading, []).extend(lines)
+    distinct = signals(f, entries)
+    results = under_titles(
+        (e.heading, line)
+        for k, e in enumerate(distinct.entries)
+        for line in _result(result, k, text.expression(e.value), e.comment)
+    )
+    width = f.shape[-1]
+    rows = [
+        f"{{{sum(k * width for k in outer) + last}, {signal}, {sign}}}"
+        for (*outer, last), signal, sign in distinct.places
+    ]
     independent = spec.derivation.closure.independent
     place = {
         f"{letter}{j}": (state, k)
@@ -178,73 +138,45 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> Kernel:
     ]
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
     recalled = [f"const double {called} = T[{k}][t];" for k, (called, _) in enumerate(trigonometry)]
-    results = (Section(title, tuple(lines)) for title, lines in under.items())
     trigonometry_loops = tuple(
         Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines
     )
     sections = [Section("Inputs", (*inputs, *recalled)), *text.sections, *results]
     read = text.trigonometry_inputs | text.main_inputs
-    return Kernel(
-        function=f,
-        text=text,
-        result=result,
-        used=tuple(s for s in model.states if any(place[x][0] == s for x in read if x in place)),
-        needs_X=bool(parameters),
-        needs_constants=bool(constants),
-        before=(*constants, *parameters, *text.fixed),
-        trigonometry=trigonometry_loops,
-        calls=len(trigonometry),
-        sections=tuple(s for s in sections if s.lines),
-        rows=tuple(packed([f"{{{row}, {signal}, {sign}}}" for row, signal, sign in signals.rows])),
-        entries=len(signals.rows),
-        count=len(signals.rows)
-        - signals.constant
-        * (model.name == "regressor"),  # its store holds constants from the start
-        computed=len(signals.computed),
-    )
-
-
-class Signals:
-    """The distinct rows of a result, up to sign: `rows` of the store as (row, signal, sign), the
-    `constant` last of them numbers.
-    """
-
-    def __init__(self, f: Function, entries: Sequence[Entry]) -> None:
-        width = f.shape[-1]
-        self.computed: list[tuple[str, Scalar | int, list[str]]] = []  # heading, value, comments
-        self.rows: list[tuple[int, int, int]] = []
-        first: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, sign
-        numbers = [e for e in entries if not isinstance(e.value, Scalar)]
-        self.constant = len(numbers)
-        for entry in sorted(entries, key=lambda e: not isinstance(e.value, Scalar)):
-            value = entry.value
-            key = (
-                ("node", value.node.index) if isinstance(value, Scalar) else ("number", abs(value))
-            )
-            own = value.sign if isinstance(value, Scalar) else -1 if value < 0 else 1
-            signal, sign = first.setdefault(key, (len(self.computed), own))
-            if signal == len(self.computed):
-                self.computed.append((entry.heading, value, []))
-            self.computed[signal][2].append(entry.comment)
-            for *outer, last in f.places(entry):
-                self.rows.append((sum(k * width for k in outer) + last, signal, own * sign))
+    used = [s for s in model.states if any(place[x][0] == s for x in read if x in place)]
+    laid: dict[str, Any] = {
+        "name": model.name,
+        "text": text,
+        "result": result,
+        "used": used,
+        "before": (*constants, *parameters, *text.fixed),
+        "trigonometry": trigonometry_loops,
+        "calls": len(trigonometry),
+        "sections": [s for s in sections if s.lines],
+        "rows": packed(rows),
+        "entries": len(rows),
+        "count": len(rows) - distinct.constant * model.by_columns,  # its store holds constants
+        "computed": len(distinct.entries),
+    }
+    given = {"X": parameters, "constants": constants}
+    return laid | _signatures(spec, f, laid, [name for name, lines in given.items() if lines])
 
 
 def _input(name: str, state: str, k: int) -> str:
     return f"const double {name} = {state}[{k}][t];"
 
 
-def _result(result: str, k: int, expression: str, comments: Sequence[str]) -> list[str]:
+def _result(result: str, k: int, expression: str, comment: str) -> list[str]:
     """An entry of a tile, its comment behind it, or before it where both are too long for a
     line.
     """
-    line, comment = f"{result}[{k}][t] = {expression};", ", ".join(c for c in comments if c)
+    line = f"{result}[{k}][t] = {expression};"
     both = f"{line:<64}  /* {comment} */" if comment else line
     return [both] if len(both) <= WIDTH - 8 or not comment else [f"/* {comment} */", line]
 
 
-def _header(spec: ModuleSpec, kernels: Sequence[Kernel]) -> list[str]:
-    lines = header(spec, {k.model.name: k.text for k in kernels}, formulas=True)
+def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]:
+    lines = header(spec, {k["name"]: k["text"] for k in kernels}, formulas=True)
     so = f"{spec.robot.name}.c -o {spec.robot.name}.so -lm"
     return [
         *lines[: lines.index("Cost per sample") - 1],
@@ -273,37 +205,28 @@ def _header(spec: ModuleSpec, kernels: Sequence[Kernel]) -> list[str]:
     ]
 
 
-def _layout(spec: ModuleSpec, k: Kernel) -> dict[str, object]:
-    """A kernel with its C signatures written out."""
-    n, model = len(spec.robot.joints), k.model
+def _signatures(
+    spec: ModuleSpec, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
+) -> dict[str, object]:
+    """A kernel's C signatures; `needs` of X and constants."""
+    n, model = len(spec.robot.joints), f.model
+    used, filled = laid["used"], f"[{laid['computed']}][TILE]"
     pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
-    given = ["const double *restrict X"] * k.needs_X + [
-        "const double *restrict constants"
-    ] * k.needs_constants
     tile = [
-        *(f"double {s}[restrict {n}][TILE]" for s in k.used),
-        *given,
-        f"double {k.result}[restrict {k.computed}][TILE]",
+        *(f"double {s}[restrict {n}][TILE]" for s in used),
+        *(f"const double *restrict {name}" for name in needs),
+        f"double {laid['result']}[restrict {laid['computed']}][TILE]",
     ]
-    arguments = (
-        [f"{s}_tile" for s in k.used]
-        + ["X"] * k.needs_X
-        + ["constants"] * k.needs_constants
-        + [k.result]
-    )
     own = ["int64_t N", *(f"const double *{p}" for p in pointers), "double *S", "int32_t flags"]
     partly = "; only rows that are not constant" if model.by_columns else ""
-    shape = ", ".join(map(str, k.function.shape))
-    summary = f"{model.summary} S has shape ({shape}, N){partly}."
+    shape = ", ".join(map(str, f.shape))
     return {
-        **vars(k),
-        "name": model.name,
-        "summary": f"/* {summary} */",
+        "summary": f"/* {model.summary} S has shape ({shape}, N){partly}. */",
         "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", tile),
-        "tile_arguments": ", ".join(arguments),
+        "tile_arguments": ", ".join([*(f"{s}_tile" for s in used), *needs, laid["result"]]),
         "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
         "scratch": ", ".join(
-            [*(f"{s}_tile[{n}][TILE]" for s in k.used), f"{k.result}[{k.computed}][TILE]"]
+            [*(f"{s}_tile[{n}][TILE]" for s in used), f"{laid['result']}{filled}"]
         ),
         "missing": _missing([*pointers, "S"]),
     }
@@ -313,9 +236,9 @@ def _missing(pointers: Sequence[str]) -> str:
     return " || ".join(f"{p} == NULL" for p in pointers)
 
 
-def _signals_layout(spec: ModuleSpec, regressor: Kernel) -> dict[str, object]:
+def _signals_layout(spec: ModuleSpec, regressor: Model) -> dict[str, object]:
     """The function that gives the distinct signals of the regressor, with its table of entries."""
-    states = regressor.model.states
+    states = regressor.states
     pointers = [f"const double *{s}" for s in states]
     own = [
         "int64_t m",
@@ -329,13 +252,3 @@ def _signals_layout(spec: ModuleSpec, regressor: Kernel) -> dict[str, object]:
         "prototype": signature(f"int32_t {spec.robot.name}_signals", own),
         "missing": _missing([*states, "constants", "U"]),
     }
-
-
-def signature(name: str, parameters: Sequence[str]) -> str:
-    """A C function with its parameters, on as few lines as they need."""
-    flat = f"{name}({', '.join(parameters)})"
-    return (
-        flat
-        if len(flat) < WIDTH
-        else "\n".join(packed(parameters)).join((f"{name}(\n", ")")).replace(",)", ")")
-    )

@@ -17,10 +17,7 @@ from symgen.emit.printers import CASADI, Section
 from symgen.emit.python_target import Block, blocks_of, broken, constants_of, context, listed
 from symgen.emit.render import laid_out
 from symgen.emit.spec import ModuleSpec
-from symgen.regroup.formula import Python
 from symgen.regroup.regrouping import sign_conditions
-
-LANGUAGE = Python("ca")
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -28,7 +25,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     robot, regrouping = spec.robot, spec.regrouping
     blocks = blocks_of(spec, CASADI)
     what = "base parameters, regressor, dynamics as CasADi functions"
-    values = context(spec, command, LANGUAGE, "ca.SX", blocks, what=what)
+    values = context(spec, command, CASADI, "ca.SX", blocks, what=what)
     coefficients = [c.symbols for b in regrouping.base for c in b.combination.values()]
     coefficients += [ratio.symbols for _, ratio, _ in sign_conditions(regrouping)]
     dynamics = {*blocks["inertia_matrix"].arguments, *blocks["bias"].arguments, "tau"}

@@ -9,12 +9,12 @@ from textwrap import wrap
 from typing import Any
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import element_names
+from symgen.derive.columns import element_names, unit
 from symgen.derive.names import FAMILIES, families_of
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.printers import Text
 from symgen.emit.render import WIDTH
-from symgen.emit.spec import ModuleSpec, unit
+from symgen.emit.spec import ModuleSpec
 from symgen.regroup.regrouping import Regrouping
 
 COLUMNS = ("j", "ant", "mu", "sigma", "gamma", "b", "alpha", "d", "theta", "r")

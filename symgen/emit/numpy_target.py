@@ -13,10 +13,8 @@ from symgen.emit.printers import NUMPY, Section
 from symgen.emit.python_target import Block, blocks_of, broken, context, element_lines
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import Function, ModuleSpec
-from symgen.regroup.formula import Python
 
 BLOCK = 4096  # samples
-LANGUAGE = Python("np")
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -28,7 +26,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     return laid_out(
         "module.py",
         {
-            **context(spec, command, LANGUAGE, "np.ndarray", blocks),
+            **context(spec, command, NUMPY, "np.ndarray", blocks),
             "size": BLOCK,
             "turn": loop_system(spec.robot).turn() if spec.tied else None,
             "joint": spec.robot.joints[0],
@@ -36,7 +34,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "data": [*literal("LINKS", spec.robot.links), *data(spec)],
             "slides": slides,
             "store_constants": list(constant_entries(spec.functions["regressor"], "zeros")),
-            "elements": element_lines(spec.robot, LANGUAGE),
+            "elements": element_lines(spec.robot, NUMPY),
             "evaluated": {name: list(_evaluation(spec, b)) for name, b in blocks.items()},
             "blocks": [_laid_out(spec, b) for b in blocks.values() if b.function.computed],
         },

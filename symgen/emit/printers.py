@@ -9,10 +9,13 @@ exactly once.
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import groupby
+from operator import itemgetter
 from string import ascii_lowercase
 
 from symgen.derive.graph import (
@@ -29,7 +32,7 @@ from symgen.derive.graph import (
     Scalar,
     reachable,
 )
-from symgen.description.expression import decimal
+from symgen.description.expression import Expression, decimal
 from symgen.description.namespace import Namespace
 
 SAYABLE = 3  # factors of a name that is made of them
@@ -67,6 +70,13 @@ class Language:
     number: Callable[[Fraction], str] = number
     lift: str = ""
 
+    def expression(self, e: Expression) -> str:
+        """A constant expression, or one linear in joint positions."""
+        text = re.sub(
+            r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}({self.lift}", str(e)
+        )
+        return re.sub(r"\bpi\b", self.pi, text)
+
 
 def _calls(package: str) -> dict[str, str]:
     return {op: f"{package}{op}" for op in (COS, SIN, SIGN, SQRT)}
@@ -91,6 +101,14 @@ class Section:
 
     title: str
     lines: tuple[str, ...]
+
+
+def under_titles(lines: Iterable[tuple[str, str]]) -> tuple[Section, ...]:
+    """Sections of (title, line): a title comes again where others stand between its lines."""
+    return tuple(
+        Section(title, tuple(line for _, line in group))
+        for title, group in groupby(lines, key=itemgetter(0))
+    )
 
 
 class Text:
@@ -130,7 +148,8 @@ class Text:
                 self.called[node.index] = self._symbol(node)
         self.named = {n.index for n in self.nodes if n.op not in (SYM, CONST) and self._has_line(n)}
         self._assign_names(outputs, labels)
-        self.sections = self._sections(headings)
+        self._marks = [(0, "Inputs"), *headings]
+        self.sections = self._sections()
 
     def _uses(self, outputs: Sequence[Scalar | int]) -> Iterator[Scalar]:
         for node in self.nodes:
@@ -147,16 +166,6 @@ class Text:
     def inputs(self) -> set[str]:
         """Names of the symbols that the outputs need, as the derivation has them."""
         return {str(node.value) for node in self.nodes if node.op == SYM}
-
-    @property
-    def operations(self) -> tuple[int, int]:
-        """(multiplications, additions) in the text."""
-        return sum(n.op == MUL for n in self.nodes), sum(n.op == ADD for n in self.nodes)
-
-    @property
-    def trigonometry(self) -> tuple[int, int]:
-        """(sines, cosines) in the text."""
-        return sum(n.op == SIN for n in self.nodes), sum(n.op == COS for n in self.nodes)
 
     def _symbol(self, node: Node) -> str:
         kind, name = node.value
@@ -238,35 +247,22 @@ class Text:
 
     # --- lines ---
 
-    def _sections(self, headings: Sequence[tuple[int, str]]) -> tuple[Section, ...]:
-        marks = [(0, "Inputs"), *headings]
-        sections: list[Section] = []
-        fixed = [n for n in self.nodes if n.index in self.named and n.fixed]
-        if fixed:
-            sections.append(Section("Constants", tuple(map(self._line, fixed))))
+    def _sections(self) -> tuple[Section, ...]:
         circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
         trigonometry = {n.index for n in reachable(circular)}
-        angles = [
-            n
-            for n in self.nodes
-            if n.index in self.named and not n.fixed and n.index in trigonometry
-        ]
-        if angles:
-            sections.append(Section("Trigonometry", tuple(map(self._line, angles))))
-        done = {n.index for n in fixed + angles}
-        starts = [start for start, _ in marks]
-        by_mark: dict[int, list[str]] = {}
-        for node in self.nodes:
-            if node.index in self.named and node.index not in done:
-                by_mark.setdefault(bisect_right(starts, node.index) - 1, []).append(
-                    self._line(node)
-                )
-        for k, lines in by_mark.items():
-            if sections and sections[-1].title == marks[k][1]:
-                sections[-1] = Section(marks[k][1], sections[-1].lines + tuple(lines))
-            else:
-                sections.append(Section(marks[k][1], tuple(lines)))
-        return tuple(sections)
+
+        def place(node: Node) -> int:
+            return 0 if node.fixed else 1 if node.index in trigonometry else 2
+
+        def title(node: Node) -> str:
+            return ("Constants", "Trigonometry", self._title(node))[place(node)]
+
+        named = sorted((n for n in self.nodes if n.index in self.named), key=place)
+        return under_titles((title(n), self._line(n)) for n in named)
+
+    def _title(self, node: Node) -> str:
+        """The heading under which the derivation made a node."""
+        return self._marks[bisect_right(self._marks, node.index, key=itemgetter(0)) - 1][1]
 
     def _line(self, node: Node) -> str:
         return f"{self.called[node.index]} = {self._body(self._as_named(node))}"

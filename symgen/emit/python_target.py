@@ -17,10 +17,9 @@ from symgen.description.expression import Expression
 from symgen.description.namespace import Namespace
 from symgen.description.robot import FIXED, Robot
 from symgen.emit.header import header, packed, plain, wrapped
-from symgen.emit.printers import Language, Section, Text
+from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.render import WIDTH
 from symgen.emit.spec import STATES, Function, ModuleSpec
-from symgen.regroup.formula import Python
 from symgen.regroup.regrouping import sign_conditions
 from symgen.version import VERSION
 
@@ -66,12 +65,12 @@ class Block:
 
     def results(self, target: Callable[[Sequence[int]], str]) -> list[Section]:
         """Assignments of the computed entries under their headings; `target` of a place."""
-        lines: dict[str, list[str]] = {}
+        lines = []
         for entry in self.function.computed:
             targets = " = ".join(map(target, self.function.places(entry)))
             line = f"{targets} = {self.text.expression(entry.value)}\t{entry.comment}"
-            lines.setdefault(entry.heading, []).append(line)
-        return [Section(heading, aligned(under)) for heading, under in lines.items()]
+            lines.append((entry.heading, line))
+        return [Section(s.title, aligned(s.lines)) for s in under_titles(lines)]
 
 
 def blocks_of(
@@ -166,7 +165,7 @@ def _bracketed(line: str) -> str:
 def context(
     spec: ModuleSpec,
     command: str | None,
-    language: Python,
+    language: Language,
     array: str,
     blocks: Mapping[str, Block],
     quote: str = "",
@@ -212,7 +211,9 @@ def context(
             [name if name in read else "_" for name in robot.parameters], "standard"
         ),
         "formulas": broken(
-            f"{b.name} = {language.formula(b.formula)}" for b in regrouping.base if b.name != b.own
+            f"{b.name} = {b.formula.text(language.expression)}"
+            for b in regrouping.base
+            if b.name != b.own
         ),
         "conditions": [
             (
@@ -264,7 +265,7 @@ class Heads:
         return signature(f"def {name}", parameters, f" -> {self.hint(returns or self.array)}:")
 
 
-def signature(start: str, parameters: Sequence[str], end: str) -> str:
+def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
     """`start(parameters)end`, on as few lines as it needs."""
     flat = f"{start}({', '.join(parameters)}){end}"
     if len(flat) <= WIDTH:
@@ -290,12 +291,12 @@ def _symbols(expressions: Iterable[Expression]) -> set[str]:
     return {name for e in expressions for name in e.symbols}
 
 
-def source(language: Python, e: Expression) -> str:
+def source(language: Language, e: Expression) -> str:
     """A constant expression as source, numbers as floats."""
     return repr(float(e.constant)) if e.constant is not None else language.expression(e)
 
 
-def _paths(robot: Robot, closure: Closure, language: Python) -> list[str]:
+def _paths(robot: Robot, closure: Closure, language: Language) -> list[str]:
     """Entries {frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each
     frame and how the actuated ones move them.
     """
@@ -313,7 +314,7 @@ def _paths(robot: Robot, closure: Closure, language: Python) -> list[str]:
 
 
 def _passive_rows(
-    robot: Robot, closure: Closure, language: Python
+    robot: Robot, closure: Closure, language: Language
 ) -> list[tuple[str, list[tuple[int, str]]]]:
     """Each passive joint over the independent ones: constant, then (column, rate), as source."""
     rows = []
@@ -325,7 +326,7 @@ def _passive_rows(
     return rows
 
 
-def element_lines(robot: Robot, language: Python) -> list[str]:
+def element_lines(robot: Robot, language: Language) -> list[str]:
     """Entries {parameter: (kind, direction of motion, row or form)} of the elements, as source."""
     entries = []
     for name, (e, j) in element_names(robot).items():

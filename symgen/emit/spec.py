@@ -4,8 +4,8 @@ each of them reads, its constant entries, its costs. Made once, printed by every
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 from symgen.derive.columns import element_names, inertial_names
@@ -14,7 +14,7 @@ from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, r
 from symgen.derive.model import Entry, Model, Place, Request, Values, labels
 from symgen.derive.models import MODELS
 from symgen.description.namespace import Namespace
-from symgen.description.robot import KINDS, PRISMATIC, Robot
+from symgen.description.robot import Robot
 from symgen.regroup.regrouping import Regrouping, regroup
 
 STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}  # argument: family of its components
@@ -106,6 +106,47 @@ class Function:
 
 
 @dataclass(frozen=True)
+class Signals:
+    """The distinct entries of a function up to sign, those of states before those that are 1.
+
+    Attributes
+    ----------
+    entries : tuple of Entry
+        The first of each, its sign as it stands there, with the comments of all.
+    places : tuple of (place, signal, sign)
+        Every place of the array that is not zero.
+    constant : int
+        How many of them, the last, are numbers.
+    """
+
+    entries: tuple[Entry, ...]
+    places: tuple[tuple[Place, int, int], ...]
+    constant: int
+
+
+def signals(f: Function, entries: Sequence[Entry]) -> Signals:
+    """The signals of some entries of a function; numbers among them are 0, 1 and -1."""
+    number: dict[tuple[str, int], tuple[int, int]] = {}  # node or number: signal, its sign
+    distinct: list[Entry] = []
+    places = []
+    for entry in sorted(entries, key=lambda e: isinstance(e.value, int)):
+        value = entry.value
+        if isinstance(value, int):
+            key, own = ("number", abs(value)), -1 if value < 0 else 1
+        else:
+            key, own = ("node", value.node.index), value.sign
+        signal, sign = number.setdefault(key, (len(distinct), own))
+        if signal == len(distinct):
+            distinct.append(entry)
+        elif entry.comment:
+            comment = f"{distinct[signal].comment}, {entry.comment}".removeprefix(", ")
+            distinct[signal] = replace(distinct[signal], comment=comment)
+        places += [(place, signal, own * sign) for place in f.places(entry)]
+    constant = sum(isinstance(e.value, int) for e in entries)
+    return Signals(tuple(distinct), tuple(places), constant)
+
+
+@dataclass(frozen=True)
 class ModuleSpec:
     """The functions of a robot over its base parameters."""
 
@@ -183,13 +224,3 @@ def is_inertial_or_actuator(robot: Robot) -> Callable[[str], bool]:
     """Whether a standard parameter is inertial or the inertia of an actuator."""
     inertial, elements = inertial_names(robot), element_names(robot)
     return lambda own: own in inertial or elements[own][0].kind == "inertia"
-
-
-def unit(robot: Robot, name: str) -> str:
-    """Unit of a standard parameter, by family and by what its joint does."""
-    inertial = inertial_names(robot)
-    if name in inertial:
-        family = inertial[name][0]
-        return "kg" if family == "M" else "kg*m" if family.startswith("M") else "kg*m**2"
-    e, j = element_names(robot)[name]
-    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]

@@ -21,10 +21,8 @@ from symgen.emit.header import data, literal, tables
 from symgen.emit.printers import ARRAYS, Section
 from symgen.emit.python_target import Block, aligned, blocks_of, broken, context
 from symgen.emit.render import WIDTH, laid_out
-from symgen.emit.spec import Function, ModuleSpec
-from symgen.regroup.formula import Python
+from symgen.emit.spec import Function, ModuleSpec, signals
 
-LANGUAGE = Python("xp", "zero + ")
 Coefficients = tuple[tuple[int, int, int, float], ...]  # (k, joint, signal, coefficient)
 
 
@@ -34,7 +32,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     functions = {**spec.functions, "regressor": signals}
     blocks = blocks_of(replace(spec, functions=functions), ARRAYS, _component, unpack=False)
     what = "base parameters, regressor, dynamics on the arrays of any package of the array API"
-    base = context(spec, command, LANGUAGE, "Array", blocks, '"', what)
+    base = context(spec, command, ARRAYS, "Array", blocks, '"', what)
     laid = {name: _laid_out(block) for name, block in blocks.items()}
     return laid_out(
         "xp.py",
@@ -60,21 +58,7 @@ def _signals(regressor: Function) -> tuple[Function, Coefficients]:
     """The entries of the regressor that differ by more than a sign, once each; constant entries are
     multiples of a signal of ones.
     """
-    number: dict[int, int] = {}  # node: signal; -1 stands for the signal of ones
-    signals: list[Entry] = []
-    coefficients = []
-    for entry in regressor.values.entries:
-        value = entry.value
-        if isinstance(value, int) and not value:
-            continue
-        node, c = (value.node.index, value.sign) if isinstance(value, Scalar) else (-1, value)
-        if node not in number:
-            number[node] = len(signals)
-            first = Scalar(value.graph, value.node, 1) if isinstance(value, Scalar) else 1
-            comment = entry.comment + (", sign apart" if c < 0 else "")
-            signals.append(Entry((number[node],), first, entry.heading, comment))
-        ((k, row),) = regressor.places(entry)
-        coefficients.append((k, row, number[node], float(c)))
+    distinct = signals(regressor, [e for e in regressor.values.entries if e.value != 0])
     model = replace(
         regressor.model,
         name="signals",
@@ -82,8 +66,10 @@ def _signals(regressor: Function) -> tuple[Function, Coefficients]:
         meaning="the distinct signals of the regressor",
         by_columns=False,
     )
-    values = Values(tuple(signals), regressor.values.algebra)
-    return Function(model, values, (len(signals),)), tuple(coefficients)
+    entries = tuple(replace(e, place=(k,)) for k, e in enumerate(distinct.entries))
+    values = Values(entries, regressor.values.algebra)
+    coefficients = tuple((k, row, s, float(sign)) for (k, row), s, sign in distinct.places)
+    return Function(model, values, (len(entries),)), coefficients
 
 
 def _laid_out(block: Block) -> dict[str, object]:

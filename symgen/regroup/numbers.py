@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from symgen.derive.angles import atoms_of
 from symgen.description.at_values import mapped
 from symgen.description.expression import Call, Expression, Number, call
 from symgen.description.robot import Robot
@@ -56,23 +57,4 @@ def _atom(c: Fraction) -> Expression:
 
 def numbers_of(robot: Robot) -> tuple[Number, ...]:
     """The Number atoms of a robot made by `numbered`, in the order of the file."""
-    expressions = [e for f in robot.frames for e in (f.b, f.d, f.r)] + [
-        *robot.gravity,
-        *robot.constraints.values(),
-    ]
-    expressions += [
-        g
-        for e in robot.elements
-        for table in (e.along, e.form)
-        for row in table.values()
-        for g in row.values()
-    ]
-    found: dict[Number, None] = {}
-    while expressions:
-        for m in expressions.pop(0).terms:
-            for a, _ in m:
-                if isinstance(a, Number):
-                    found[a] = None
-                elif isinstance(a, Call):
-                    expressions.append(a.argument)
-    return tuple(found)
+    return tuple(dict.fromkeys(a for a in atoms_of(robot) if isinstance(a, Number)))

@@ -20,7 +20,7 @@ from __future__ import annotations
 from symgen.derive.geometry import Rotation, axis_rotation, displacement
 from symgen.derive.scalar import Vector, apply
 from symgen.description.expression import ONE, ZERO, Expression, call
-from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, REVOLUTE, Frame, Robot, parameter
+from symgen.description.robot import FIXED, PRISMATIC, REVOLUTE, Frame, Robot, parameter
 
 TENSOR = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 FIRST = ("MX", "MY", "MZ")
@@ -146,6 +146,3 @@ def _tensor(J: list[list[Expression]]) -> dict[tuple[str, int], Expression]:
 
 def _first(u: Vector) -> dict[tuple[str, int], Expression]:
     return {(name, 1): c for name, c in zip(FIRST, u, strict=True) if c}
-
-
-__all__ = ["INERTIAL", "Step", "Transfer", "link_relations"]

@@ -17,13 +17,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from symgen.derive.columns import element_names, inertial_names
+from symgen.derive.columns import element_names, inertial_names, unit
 from symgen.derive.derivation import derive
 from symgen.derive.energies import origin_velocities
 from symgen.derive.graph import Scalar as Node
 from symgen.derive.scalar import Scalar, dot
 from symgen.description.robot import KINDS, Robot
-from symgen.emit.spec import ModuleSpec, unit
+from symgen.emit.spec import ModuleSpec
 
 AXES = "xyz"
 

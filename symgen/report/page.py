@@ -24,11 +24,12 @@ from markupsafe import Markup
 from symgen.certify.certificate import Certificate
 from symgen.certify.modules import certify
 from symgen.derive.closure import Closure
+from symgen.derive.columns import unit
 from symgen.derive.loops import close
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
 from symgen.emit.header import informative_columns
-from symgen.emit.spec import ModuleSpec, module_spec, unit
+from symgen.emit.spec import ModuleSpec, module_spec
 from symgen.regroup.regrouping import Regrouping
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text

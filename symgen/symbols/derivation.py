@@ -20,7 +20,7 @@ from symgen.derive.loops import close
 from symgen.derive.model import Request
 from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
-from symgen.derive.scalar import Scalar, add, mul
+from symgen.derive.scalar import Scalar, linear
 from symgen.description.at_values import at_values, exact, substituted
 from symgen.description.expression import ONE, Expression
 from symgen.description.grammar import parse
@@ -94,11 +94,9 @@ class Source:
         """dq_u/dq_i: the number of a linear relation, a symbol where only the closure equations
         give it.
         """
-        total: Scalar = 0
-        for k, n in self.relations.row[u].items():
-            step = algebra.rate(k, i) if k in self.relations.tied else int(k == i)
-            total = add(total, mul(algebra.constant(n), step))
-        return total
+        row, tied = self.relations.row[u], self.relations.tied
+        steps = {k: algebra.rate(k, i) if k in tied else int(k == i) for k in row}
+        return linear(algebra, row, steps)
 
 
 def source_of(

@@ -15,6 +15,7 @@ from fractions import Fraction
 from itertools import combinations, product
 from typing import Any
 
+from symgen.derive.geometry import summed
 from symgen.derive.scalar import Turn
 from symgen.description.expression import Expression, quarter_turns
 
@@ -88,10 +89,7 @@ class Identities:
 
     def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
         """cos and sin of a + way b, where that is an angle of the model."""
-        turns = dict(a[0])
-        for j, n in b[0]:
-            turns[j] = turns.get(j, 0) + way * n
-        turn = tuple((j, n) for j, n in sorted(turns.items()) if n)
+        turn = summed((*a[0], *((j, way * n) for j, n in b[0])))
         if not turn:
             return None
         turn, rest, sign = forward(turn, a[1] + b[1] * way)

@@ -264,7 +264,7 @@ class SymbolicModel:
             raise SymgenError(
                 f"{self.model.name} has no recursion; what works is {self.model.instead}"
             )
-        values = self.model.values(self.source.derivation, self.request, by_steps=True)
+        values = self.model.values(self.source.derivation, self.request)
         by_place = {entry.place: entry.value for entry in values.entries}
         outputs = {place: by_place[place] for place in self.places if place in by_place}
         labelled = {self.label(place): x for place, x in outputs.items()}

@@ -13,9 +13,8 @@ from typing import Any
 import sympy
 
 from symgen.derive.graph import Node
-from symgen.regroup.formula import sympy_expression
 from symgen.symbols.symbolic_model import SymbolicModel
-from symgen.symbols.trees import evaluated, rational, symbol
+from symgen.symbols.trees import angle, evaluated, rational, symbol
 
 FACTORED = 300  # terms of a determinant, up to which it is factored over the rationals
 
@@ -25,10 +24,7 @@ def of_model(model: SymbolicModel) -> Any:
     scalars.
     """
     closed = model.closed
-    angles = {
-        name: (sympy.cos if name[0] == "C" else sympy.sin)(sympy_expression(e, {}))
-        for name, e in closed.angles.items()
-    }
+    angles = {name: evaluated(angle(name[0], e), {}) for name, e in closed.angles.items()}
     values = {place: evaluated(x, angles) for place, x in closed.entries.items()}
     if closed.denominator is not None:
         below = evaluated(closed.denominator, angles)

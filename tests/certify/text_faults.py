@@ -37,7 +37,7 @@ SAME = (  # changed lines that change no value, and why
     ),
     (r"how (= -way|== -2)|flags & \d", "the way of writing: through the caches, or past them"),
     (r"ready = -True", "what is not zero is true"),
-    (r"= -np\.zeros", "minus zero, where every entry is written"),
+    (r"= -(np\.zeros|ca\.SX\()", "minus zero, where every entry is written"),
     (r"^    B = |every = int", "samples at a time"),
     (r"start && start \+ N >= TILE", "writes the same numbers again"),
     (r"VP242 = C5b", "cancels: N342 enters NE332 and NE322, whose difference A holds"),

@@ -118,7 +118,7 @@ class Multipliers:
 
     def gravity(self, chi: Array) -> Array:
         """tau at rest without friction, (N, n)."""
-        return self.solve(self.tree.gravity(self.q, chi)[..., None])[..., 0]
+        return self.solve(self.tree.torque(self.q, 0 * self.q, 0 * self.q, chi)[..., None])[..., 0]
 
     def projected_regressor(self) -> Array:
         """G' D_tree, (N, n, p): the principle of virtual power instead of multipliers."""

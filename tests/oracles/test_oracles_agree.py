@@ -39,7 +39,7 @@ def test_dynamics_and_kinematics(robot: Robot) -> None:
     close(lagrange.regressor(q, qd, qdd), [oracle.regressor(*s) for s in states], axis=(0, 1))
     close(lagrange.torque(q, qd, qdd, chi), [oracle.torque(*s, chi) for s in states])
     close(lagrange.inertia_matrix(q, chi), [oracle.inertia_matrix(x, chi) for x in q])
-    close(lagrange.gravity(q, chi), [oracle.gravity(x, chi) for x in q])
+    close(lagrange.torque(q, 0 * q, 0 * q, chi), [oracle.gravity(x, chi) for x in q])
     close(lagrange.poses(q), [oracle.poses(x) for x in q])
     for f in robot.frames:
         close(lagrange.jacobian(q, f.j), [oracle.jacobian(x, f.j) for x in q])
@@ -75,7 +75,7 @@ def test_planar_2r_by_hand() -> None:
         [[0.3 + 0.2 + 2.0 * L**2 + 2 * 0.5 * L * c2, coupling], [coupling, 0.2]],
     )
     elbow = 0.5 * g * np.cos(q.sum())
-    close(model.gravity(q, x), [(0.4 + 2.0 * L) * g * np.cos(q[0]) + elbow, elbow])
+    close(model.torque(q, 0 * q, 0 * q, x), [(0.4 + 2.0 * L) * g * np.cos(q[0]) + elbow, elbow])
 
 
 def test_numeric_regressor() -> None:
@@ -128,7 +128,7 @@ def test_general_loop_moves_as_its_power_says() -> None:
     def energy(q, v):
         return 0.5 * np.einsum("ti,tij,tj->t", v, model.inertia_matrix(q, chi), v)
 
-    weight = np.einsum("ti,ti->t", model.gravity(q, chi), v)
+    weight = np.einsum("ti,ti->t", model.torque(q, 0 * q, 0 * q, chi), v)
     power = (energy(q1, v1) - energy(q0, v0)) / (2 * h) + weight
     actuated = model.actuated_regressor(*path(times)) @ chi
     assert np.allclose(actuated[:, 0] * path(times)[1][:, 0], power, atol=1e-5)
