@@ -1,6 +1,4 @@
-"""Records that are read by blocks: what a source of samples offers, and samples that wait for one
-another.
-"""
+"""Records that are read by blocks: what a source of samples offers, and pieces of it."""
 
 from __future__ import annotations
 
@@ -185,25 +183,3 @@ class PieceReader:
         """Hold no block that ends before sample `begin`."""
         while self.held and self.first + len(self.held[0][0]) <= begin:
             self.first += len(self.held.pop(0)[0])
-
-
-class Queue:
-    """Samples in the order in which they came, along the first axis."""
-
-    def __init__(self) -> None:
-        self.parts: list[Array] = []
-        self.count = 0
-
-    def put(self, x: Array) -> None:
-        """The next samples."""
-        if len(x):
-            self.parts.append(x)
-            self.count += len(x)
-
-    def take(self, count: int) -> Array:
-        """The first `count` of those that wait."""
-        if len(self.parts[0]) < count:
-            self.parts = [np.concatenate(self.parts)]
-        head = self.parts[0]
-        self.parts[0], self.count = head[count:], self.count - count
-        return head[:count]

@@ -36,7 +36,6 @@ from runtime.rows.prepared import (
     Source,
     decimated_torque,
     prepared,
-    record_of,
 )
 from runtime.rows.segments import Cuts, Segment, Window, joined
 from runtime.rows.selection import instants_of, nothing_left
@@ -105,7 +104,9 @@ def observe(
     blocks = [record.block for record in several if isinstance(record, Stream)]
     if blocks:
         streams = [
-            record if isinstance(record, Stream) else RecordStream(record_of(record), blocks[0])
+            record
+            if isinstance(record, Stream)
+            else RecordStream(prepared(model, record, study).record, blocks[0])
             for record in several
         ]
         with started(workers) as processes:

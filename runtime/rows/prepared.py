@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, TypeAlias, overload
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -149,10 +149,6 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
     return records[0].drives if records else drives_of(model)
 
 
-@overload
-def record_of(record: Record | Prepared) -> Record: ...
-@overload
-def record_of(record: Source) -> Record | Stream: ...
 def record_of(record: Source) -> Record | Stream:
     """The record itself."""
     return record.record if isinstance(record, Prepared) else record

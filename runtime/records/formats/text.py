@@ -19,7 +19,6 @@ from runtime.errors import InputError
 from runtime.files import opened
 from runtime.records.formats.columns import WIDEST, Array, Groups, Source, Table
 from runtime.records.missing import COUNTS
-from runtime.records.stream import Queue
 
 LONGEST = 1_000_000  # characters of a line: so many fields of a hundred digits each
 PIECE = 2**22  # characters read at a time
@@ -63,20 +62,22 @@ class TextTable(Table):
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None
     ) -> Iterator[Sequence[Array]]:
         indices = [self.names.index(name) for name in names]
-        waiting = Queue()
+        waiting = np.empty((0, len(names)))
         first, place = [known for known in self._places[:-1] if known[0] <= start][-1]
         for _, numbers, lines in self._pieces(place):
             skipped = max(start - first, 0)
             own = lines[skipped : None if stop is None else max(stop - first, 0)]
             if own:
-                waiting.put(self._loaded(indices, islice(numbers, skipped, None), own))
-            while waiting.count >= size:
-                yield list(waiting.take(size).T)
+                loaded = self._loaded(indices, islice(numbers, skipped, None), own)
+                waiting = np.concatenate([waiting, loaded])
+            while len(waiting) >= size:
+                yield list(waiting[:size].T)
+                waiting = waiting[size:]
             first += len(lines)
             if stop is not None and first >= stop:
                 break
-        if waiting.count:
-            yield list(waiting.take(waiting.count).T)
+        if len(waiting):
+            yield list(waiting.T)
 
     def _loaded(self, indices: list[int], numbers: Iterator[int], lines: list[str]) -> Array:
         """Numbers of these columns, shape (len(lines), len(indices))."""
