@@ -201,13 +201,13 @@ class RecordFiles:
             parts["q"] = bridged(parts["q"], missing, before)
         sides = {"q": self.side.position, "tau": self.side.torque, "tau_known": self._on_joints}
         sides |= {"q_r": self.side.position, "tau_ff": self.side.torque, "t": self._time}
-        converted = {}
+        converted: dict[str, Any] = {"t": None, "missing": missing}
         for table, groups in groups_of(self.columns, self.tables):
             for key, names in groups.items():
                 hint = COUNTS if key == "q" and not self.missing else ""
                 x = require_finite(parts[key], names, table.file, table.row, start, hint)
                 converted[key] = sides[key](x)
-        return Samples(**{"t": None, "missing": missing, **converted}), parts["q"][-1]
+        return Samples(**converted), parts["q"][-1]
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""

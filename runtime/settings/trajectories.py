@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def motion_from_mapping(mapping: Mapping[str, Any]) -> Motion:
                 f"part {k + 1} of the trajectory has no coefficients `p`", path=path
             )
         settings = {key: value for key, value in part.items() if key != "p"}
-        family: Family = structure(AnyFamily, settings, path)
+        family: Family = structure(cast(Any, AnyFamily), settings, path)
         try:
             made.append(Part(family, np.array(part["p"], dtype=float).T))
         except InputError as e:

@@ -23,6 +23,7 @@ import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BufferedReader
 from tempfile import TemporaryDirectory
 from typing import IO, Any, cast
 
@@ -84,7 +85,7 @@ class Process:
         """A value as {"value": ...}, a tuple of arrays, an error as {"error": ...}; None where the
         process has ended.
         """
-        pipe = cast(IO[bytes], self.popen.stdout)
+        pipe = cast(BufferedReader, self.popen.stdout)
         line = pipe.readline()
         answer = json.loads(line) if line.endswith(b"\n") else None
         if answer is None or "arrays" not in answer:
