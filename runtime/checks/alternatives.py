@@ -511,17 +511,6 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                 "give lengths in m",
                 constants={key: factor * entry[key] for key in lengths},
             )
-    yield from _conventions(make, entry, frames)
-
-
-def _conventions(
-    make: _Maker, entry: Mapping[str, float], frames: Sequence[int]
-) -> Iterator[Alternative]:
-    """alpha and d of every frame taken from the frame before or after: a table of the other
-    convention.
-    """
-    if len(frames) < 2:
-        return
     for step, cause, remedy in (
         (
             -1,
@@ -533,13 +522,14 @@ def _conventions(
             "the table is Khalil's and is read as of the classic (distal) convention",
             "leave convention: distal out",
         ),
-    ):
+    ):  # alpha and d of every frame taken from the frame before or after
         moved = {
             f"free_{key}{j}": entry.get(f"free_{key}{j + step}", 0.0)
             for j in frames
             for key in ("alpha", "d")
         }
-        yield make("table", cause, remedy, constants=moved)
+        if len(frames) > 1:
+            yield make("table", cause, remedy, constants=moved)
 
 
 def _angle(x: float) -> str:

@@ -42,6 +42,12 @@ class Check:
     limit: str = ""
     remedy: str = ""
 
+    @property
+    def sentence(self) -> str:
+        """Question, finding, and what to do."""
+        remedy = f" {self.remedy[0].upper()}{self.remedy[1:]}." if self.remedy else " "
+        return f"{self.question} {self.finding}.{remedy}"
+
 
 class Answer(NamedTuple):
     """State and finding of a Check; remedy and limit where they are not those of its Question."""

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from runtime.checks.fits import Grams, solved
-from runtime.checks.samples import motion_cutoff, moved
+from runtime.checks.samples import lowpassed, usable
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
@@ -31,7 +31,6 @@ from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
-from runtime.signals.filters import Lowpass, lowpass_filtered, median_filtered
 from runtime.table import Table
 
 Array = np.ndarray
@@ -123,7 +122,8 @@ def delay(
             file=record.name,
         )
     problem = _Problem(model, own, study, longest)
-    start = min(problem.grid, key=lambda d: problem.misfit(np.full(record.n, d)))
+    sigmas = [problem.fit(np.full(record.n, d))[1] for d in problem.grid]
+    start = problem.grid[int(np.argmin(np.log(sigmas).sum(axis=1)))]
     shift = np.full(record.n, start)
     for _ in range(LIMIT.DELAY_PASSES):
         step = np.clip(problem.step(shift)[0], -longest / 2, longest / 2)
@@ -159,20 +159,11 @@ class _Problem:
 
     def __init__(self, model: GeneratedModel, own: Prepared, study: Study, longest: float) -> None:
         record = own.record
-        cutoff = motion_cutoff(record, study)
-        low = Lowpass(cutoff=cutoff)
-        states = moved(own, study, low)
-        tau = lowpass_filtered(
-            median_filtered(record.torque, study.signals.median), record.rate, low
-        )
+        cutoff, states, torque = lowpassed(own, study)
+        tau = torque(record.torque)
         margin = int(np.ceil((longest + 1 / cutoff) * record.rate)) + 2
-        t0, t1 = study.rows.window
-        inside = (record.t >= (-np.inf if t0 is None else t0)) & (
-            record.t <= (np.inf if t1 is None else t1)
-        )
+        inside = usable(record, study, margin // 10, margin)
         inside[:margin] = inside[-margin:] = False
-        if record.missing is not None:
-            inside &= ~record.missing.near_gaps(margin // 10, margin)
         kept = np.flatnonzero(inside)
         step = max(1, int(0.8 * record.rate / (2 * cutoff)), -(-len(kept) // LIMIT.DELAY_INSTANTS))
         kept = kept[::step]
@@ -232,10 +223,6 @@ class _Problem:
             X = solved(*grams.weighted(sigma))
             sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)
         return X, sigma, (Y - self.D @ X) * self.mask
-
-    def misfit(self, shift: Array) -> float:
-        """Sum of log sigma over the joints."""
-        return float(np.log(self.fit(shift)[1]).sum())
 
     def errors(self, shift: Array) -> Array:
         """Relative error by joint, %."""

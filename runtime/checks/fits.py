@@ -243,7 +243,10 @@ class Barrier:
                     0.25 * (chi[row > 0] @ row[row > 0]) / -(chi[row < 0] @ row[row < 0])
                 )
         for places, B in self.forms:
-            chi[places] = np.maximum(chi[places], _interior(B) * float(self.size[0]))
+            # coefficients of a positive definite sum: those of the identity, by least squares
+            k, identity = B.reshape(len(B), -1), np.eye(B.shape[1]).ravel()
+            inside = np.linalg.lstsq(k.T, identity, rcond=None)[0]
+            chi[places] = np.maximum(chi[places], inside * float(self.size[0]))
         return chi
 
     @property
@@ -348,12 +351,6 @@ class Barrier:
                     break
                 chi, now = chi + t * step, after
         return chi
-
-
-def _interior(B: Array) -> Array:
-    """Coefficients of a positive definite sum_k c_k B_k: from the identity, by least squares."""
-    k = B.reshape(len(B), -1)
-    return np.asarray(np.linalg.lstsq(k.T, np.eye(B.shape[1]).ravel(), rcond=None)[0])
 
 
 def quick_fit(grams: Grams, barrier: Barrier, N: float, sigma: Array) -> Fit:

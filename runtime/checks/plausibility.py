@@ -20,9 +20,8 @@ import numpy as np
 from runtime.checks.alternatives import times_of
 from runtime.checks.case import Case
 from runtime.checks.check import WORST, Check, worst_of
-from runtime.checks.continuous import searched
+from runtime.checks.continuous import Gravity, searched
 from runtime.checks.delay import Delay
-from runtime.checks.gravity import Gravity
 from runtime.checks.known import KnownValues
 from runtime.checks.motion import motion_excites, rest
 from runtime.checks.physics import better, delayed, direction, not_asked, physics, size, values
@@ -114,19 +113,11 @@ class Plausibility(
     @property
     def line(self) -> str:
         """The worst finding in one line; "" where there is none."""
-        return (
-            ""
-            if self.worst is None
-            else f"{self.worst.question} {self.worst.finding}. {_sentence(self.worst.remedy)}"
-        )
+        return "" if self.worst is None else self.worst.sentence
 
     def to_text(self) -> str:
         """Findings that are not good, then what was found besides."""
-        lines = [
-            f"{c.state}: {c.question} {c.finding}. {_sentence(c.remedy)}"
-            for c in self.checks
-            if c.state in WORST[:2]
-        ]
+        lines = [f"{c.state}: {c.sentence}" for c in self.checks if c.state in WORST[:2]]
         lines += [f"no record can tell: {text}" for text in self.equivalent]
         return "\n".join(
             lines or ["Record, study and robot file suit each other, as far as judged."]
@@ -265,10 +256,6 @@ def _ranked(trials: Sequence[Trial]) -> list[Trial]:
         cause = f"the sampling rate is {times_of(alike)} the stated one"
         kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
     return sorted(kept, key=lambda trial: -trial.gain)
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 __all__ = ["Plausibility", "plausibility"]

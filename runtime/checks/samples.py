@@ -8,7 +8,7 @@ nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ from runtime.settings.study import Study
 from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_filtered
 
 Array = np.ndarray
+
+SIGNALS = ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ class Samples:
 
     def moving(self) -> Array:
         """Whether each joint moves at each instant, bool (K, n)."""
-        return np.asarray((np.abs(self.qd) > self.standing()) & (np.abs(self.qd) > 0))
+        return moving(self.qd)
 
     def still(self) -> Array:
         """Whether each joint stands still in the whole record, (n,)."""
@@ -78,18 +80,15 @@ class Samples:
         size = np.maximum(np.abs(self.tau).max(axis=0), 1e-12)
         return np.asarray(np.ptp(self.tau, axis=0) <= 1e-9 * size)
 
-    def take(self, chosen: Array) -> Samples:
-        """The instants of an index or a mask."""
-        arrays = {
-            name: getattr(self, name)[chosen]
-            for name in ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
-        }
-        return replace(self, **arrays)
-
     def thinned(self, most: int) -> Samples:
         """At most `most` instants, evenly drawn."""
-        step = -(-len(self) // most)
-        return self if step <= 1 else self.take(np.arange(0, len(self), step))
+        kept = np.arange(0, len(self), -(-len(self) // most))
+        return replace(self, **{name: getattr(self, name)[kept] for name in SIGNALS})
+
+
+def moving(qd: Array) -> Array:
+    """Samples at which each joint moves, bool (K, n)."""
+    return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
 def excerpts(stream: Stream, study: Study) -> list[Record]:
@@ -100,18 +99,16 @@ def excerpts(stream: Stream, study: Study) -> list[Record]:
         number, length = 1, stop - start
     reader = PieceReader(stream)
     begins = map(int, np.linspace(start, stop - length, number))
-    return [_excerpt(stream, *reader.read(a, a + length)) for a in begins]
+    parts = []
+    for begin in begins:
+        t, q, tau, gaps = reader.read(begin, begin + length)
+        missing = Missing(gaps, stream.follows) if gaps.any() else None
+        parts.append(Record(t, q, tau, name=stream.name, origin=stream.origin, missing=missing))
+    return parts
 
 
-def _excerpt(stream: Stream, t: Array, q: Array, tau: Array, gaps: Array) -> Record:
-    missing = Missing(gaps, stream.follows) if gaps.any() else None
-    return Record(t, q, tau, name=stream.name, origin=stream.origin, missing=missing)
-
-
-def samples_of(
-    records: Sequence[Record | Prepared], study: Study, most: int = LIMIT.INSTANTS_KEPT
-) -> Samples:
-    """Filtered instants of all records, in their windows, at most `most`.
+def samples_of(records: Sequence[Record | Prepared], study: Study) -> Samples:
+    """Filtered instants of all records, in their windows, at most LIMIT.INSTANTS_KEPT.
 
     The cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that
     is lower.
@@ -123,10 +120,9 @@ def samples_of(
     """
     own = [one if isinstance(one, Prepared) else Prepared(one, study) for one in records]
     parts = [_filtered(one, study, number) for number, one in enumerate(own)]
-    names = ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SIGNALS}
     every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
-    return every.thinned(most)
+    return every.thinned(LIMIT.INSTANTS_KEPT)
 
 
 def motion_cutoff(record: Record, study: Study) -> float:
@@ -146,39 +142,38 @@ def motion_cutoff(record: Record, study: Study) -> float:
     return float(min(most, max(LIMIT.DYNAMIC * frequency, 20 * record.rate / len(record))))
 
 
-def moved(own: Prepared, study: Study, low: Lowpass) -> States:
-    """States of the positions as they are through another low-pass, shape (N, n) each."""
-    return own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
+def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Array], Array]]:
+    """Cut-off of the motion, Hz, the states of the positions as they are through a low-pass of it,
+    shape (N, n) each, and the function that filters torques alike.
+    """
+    low = Lowpass(cutoff=motion_cutoff(own.record, study))
+    states = own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
+
+    def torque(tau: Array) -> Array:
+        return lowpass_filtered(median_filtered(tau, study.signals.median), own.record.rate, low)
+
+    return low.cutoff, states, torque
 
 
-def _filtered(own: Prepared, study: Study, number: int) -> Samples:
-    """One record, one sample in about 0.8 rate/(2 cutoff)."""
-    record = own.record
-    cutoff = motion_cutoff(record, study)
-    low = Lowpass(cutoff=cutoff)
-    states = moved(own, study, low)
-    known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
-    tau, known = (
-        lowpass_filtered(median_filtered(x, study.signals.median), record.rate, low)
-        for x in (record.tau, known)
-    )
-    step = max(1, int(0.8 * record.rate / (2 * cutoff)))
+def usable(record: Record, study: Study, before: int, after: int) -> Array:
+    """Samples in the window, and at least so many before and after a gap, bool (N,)."""
     t0, t1 = study.rows.window
     inside = (record.t >= (-np.inf if t0 is None else t0)) & (
         record.t <= (np.inf if t1 is None else t1)
     )
     if record.missing is not None:
-        inside &= ~record.missing.near_gaps(step, 3 * step)
-    kept = np.flatnonzero(inside)[3 * step : -3 * step : step]
+        inside &= ~record.missing.near_gaps(before, after)
+    return inside
+
+
+def _filtered(own: Prepared, study: Study, number: int) -> Samples:
+    """One record, one sample in about 0.8 rate/(2 cutoff)."""
+    record = own.record
+    cutoff, states, torque = lowpassed(own, study)
+    known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
+    step = max(1, int(0.8 * record.rate / (2 * cutoff)))
+    kept = np.flatnonzero(usable(record, study, step, 3 * step))[3 * step : -3 * step : step]
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)
-    return Samples(
-        record.t[kept],
-        states.q[kept],
-        states.qd[kept],
-        states.qdd[kept],
-        tau[kept],
-        known[kept],
-        np.full(len(kept), number),
-        cutoff,
-    )
+    signals = (record.t, states.q, states.qd, states.qdd, torque(record.tau), torque(known))
+    return Samples(*(x[kept] for x in signals), np.full(len(kept), number), cutoff)

@@ -24,7 +24,7 @@ from runtime.checks.fits import (
     physical_fit,
     quick_fit,
 )
-from runtime.checks.samples import Samples
+from runtime.checks.samples import Samples, moving
 from runtime.estimators.physical import frame_origins
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, drives_of
@@ -133,11 +133,18 @@ class Problem:
         rows = self.rows(alternative)
         return None if rows is None else Grams.of(*rows, self.tau)
 
+    def fit(self, grams: Grams, how: Callable[..., Fit] = physical_fit, **options: int) -> Fit:
+        """The parameters of a physical robot, over the standard parameters; weights begin at those
+        of least squares.
+        """
+        standard = grams.of_joints.shape[1] == len(self.physical.standard) + 1
+        over = grams if standard else grams.mapped(self.physical.K)
+        sigma = least_squares(grams, self.N).sigma
+        return how(over, self.barrier, self.N, sigma, **options)
+
     def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
         """An alternative under the conditions of a physical robot."""
-        fit = physical_fit(
-            self.standard(grams), self.barrier, self.N, least_squares(grams, self.N).sigma
-        )
+        fit = self.fit(grams)
         return Trial(alternative, bound, fit, self.given.score - fit.score)
 
     def beyond(self, V: Array) -> float:
@@ -173,20 +180,6 @@ class Problem:
         )  # bodies as large as the torques
         other = replace(self, barrier=barrier).fitted(alternative, Grams.of(*rows, self.tau))
         return bool(abs(other.gain) < LIMIT.SAME_SCORE)
-
-    def standard(self, grams: Grams) -> Grams:
-        """The same over the standard parameters."""
-        return (
-            grams
-            if grams.of_joints.shape[1] == len(self.physical.standard) + 1
-            else grams.mapped(self.physical.K)
-        )
-
-
-def moving(qd: Array) -> Array:
-    """Samples at which each joint moves, bool (K, n)."""
-
-    return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
 def problem_of(
@@ -255,44 +248,30 @@ def reach(model: GeneratedModel, q: Array) -> float:
     return float(np.clip(np.nanmax(distance), 0.1, 1e6)) if np.isfinite(distance).any() else 1.0
 
 
-def tried(
-    problem: Problem,
-    sides: Sequence[str] = ("joint", "joint"),
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Trial]:
+def tried(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
     """All alternatives, the best first; those that cannot win are not fitted under the conditions
     of a physical robot.
     """
-    every = alternatives(problem.model, problem.variants, sides)
     given, rows = problem.given, problem.samples.moving().sum(axis=0)
-    bounds: list[tuple[float, Alternative, Grams, Array]] = []
-    for k, alternative in enumerate(every):
-        progress(k, len(every))
+    bounds: list[tuple[float, Alternative, Grams]] = []
+    for alternative in alternatives(problem.model, problem.variants, sides):
         grams = problem.grams(alternative)
         if grams is not None and (grams.rows >= rows // 2).all():
-            free = least_squares(grams, problem.N)
-            bounds.append((free.score, alternative, grams, free.sigma))
+            bounds.append((least_squares(grams, problem.N).score, alternative, grams))
     bounds.sort(key=lambda item: item[0])
     quick: list[tuple[float, float, Alternative, Grams]] = []
     best = given.score - LIMIT.DECISIVE
-    for bound, alternative, grams, sigma in bounds:
-        if len(quick) < LIMIT.ALTERNATIVES_FITTED and bound < best + LIMIT.GAIN_ALIKE * (
-            given.score - best
-        ):
-            score = quick_fit(problem.standard(grams), problem.barrier, problem.N, sigma).score
+    for bound, alternative, grams in bounds:
+        promising = bound < best + LIMIT.GAIN_ALIKE * (given.score - best)
+        if len(quick) < LIMIT.ALTERNATIVES_FITTED and promising:
+            score = problem.fit(grams, quick_fit).score
             best = min(best, score)
             quick.append((score, bound, alternative, grams))
     quick.sort(key=lambda item: item[0])
-    trials = {
-        id(a): Trial(
-            a,
-            bound,
-            None,
-            -np.inf,
-            abs(bound - problem.free.score) < LIMIT.SAME_SCORE and problem.hides(a),
-        )
-        for bound, a, *_ in bounds
-    }
+    trials = {}
+    for bound, alternative, _ in bounds:
+        alike = abs(bound - problem.free.score) < LIMIT.SAME_SCORE and problem.hides(alternative)
+        trials[id(alternative)] = Trial(alternative, bound, None, -np.inf, alike)
     for _, bound, alternative, grams in quick[: LIMIT.ALTERNATIVES_REFINED]:
         if not trials[id(alternative)].equivalent:
             trials[id(alternative)] = problem.fitted(alternative, grams, bound)
@@ -303,19 +282,15 @@ def decisive(trials: Sequence[Trial], given: Fit) -> list[Trial]:
     """Those that explain the record decisively better than the study as given: the best, and those
     like it.
     """
-    better = [
-        trial
-        for trial in trials
-        if trial.fit is not None and trial.gain >= LIMIT.DECISIVE and _visible(trial.fit, given)
-    ]
-    return [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain][
-        : LIMIT.ALTERNATIVES_NAMED
-    ]
-
-
-def _visible(fit: Fit, given: Fit) -> bool:
-    ratio = given.errors / np.maximum(fit.errors, 0.1)
-    return (
-        bool(((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2)).any())
-        or given.penalty - fit.penalty > LIMIT.DECISIVE
-    )
+    better = []
+    for trial in trials:
+        if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
+            fewer, ratio = (
+                given.errors - trial.fit.errors,
+                given.errors / trial.fit.errors.clip(0.1),
+            )
+            visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2)).any()
+            if visible.any() or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
+                better.append(trial)
+    alike = [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain]
+    return alike[: LIMIT.ALTERNATIVES_NAMED]

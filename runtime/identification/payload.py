@@ -26,12 +26,13 @@ from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import Result
 from runtime.loop.methods import estimate_of
+from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.model.mount import Mount, load_vector, mount
 from runtime.rows.observation import Observation, stack
 from runtime.settings.study import EstimateSettings, PayloadSettings
-from runtime.table import aligned
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -87,16 +88,19 @@ class Payload(Result):
             else float(self.value[self.names.index(family)])
         )
 
-    def to_table(self) -> str:
+    def table(self) -> Table:
         """One line per parameter."""
-        rows: list[Sequence[str]] = [(f"load on {self.place}", "value", "sigma", "unit")]
-        rows += [(name, f"{self.given[name]:.6g}", "given", _unit(name)) for name in self.given]
-        estimates = zip(self.names, self.value, self.sigma, strict=True)
+        rows = [(name, number(x, ".6g"), "given", _unit(name)) for name, x in self.given.items()]
         rows += [
-            (name, f"{x:.6g}", f"{s:.2g}" if np.isfinite(s) else "-", _unit(name))
-            for name, x, s in estimates
+            (name, number(x, ".6g"), number(sigma, ".2g"), _unit(name))
+            for name, x, sigma in zip(self.names, self.value, self.sigma, strict=True)
         ]
-        return aligned(rows)
+        caption = f"Load on {self.place}, its parameters there, SI"
+        return Table(caption, (f"load on {self.place}", "value", "sigma", "unit"), rows)
+
+    def to_table(self) -> str:
+        """The table as text."""
+        return self.table().to_text()
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""

@@ -23,7 +23,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import welch
 from scipy.special import chdtrc
 
-from runtime.identification.validation import Comparison, JointComparison
+from runtime.identification.validation import JointComparison
 from runtime.limits import LIMIT
 
 Array = np.ndarray
@@ -72,7 +72,7 @@ class Whiteness:
         return bool(self.p >= LIMIT.SIGNIFICANT)
 
 
-def whiteness(comparison: Comparison, rate: float) -> tuple[Whiteness, ...]:
+def whiteness(comparison: Sequence[JointComparison], rate: float) -> tuple[Whiteness, ...]:
     """Whiteness of every joint; rate : rows per second of one joint, Hz."""
     return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
 

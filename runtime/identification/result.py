@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from runtime.checks.known import torque_unit_doubt
 from runtime.checks.plausibility import Plausibility
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
@@ -23,10 +24,14 @@ from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
 from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
 from runtime.identification.payload_study import PayloadStudy
-from runtime.identification.record_errors import RecordError, record_errors
-from runtime.identification.torque_unit import torque_unit_doubt
 from runtime.identification.uncertainty import Uncertainty
-from runtime.identification.validation import Comparison, CrossValidation, WeakDirections
+from runtime.identification.validation import (
+    CrossValidation,
+    JointComparison,
+    RecordError,
+    WeakDirections,
+    record_errors,
+)
 from runtime.json_documents import json_text
 from runtime.markup import number
 from runtime.model.drives import Coupling
@@ -69,7 +74,7 @@ class Identification:
     essential : Essential
         The essential parameters and the trail from all parameters to them; by the linear companion
         of a method that is not linear.
-    comparison : Comparison
+    comparison : tuple of JointComparison
         Torques by joint beside W X of `model_estimate`.
     validation : tuple of CrossValidation
         One part of the data predicts the others: windows of the records first, then further
@@ -108,7 +113,7 @@ class Identification:
     observation: Observation
     estimate: Estimate
     essential: Essential
-    comparison: Comparison
+    comparison: tuple[JointComparison, ...]
     validation: tuple[CrossValidation, ...]
     correlations: WeakDirections
     coupling: Mapping[Coupling, Estimate]

@@ -9,8 +9,7 @@ from typing import Any
 
 from runtime.estimators.estimate import SCHEMA as ESTIMATE
 from runtime.estimators.estimate import Estimate, JointFit
-from runtime.identification.record_errors import RecordError
-from runtime.identification.validation import WeakDirections
+from runtime.identification.validation import RecordError, WeakDirections
 from runtime.json_documents import Vector, Whole, json_schema
 from runtime.model.drives import Coupling
 from runtime.resolution.result import SCHEMA as CESTAC

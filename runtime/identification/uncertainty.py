@@ -18,6 +18,7 @@ References: Seber and Lee (2003), section 4.3, for F.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,7 @@ from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import linear_companion, linear_system
 from runtime.identification.residuals import Whiteness, effective_share, whiteness
-from runtime.identification.validation import Comparison
+from runtime.identification.validation import JointComparison
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.rows.observation import Observation
@@ -251,7 +252,7 @@ def uncertainty(
     observation: Observation,
     settings: EstimateSettings,
     essential: Essential,
-    comparison: Comparison,
+    comparison: Sequence[JointComparison],
 ) -> Uncertainty:
     """Checks of the essential parameters of an observation.
 
@@ -263,7 +264,7 @@ def uncertainty(
         Method of the study; the checks are those of its linear companion.
     essential : Essential
         Parameters, and the trail to them.
-    comparison : Comparison
+    comparison : sequence of JointComparison
         Residuals whose whiteness is tested.
     """
     by_joint = whiteness(comparison, observation.rate)

@@ -11,7 +11,7 @@ Errors are reported per joint since a wrong wrist hides in a total that the shou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,26 +66,10 @@ class JointComparison:
         return percent(self.error, self.measured)
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Measured and predicted torques of every joint."""
-
-    joints: tuple[JointComparison, ...]
-
-    def __iter__(self) -> Iterator[JointComparison]:
-        return iter(self.joints)
-
-    @property
-    def relative_error(self) -> float:
-        """100 ||Y - W X|| / ||Y|| over all joints, in %."""
-        return percent(
-            np.concatenate([j.error for j in self.joints]),
-            np.concatenate([j.measured for j in self.joints]),
-        )
-
-
-def predicted_torque(observation: Observation, fit: Estimate) -> Array:
-    """W X, shape (r,), with the columns of the Estimate."""
+def direct_comparison(observation: Observation, fit: Estimate) -> tuple[JointComparison, ...]:
+    """Measured torques beside W X, with the columns of the Estimate, joint by joint, at the
+    instants of the observation.
+    """
     missing = [name for name in fit.names if name not in observation.names]
     if missing:
         raise InputError(
@@ -93,12 +77,7 @@ def predicted_torque(observation: Observation, fit: Estimate) -> Array:
             f"{', '.join(observation.names)}"
         )
     columns = [observation.names.index(name) for name in fit.names]
-    return np.asarray(observation.W[:, columns] @ fit.X)
-
-
-def direct_comparison(observation: Observation, fit: Estimate) -> Comparison:
-    """Measured beside predicted torques, at the instants of the observation."""
-    predicted = predicted_torque(observation, fit)
+    predicted = observation.W[:, columns] @ fit.X
     parts = []
     for j in range(observation.n):
         rows = observation.joint(j)
@@ -106,7 +85,7 @@ def direct_comparison(observation: Observation, fit: Estimate) -> Comparison:
         parts.append(
             JointComparison(label, observation.t[rows], observation.Y[rows], predicted[rows])
         )
-    return Comparison(tuple(parts))
+    return tuple(parts)
 
 
 @dataclass(frozen=True)
@@ -188,6 +167,41 @@ def prediction_errors(observation: Observation, fit: Estimate) -> tuple[float, t
     residual, measured = observation.norms(fit.names, fit.X)
     return percent(residual, measured), tuple(
         percent(e, m) for e, m in zip(residual, measured, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class RecordError:
+    """Fit of one record.
+
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    rows : int
+        Rows of W that it gave.
+    relative_error : float, %
+        100 ||Y_k - W_k X|| / ||Y_k||.
+    per_joint : tuple of float, %
+        The same by joint.
+    """
+
+    name: str
+    rows: int
+    relative_error: float
+    per_joint: tuple[float, ...]
+
+
+def record_errors(
+    observation: Observation, fit: Estimate, names: Sequence[str]
+) -> tuple[RecordError, ...]:
+    """Errors of the records called `names`, in the order in which `observation` holds them, with
+    the parameters of `fit`.
+    """
+    parts = [observation.of_record(k) for k in range(len(names))]
+    return tuple(
+        RecordError(name, sum(part.rows), *prediction_errors(part, fit))
+        for name, part in zip(names, parts, strict=True)
     )
 
 
@@ -344,11 +358,9 @@ def weak_directions(
     settings: EstimateSettings | None = None,
     *,
     threshold: float = LIMIT.CORRELATION,
-    count: int = 3,
 ) -> WeakDirections:
-    """Parameters that trade against each other on this observation.
-
-    threshold : smallest |correlation| reported.   count : number of singular directions.
+    """Parameters that trade against each other on this observation, and the three directions that W
+    sees least.   threshold : smallest |correlation| reported.
     """
     system = linear_system(observation, linear_companion(settings or EstimateSettings()))
     names = system.names
@@ -365,7 +377,7 @@ def weak_directions(
     ]
     components, label = connected_components(linked, directed=False)
     groups = [tuple(names[i] for i in np.flatnonzero(label == c)) for c in range(components)]
-    weakest = range(len(names) - 1, max(len(names) - 1 - count, -1), -1)
+    weakest = range(len(names) - 1, max(len(names) - 4, -1), -1)
     return WeakDirections(
         pairs=tuple(sorted(pairs, key=lambda pair: -abs(pair.correlation))),
         groups=tuple(group for group in groups if len(group) > 1),

@@ -21,7 +21,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.residuals import Whiteness
-from runtime.identification.validation import Comparison, JointComparison
+from runtime.identification.validation import JointComparison
 from runtime.limits import LIMIT
 from runtime.reporting.page import Image
 from runtime.reporting.panels import PanelLayout
@@ -103,17 +103,19 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
     return figure
 
 
-def torque_overlay(comparison: Comparison, unit: str = "N m", source: str = "measured") -> Figure:
+def torque_overlay(
+    comparison: Sequence[JointComparison], unit: str = "N m", source: str = "measured"
+) -> Figure:
     """Fig. 4 of the chapter: every joint in a panel of its own."""
 
     def draw(ax: Axes, joint: JointComparison) -> None:
         _torques(ax, ax, joint, source)
         ax.set(title=_title(joint), xlabel="time, s", ylabel=f"torque, {unit}")
 
-    return panels(comparison.joints, draw, 2, cell=(4.8, 2.3), legend=3)
+    return panels(comparison, draw, 2, cell=(4.8, 2.3), legend=3)
 
 
-def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
+def residual_histogram(comparison: Sequence[JointComparison], unit: str = "N m") -> Figure:
     """Residuals of every joint, each beside the normal law of the same deviation."""
     x = np.linspace(-4, 4, 161)
     normal = np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi)
@@ -126,7 +128,7 @@ def residual_histogram(comparison: Comparison, unit: str = "N m") -> Figure:
         title = f"joint {joint.joint}, deviation {deviation:.3g} {unit}"
         ax.set(title=title, xlabel="residual / deviation", yticks=[])
 
-    return panels(comparison.joints, draw, 3, cell=(3.2, 2.1), least=5.4)
+    return panels(comparison, draw, 3, cell=(3.2, 2.1), least=5.4)
 
 
 def spectra_figure(

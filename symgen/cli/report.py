@@ -39,7 +39,7 @@ def report(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.identification.assessment import assess
+        from runtime.identification.identification import assess
         from runtime.json_documents import json_text
         from runtime.records.reading_by_blocks import records_or_streams
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from runtime import load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
-from runtime.identification.record_errors import record_errors
+from runtime.identification.validation import record_errors
 from runtime.records.reading_by_blocks import open_streams
 from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping

@@ -16,7 +16,7 @@ from campaign import campaign
 import runtime
 import runtime.rows.prepared
 from runtime import InputError
-from runtime.identification.assessment import assess
+from runtime.identification.identification import assess
 from runtime.limits import LIMIT
 from runtime.records.provenance import origin, record_names
 from runtime.records.record import Origin

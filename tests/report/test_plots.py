@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from runtime.identification.validation import Comparison, JointComparison
+from runtime.identification.validation import JointComparison
 from runtime.reporting import figures as plots
 
 
@@ -16,7 +16,7 @@ from runtime.reporting import figures as plots
 def comparison():
     t = np.r_[np.linspace(0, 1, 50), np.linspace(2, 3, 50)]
     y = np.sin(5 * t)
-    return Comparison(tuple(JointComparison(str(j), t, y, 0.9 * y) for j in (1, 2, 3)))
+    return tuple(JointComparison(str(j), t, y, 0.9 * y) for j in (1, 2, 3))
 
 
 def test_formats(comparison):
@@ -27,12 +27,12 @@ def test_formats(comparison):
 
 
 def test_same_data_same_bytes(comparison):
-    first, second = (plots.svg(plots.joint_overlay(comparison.joints[0])) for _ in range(2))
+    first, second = (plots.svg(plots.joint_overlay(comparison[0])) for _ in range(2))
     assert first == second
 
 
 def test_lines_break_at_gaps(comparison):
-    upper, lower = plots.joint_overlay(comparison.joints[0]).axes
+    upper, lower = plots.joint_overlay(comparison[0]).axes
     for y in (upper.lines[0].get_ydata(), upper.lines[1].get_ydata(), lower.lines[0].get_ydata()):
         assert np.isnan(y).sum() == 1 and np.isnan(y[50])
 
@@ -41,9 +41,7 @@ def test_panels_stand_apart_and_inside_the_figure():
     t = np.linspace(0, 1, 50)
     y = 1e5 * np.sin(5 * t)
     figure = plots.torque_overlay(
-        Comparison(
-            tuple(JointComparison(str(j), t, 10.0**-j * y, 0.9 * 10.0**-j * y) for j in range(7))
-        )
+        tuple(JointComparison(str(j), t, 10.0**-j * y, 0.9 * 10.0**-j * y) for j in range(7))
     )
     plots.png(figure)
     boxes = [ax.get_tightbbox() for ax in figure.axes if ax.get_visible()] + [
