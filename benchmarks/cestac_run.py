@@ -42,7 +42,7 @@ from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
 from runtime.estimators.essential import essential_of
-from runtime.estimators.normal_equations import least_squares
+from runtime.estimators.solution import solve
 from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
@@ -155,9 +155,7 @@ def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object
     return {
         "  C: draw, filters": draw_and_filter,
         "  C: signals, decimation": lambda: kernels.decimated(work.entries, states, *arguments),
-        "  least squares": lambda: least_squares(
-            work.entries.rows([(y, part.torque, chosen.mask)])
-        ),
+        "  least squares": lambda: solve(work.entries.factor([(y, part.torque, chosen.mask)])),
     }
 
 

@@ -138,13 +138,10 @@ class LevelDocument(LevelResult):
         The runs; null where there are more than a thousand.
     run_count : int
         Number of runs.
-    by_normal_equations : int
-        Number of runs that were solved by normal equations.
     """
 
     runs: tuple[Run, ...] | None  # type: ignore[assignment]
     run_count: Whole
-    by_normal_equations: Whole
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
     FOLDER/runs/study.json
             what makes the runs: settings, hashes of record and model, versions
     FOLDER/runs/000000.npz ...
-            the runs, some thousand in each: level, run, X, residual_norm, normal
+            the runs, some thousand in each: level, run, X, residual_norm
 
 Every file is written whole under another name and then renamed; an archive once written is not
 touched again. A study goes on only where study.json
@@ -201,7 +201,6 @@ def _read(path: Path, b: int) -> Runs:
         "run": ((R,), "i"),
         "X": ((R, b), "f"),
         "residual_norm": ((R,), "f"),
-        "normal": ((R,), "b"),
     }
     if shapes != wanted:
         raise InputError(

@@ -304,12 +304,10 @@ class Cestac(Result):
         }
 
     def _level_summary(self, level: LevelResult) -> dict[str, Any]:
-        """The fields of one level; of many runs, their number and the number solved by normal
-        equations stand for them.
-        """
+        """The fields of one level; of many runs, their number stands for them."""
+        shown = {f.name: getattr(level, f.name) for f in fields(level)}
         runs = list(level.runs) if self.lists_runs else None
-        counts = {"run_count": len(level.runs), "by_normal_equations": int(level.runs.normal.sum())}
-        return {**{f.name: getattr(level, f.name) for f in fields(level)}, "runs": runs, **counts}
+        return {**shown, "runs": runs, "run_count": len(level.runs)}
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:

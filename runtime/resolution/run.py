@@ -23,7 +23,7 @@ from runtime.model.generated import GeneratedModel
 from runtime.model.narrowing import narrowed
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.perturbed import Task, perturbed, system_of, with_deviation
-from runtime.resolution.runs import TRIANGULAR, Level, Run, Runs
+from runtime.resolution.runs import Level, Run, Runs
 from runtime.rows.observation import Observation
 
 Array = np.ndarray
@@ -64,13 +64,11 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     draw = key[1:] if task.settings.common else key
     if work.in_c is not None:
         fit = work.in_c.fit(level, draw)
-        return Run(
-            *key, tuple(fit.X.tolist()), float(np.linalg.norm(fit.residual_norms)), fit.method
-        )
+        return Run(*key, tuple(fit.X.tolist()), fit.residual_norm)
     observation = perturbed(work.columns, work.task, level, draw)
     X = _estimated(work, observation, level)
     norm = float(np.linalg.norm(observation.Y - observation.W @ X))
-    return Run(*key, tuple(X.tolist()), norm, TRIANGULAR)
+    return Run(*key, tuple(X.tolist()), norm)
 
 
 def moved_estimate(task: Task, errors: Sequence[Array]) -> Array:

@@ -9,11 +9,6 @@ import numpy as np
 
 Array = np.ndarray
 
-NORMAL, TRIANGULAR = (
-    "normal equations",
-    "triangular factor",
-)  # How the least squares of a run was solved
-
 
 @dataclass(frozen=True)
 class Run:
@@ -29,15 +24,12 @@ class Run:
         Parameters in column order.
     residual_norm : float, N m or N
         ||Y - W_CESTAC X||.
-    method : str
-        How the least squares was solved: NORMAL or TRIANGULAR.
     """
 
     level: int
     run: int
     X: tuple[float, ...]
     residual_norm: float
-    method: str = TRIANGULAR
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +41,12 @@ class Runs(Sequence[Run]):
     level, run : ndarray of int, shape (R,)
     X : ndarray, shape (R, b)
     residual_norm : ndarray, shape (R,), N m
-    normal : ndarray of bool, shape (R,)
-        Whether the run was solved by normal equations.
     """
 
     level: Array
     run: Array
     X: Array
     residual_norm: Array
-    normal: Array
 
     @classmethod
     def of(cls, runs: Sequence[Run], b: int) -> Runs:
@@ -67,7 +56,6 @@ class Runs(Sequence[Run]):
             np.array([run.run for run in runs], dtype=np.int64),
             np.array([run.X for run in runs], dtype=float).reshape(len(runs), b),
             np.array([run.residual_norm for run in runs], dtype=float),
-            np.array([run.method == NORMAL for run in runs], dtype=bool),
         )
 
     @classmethod
@@ -94,13 +82,11 @@ class Runs(Sequence[Run]):
         return len(self.run)
 
     def __getitem__(self, i: int) -> Run:  # type: ignore[override]
-        method = NORMAL if self.normal[i] else TRIANGULAR
         return Run(
             int(self.level[i]),
             int(self.run[i]),
             tuple(self.X[i].tolist()),
             float(self.residual_norm[i]),
-            method,
         )
 
 

@@ -284,7 +284,6 @@ def checkpoint_arrays() -> dict[str, np.ndarray]:
         "run": np.arange(3),
         "X": np.ones((3, 2)),
         "residual_norm": np.ones(3),
-        "normal": np.ones(3, dtype=bool),
     }
 
 

@@ -121,7 +121,6 @@ def test_least_squares_of_a_motion_that_hardly_accelerates():
     t = np.arange(6000) / 1000.0
     slow = replace(RECORD, q=motion(t / 300)[0])  # accelerations 1e-5 of before
     found = cestac(planar, slow, study(delta=(1e-9,)))
-    assert [run.method for run in found.levels[0].runs] == ["triangular factor"] * 3
     assert np.allclose(found.levels[0].mean, found.reference.X, rtol=1e-3)
 
 
@@ -130,7 +129,6 @@ def test_weights_take_the_way_of_the_identification():
     found = cestac(planar, RECORD, weighted)
     q = perturbed_position(RECORD.q, Level(1e-3), weighted.cestac, None, (0, 1))
     seen = observe(planar, replace(RECORD, q=q), weighted)
-    assert found.levels[0].runs[1].method == "triangular factor"
     assert np.allclose(found.levels[0].runs[1].X, estimate_of(seen, weighted.estimate).X, rtol=1e-9)
 
 
@@ -154,7 +152,7 @@ def test_many_runs_are_not_listed_in_json(small):
         small.levels[0].runs,
         **{
             f: np.repeat(getattr(small.levels[0].runs, f), 400, axis=0)
-            for f in ("run", "level", "X", "residual_norm", "normal")
+            for f in ("run", "level", "X", "residual_norm")
         },
     )
     text = replace(small, levels=(replace(small.levels[0], runs=many), small.levels[1])).to_json()

@@ -43,7 +43,7 @@ def same_bits(found, expected):
     return all(
         np.array_equal(getattr(a.runs, name), getattr(b.runs, name))
         for a, b in zip(found.levels, expected.levels, strict=True)
-        for name in ("run", "X", "residual_norm", "normal")
+        for name in ("run", "X", "residual_norm")
     )
 
 
@@ -224,7 +224,6 @@ def test_archives_are_compact(tmp_path):
         np.arange(R),
         rng.standard_normal((R, b)),
         np.ones(R),
-        np.ones(R, dtype=bool),
     )
     checkpoint = Checkpoint(tmp_path)
     checkpoint.resume({}, b)
@@ -240,7 +239,7 @@ def pickled(path):
     np.savez(
         path,
         X=np.array([{"a": 1}], dtype=object),
-        **dict.fromkeys(("level", "run", "residual_norm", "normal"), np.zeros(1)),
+        **dict.fromkeys(("level", "run", "residual_norm"), np.zeros(1)),
     )
 
 
@@ -251,7 +250,6 @@ def other_shape(path):
         level=np.zeros(2, int),
         run=np.zeros(2, int),
         residual_norm=np.zeros(2),
-        normal=np.zeros(2, bool),
     )
 
 

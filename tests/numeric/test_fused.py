@@ -17,7 +17,7 @@ from scipy.signal import cheby1, sosfiltfilt
 
 from oracles.random_robots import random_robot
 from runtime.errors import InputError
-from runtime.estimators.normal_equations import least_squares
+from runtime.estimators.solution import solve
 from runtime.model.compile_cache import NotCompiledError
 from runtime.model.compiled import CompiledModel
 from runtime.model.loading import cache_folder
@@ -208,47 +208,33 @@ def system(
 
 @pytest.mark.parametrize("K", [40, 511, 512, 513, 2500])
 def test_least_squares_of_kept_rows(K, planar):
-    """Two records; both ways; rows left out by joint."""
+    """Two records; rows left out by joint."""
     entries, y, Y, mask, W = system(planar, K, 1)
     _, y2, Y2, mask2, W2 = system(planar, 30, 2)
-    rows = entries.rows([(y, Y, mask), (y2, Y2, mask2)])
+    factor = entries.factor([(y, Y, mask), (y2, Y2, mask2)])
     every, right = np.vstack([W, W2]), np.concatenate([Y[mask], Y2[mask2]])
     X = np.linalg.lstsq(every, right, rcond=None)[0]
-    norms = [np.hypot(np.linalg.norm((Y[j] - row @ X)[mask[j]]), np.linalg.norm((Y2[j] - row2 @ X)[mask2[j]]))
-             for j, (row, row2) in enumerate(zip(store(entries, y).transpose(1, 2, 0), store(entries, y2).transpose(1, 2, 0), strict=True))]  # fmt: skip
-    unit = every / np.linalg.norm(every, axis=0)
-    for limit, method in ((1e4, "normal equations"), (0.0, "triangular factor")):
-        fit = least_squares(rows, limit)
-        assert fit.method == method
-        np.testing.assert_allclose(fit.X, X, rtol=1e-12, atol=1e-13)
-        np.testing.assert_allclose(fit.residual_norms, norms, rtol=1e-12)
-        assert np.linalg.cond(unit) / 3 < fit.kappa < 3 * np.linalg.cond(unit)
-    factor = rows.factor()
+    fit, unit = solve(factor), every / np.linalg.norm(every, axis=0)
+    np.testing.assert_allclose(fit.X, X, rtol=1e-12, atol=1e-13)
+    assert np.isclose(fit.residual_norm, np.linalg.norm(right - every @ X), rtol=1e-12)
+    assert np.isclose(fit.cond_unit, np.linalg.cond(unit), rtol=1e-9)
     assert [joint.rows for joint in factor.joints] == [
         int(mask[j].sum() + mask2[j].sum()) for j in range(2)
     ]
 
 
-def test_the_condition_decides_which_way_is_taken(planar):
-    entries, y, Y, mask, W = system(planar, 400, 3)
+def test_columns_that_rows_do_not_tell_apart(planar):
+    """Near ones are solved to their digits; of a column without effect the least norm is taken."""
+    entries, y, Y, mask, _ = system(planar, 400, 3)
     first, second = entries.number[0], next(k for k in entries.number if k != entries.number[0])
-    for apart, method in ((1e-2, "normal equations"), (1e-7, "triangular factor")):
+    for apart in (1e-2, 1e-7, 0.0):
         near = y.copy()
-        near[second] = near[first] + apart * y[second]
-        fit = least_squares(entries.rows([(near, Y, mask)]))
+        near[second] = near[first] + apart * y[second] if apart else 0.0
         D = store(entries, near)
         W = np.vstack([D[:, j, mask[j]].T for j in range(2)])
-        unit = np.linalg.cond(W / np.linalg.norm(W, axis=0))
-        if unit > 1e5 or unit < 3e3:  # pairs of columns that never meet in one joint stay apart
-            assert fit.method == ("triangular factor" if unit > 1e5 else "normal equations")
-        residual = np.linalg.norm(Y[mask] - W @ fit.X)
-        assert np.isclose(
-            residual,
-            np.linalg.norm(Y[mask] - W @ np.linalg.lstsq(W, Y[mask], rcond=None)[0]),
-            rtol=1e-10,
-        ), method
-    near[second] = 0  # a column without effect
-    assert least_squares(entries.rows([(near, Y, mask)])).method == "triangular factor"
+        residual = np.linalg.norm(Y[mask] - W @ solve(entries.factor([(near, Y, mask)])).X)
+        best = np.linalg.norm(Y[mask] - W @ np.linalg.lstsq(W, Y[mask], rcond=None)[0])
+        assert np.isclose(residual, best, rtol=1e-10)
 
 
 def test_refusals(planar):

@@ -4,7 +4,7 @@ least squares around the signals of a robot in C.
     FilteredStates(positions, rate, signals, room)
             as runtime.signals.filters.filtered_states, of Positions(q, window, room)
     SignalEntries(model, names)
-            which signals stand where in the wanted columns, and the rows of [W Y] that they make
+            which signals stand where in the wanted columns, and the factor that they make
     decimated(entries, states, samples, ...)
             kept samples of the wanted signals; the signals are not stored
 
@@ -24,14 +24,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf
 from scipy.signal import sosfilt_zi
 
 from runtime.errors import InputError
-from runtime.estimators.normal_equations import JointRows
 from runtime.model.compile_cache import FLAGS, NotCompiledError, shared_object
 from runtime.model.compiled import CompiledSignals
 from runtime.model.loading import cache_folder
 from runtime.resolution.c.folding import STATE, folding_of
+from runtime.rows.factor import Factor, JointFactor
 from runtime.settings.study import Decimate, Lowpass
 from runtime.settings.study import Signals as SignalSettings
 from runtime.signals.filters import (
@@ -314,8 +315,8 @@ class SignalEntries:
             table if len(self.wanted) == table.count else model.signals_alone(self.wanted.tolist())
         )
 
-    def rows(self, parts: Sequence[tuple[Array, Array, Array]]) -> JointRows:
-        """Rows of [W_j Y_j] of decimated signals.
+    def factor(self, parts: Sequence[tuple[Array, Array, Array]]) -> Factor:
+        """Triangular factor of [W Y] of decimated signals.
 
         parts : of each record the signals y, shape (S, K), as `decimated` gives them; torques Y,
         shape (n, K), N m (N); mask, bool, shape (n, K), of the rows used.
@@ -326,8 +327,10 @@ class SignalEntries:
                 np.vstack([self.sign[a:b, None] * y[self.number[a:b]], Y[j]])[:, mask[j]]
                 for y, Y, mask in parts
             ]
-            joints.append(blocks[0] if len(blocks) == 1 else np.hstack(blocks))
-        return JointRows(self.names, self.columns, tuple(joints))
+            rows = np.hstack(blocks)  # of [W_j Y_j]', which LAPACK factors in place
+            R = dgeqrf(rows.T, overwrite_a=1)[0][: len(rows)]
+            joints.append(JointFactor(self.columns[j], np.triu(R), rows.shape[1]))
+        return Factor.of(self.names, joints)
 
 
 def decimated(

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.estimators.normal_equations import LeastSquares, least_squares
+from runtime.estimators.solution import Solution, solve
 from runtime.model.compile_cache import FallbackWarning
 from runtime.model.compiled import CompiledSignals, compiled_model
 from runtime.model.generated import GeneratedModel
@@ -73,16 +73,16 @@ class CompiledWorkspace:
             task.settings.side == "joint" or task.drives is None
         )
 
-    def fit(self, level: Level, draw: tuple[int, ...]) -> LeastSquares:
+    def fit(self, level: Level, draw: tuple[int, ...]) -> Solution:
         """Ordinary least squares of Y on W_CESTAC of one draw, eq. (17)."""
         rows = []
         for k, (record, measured, room) in enumerate(self.records):
             position, torque = stream_keys(draw, k)
             y = self._signals(record, self._states(record, measured, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
-        return least_squares(self.entries.rows(rows))
+        return solve(self.entries.factor(rows))
 
-    def moved_fit(self, errors: Sequence[Array]) -> LeastSquares:
+    def moved_fit(self, errors: Sequence[Array]) -> Solution:
         """The same with the positions of every record moved by `errors`, shape (N, n) each, torques
         as measured.
         """
@@ -91,7 +91,7 @@ class CompiledWorkspace:
             moved = self._positions(record, record.q + error, room)
             states = kernels.FilteredStates(moved, record.rate, record.selection.signals, room)
             rows.append((self._signals(record, states, room), record.torque, record.selection.mask))
-        return least_squares(self.entries.rows(rows))
+        return solve(self.entries.factor(rows))
 
     def _positions(self, record: PreparedRecord, q: Array, room: kernels.Room) -> kernels.Positions:
         """Positions q, shape (N, n), as C reads them."""
