@@ -61,6 +61,8 @@ import runtime
 
 BASE = {"first": 1_000_000, "second": 2_000_000}
 """Seeds: record k has BASE + k."""
+SAVED = 30.0
+"""Time between two writings of the rows, s."""
 NOISES = list(world.NOISES)
 
 
@@ -281,8 +283,7 @@ def study_of(
         move = Motion(move.t, *(_alike(x, j, other) for x in (move.q, move.qd, move.qdd)))
     tau = truth.torque(move)
     if kind == "unmodelled friction":
-        slow = np.array([0.1 * joint.speed for joint in robot.joints])
-        tau = tau + 1.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2))
+        tau = tau + 3 * stribeck(truth, move)
     q = (
         encoded(robot, move, Encoder(2 * pi / float(rng.choice([500, 2000, 8000, 20000]))), seed)
         if kind == "encoder"
@@ -448,41 +449,72 @@ ONE_OF = 3
 
 
 def causes(k: int, seed: int, seeds: str) -> list[Row]:
-    """One study: right, or with one of WRONG; the findings that are not good, and causes that are named."""
-    robots = robots_of(seeds)
-    rng, robot = np.random.default_rng([seed, 59]), robots[(k // 2) % len(robots)]
+    """One study: right, or with one of WRONG; the findings that are not good, and causes that are named.
+
+    Right studies have records of 3 or 10 s, noise of 0.5 to 10 % and, every third, friction that is
+    not the model's; wrong ones 10 s, at most 3 % and the friction of the model.
+    """
     wrong = WRONG[(k // ONE_OF) % len(WRONG)] if k % ONE_OF == ONE_OF - 1 else None
+    robots = robots_of(seeds) if wrong else (*robots_of(seeds), *world.SPECIAL)
+    rng, robot = np.random.default_rng([seed, 59]), robots[(k // 3 + k // 30 + k) % len(robots)]
     motion, kind = MOVES[int(rng.integers(3))], NOISES[int(rng.integers(3))]
-    truth = Truth(robot, seed)
-    move, seconds = world.MOTIONS[motion](robot, seed), 10.0
+    seconds = 10.0 if wrong or rng.uniform() < 0.7 else 3.0
+    share = float(rng.choice([0.005, 0.01, 0.03] if wrong else [0.005, 0.01, 0.03, 0.1]))
+    truth, move = Truth(robot, seed), world.MOTIONS[motion](robot, seed, seconds=seconds)
     tau = truth.torque(move)
-    q, tau = (
-        move.q,
-        tau + noise(tau, world.NOISES[kind], float(rng.choice([0.005, 0.01, 0.03])), seed),
-    )
-    j = int(
-        rng.integers(1, robot.n)
-    )  # the zero and the sign of the first joint can often not be told
+    other = wrong is None and rng.uniform() < 1 / 3
+    if other:
+        tau = tau + stribeck(truth, move)
+    q, tau = move.q, tau + noise(tau, world.NOISES[kind], share, seed)
+    j = int(rng.integers(1, robot.n))  # the first joint's zero and sign can often not be told
     if wrong is not None:
         q, tau = wrong.spoil(truth, move, q, tau, j, rng)
     model, variants = emitted(robot.name)
     record = runtime.Record(np.arange(len(q)) / world.RATE, q, tau)
     found = runtime.plausibility(model, record, study(robot, motion), variants=variants)
-    texts = [f"{c.question} {c.finding}" for c in found.checks if c.state in ("doubtful", "no")]
-    texts += [one["cause"] for one in found.named_causes]
-    pattern = wrong and wrong.name.format(j=j + 1, i=(j + 1) % robot.n + 1)
-    return [{"wrong": wrong.label if wrong else "", "robot": robot.name, "motion": motion, "noise": kind, "seconds": seconds, "joint": j + 1, "texts": texts,
-             "causes": [one["cause"] for one in found.named_causes], "states": [c.state for c in found.checks if c.state in ("doubtful", "no")],
-             "named": bool(pattern and any(re.search(pattern, text) for text in texts)), "equivalent": list(found.equivalent)}]  # fmt: skip
+    told = [c for c in found.checks if c.state in ("doubtful", "no")]
+    named = [one["cause"] for one in found.named_causes]
+    texts = [*(f"{c.question} {c.finding}" for c in told), *named]
+    pattern = wrong.name.format(j=j + 1, i=(j + 1) % robot.n + 1) if wrong else "nothing is wrong"
+    return [
+        {
+            "wrong": wrong.label if wrong else "",
+            "robot": robot.name,
+            "motion": motion,
+            "noise": kind,
+            "share": share,
+            "seconds": seconds,
+            "other friction": other,
+            "joint": j + 1,
+            "texts": texts,
+            "states": [c.state for c in told],
+            "named": any(re.search(pattern, text) for text in texts),
+            "other causes": [text for text in named if not re.search(pattern, text)],
+            "equivalent": list(found.equivalent),
+        }
+    ]
+
+
+def stribeck(truth: Truth, move: Motion) -> Array:
+    """What friction has above Coulomb's at low speed: half of it again, over a tenth of the speed."""
+    slow = np.array([0.1 * joint.speed for joint in truth.robot.joints])
+    return np.asarray(0.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2)))
 
 
 def causes_table(rows: list[Row]) -> str:
     lines = []
     for label in ("", *(w.label for w in WRONG)):
         own = among(rows, wrong=label)
-        told = sum(bool(r["texts"]) for r in own)
-        lines.append((label or "nothing (right studies)", len(own), sum(r["named"] for r in own) if label else "-",
-                      sum(bool(r["causes"]) and not r["named"] for r in own), told))  # fmt: skip
+        lines.append(
+            (
+                label or "nothing (right studies)",
+                len(own),
+                sum(r["named"] for r in own) if label else "-",
+                sum(bool(r["other causes"]) for r in own),
+                sum("no" in r["states"] for r in own),
+                sum(bool(r["texts"]) for r in own),
+            )
+        )
     right: dict[str, int] = {}
     for r in among(rows, wrong=""):
         for text in r["texts"]:
@@ -492,12 +524,14 @@ def causes_table(rows: list[Row]) -> str:
         "what is wrong",
         "studies",
         "told by name",
-        "another cause named",
+        "another cause named, alone or beside it",
+        "a No",
         "any finding that is not good",
     )
+    wrong = [r for r in rows if r["wrong"]]
     return (
         markdown(head, lines)
-        + "\n\n"
+        + f"\n\nWrong studies told by name: {sum(r['named'] for r in wrong)} of {len(wrong)}.\n\n"
         + markdown(("told of right studies", "times"), sorted(right.items(), key=lambda x: -x[1]))
     )
 
@@ -585,6 +619,7 @@ def physics_table(rows: list[Row]) -> str:
     for label in PHYSICAL:
         own = among(rows, robot=label)
         asked = [r for r in own if r["feasible"] is not None]
+        fitted = [r for r in own if r.get("message")]
         blocked = sorted({b for r in asked for b in r["blocking"] if not r["feasible"]})
         low = [
             min(m / t for m, t in zip(r["masses"].values(), r["true masses"], strict=False))
@@ -597,9 +632,9 @@ def physics_table(rows: list[Row]) -> str:
             if r["masses"]
         ]
         said = dict.fromkeys(r["said"].strip() for r in own if r["said"].strip())
-        lines.append((label, len(own), len(asked), sum(not r["feasible"] for r in asked), ", ".join(blocked[:4]), middle([r["error free"] for r in own]), middle([r["error"] for r in own]),
+        lines.append((label, len(own), len(asked), sum(not r["feasible"] for r in asked), ", ".join(blocked[:4]), sum("NOT physically" in r["message"] for r in fitted), middle([r["error free"] for r in own]), middle([r["error"] for r in own]),
                       middle(low), middle(high), "; ".join(text[:120] for text in list(said)[:2])))  # fmt: skip
-    head = ("robot", "records", "judged", "said not to be physical", "by", "true error of all, median %", "of the feasible, median %",
+    head = ("robot", "records", "judged", "said not to be physical", "by", "the feasible fit says so", "true error of all, median %", "of the feasible, median %",
             "mass over true mass: smallest link", "largest link", "what is said")  # fmt: skip
     return markdown(head, lines)
 
@@ -631,18 +666,36 @@ def one(task: tuple[str, int, str]) -> tuple[int, list[Row]]:
 
 
 def asked(
-    question: str, records: int, seeds: str, workers: int = 1, minutes: float = np.inf
+    question: str,
+    records: int,
+    seeds: str,
+    workers: int = 1,
+    minutes: float = np.inf,
+    *,
+    before: Sequence[Row] = (),
+    saved: Callable[[list[Row]], None] = lambda rows: None,
 ) -> list[Row]:
-    """Rows of the first records, in their order; fewer where the time ends before."""
-    began, results = time.monotonic(), []
-    for k, rows in done([(question, k, seeds) for k in range(records)], workers):
-        results.append((k, rows))
-        if time.monotonic() - began > 60 * minutes:
+    """Rows of the first records, in their order; fewer where the time ends before.
+
+    before : rows of the first of them, from an earlier call. saved : called with all rows from time
+    to time.
+    """
+    rows, first = list(before), 1 + max((row["record"] for row in before), default=-1)
+    began = last = time.monotonic()
+    for k, own in done([(question, k, seeds) for k in range(first, records)], workers):
+        rows += [row | {"record": k} for row in own]
+        now = time.monotonic()
+        if now - last > SAVED:
+            saved(rows)
+            last = now
+        if now - began > 60 * minutes:
             break
-    return [row | {"record": k} for k, rows in results for row in rows]
+    saved(rows)
+    return rows
 
 
 def done(tasks: Sequence[tuple[str, int, str]], workers: int) -> Iterator[tuple[int, list[Row]]]:
+    """(record, rows) in the order of the records."""
     if workers == 1:
         yield from map(one, tasks)
         return
@@ -650,47 +703,48 @@ def done(tasks: Sequence[tuple[str, int, str]], workers: int) -> Iterator[tuple[
         yield from pool.imap(one, tasks)
 
 
+def report(question: str, rows: Sequence[Row]) -> str:
+    """The table of the rows, and the records that broke."""
+    broke = [row for row in rows if "broke" in row]
+    lines = [f"record {row['record']} ended with {row['broke'][:300]}" for row in broke]
+    table = QUESTIONS[question][1]([row for row in rows if "broke" not in row])
+    return "\n\n".join([*lines, table])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--question", choices=[*QUESTIONS, "all"], required=True)
-    parser.add_argument("--records", type=int, help="default: as many as the page is to have")
-    parser.add_argument("--seeds", choices=list(BASE), default="first")
-    parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument(
-        "--minutes", type=float, default=np.inf, help="start no record after this time"
-    )
-    parser.add_argument("--folder", type=Path, default=Path())
+    add = parser.add_argument
+    add("--question", choices=[*QUESTIONS, "all"], required=True)
+    add("--records", type=int, help="default: as many as the page is to have")
+    add("--seeds", choices=list(BASE), default="first")
+    add("--workers", type=int, default=1)
+    add("--minutes", type=float, default=np.inf, help="of a question, after which no record starts")
+    add("--folder", type=Path, default=Path(), help="where truth_QUESTION_SEEDS.json is written")
+    add("--more", action="store_true", help="go on from the records in that file")
     given = parser.parse_args()
     for question in QUESTIONS if given.question == "all" else [given.question]:
-        _, table, usual = QUESTIONS[question]
-        began = time.monotonic()
-        rows = asked(question, given.records or usual, given.seeds, given.workers, given.minutes)
-        count = len({row["record"] for row in rows})
-        broke = [row for row in rows if "broke" in row]
-        print(
-            f"\n**{question}**, seeds {given.seeds}, {count} records, {time.monotonic() - began:.0f} s",
-            flush=True,
-        )
-        print(
-            *(f"\nrecord {row['record']} ended with {row['broke'][:300]}" for row in broke), sep=""
-        )
-        print(table([row for row in rows if "broke" not in row]) + "\n", flush=True)
         file = given.folder / f"truth_{question}_{given.seeds}.json"
-        file.write_text(
-            json.dumps(
-                {
-                    "question": question,
-                    "seeds": given.seeds,
-                    "base": BASE[given.seeds],
-                    "records": count,
-                    "rows": rows,
-                },
-                indent=1,
-                default=float,
-            )
+        head = {"question": question, "seeds": given.seeds, "base": BASE[given.seeds]}
+
+        def saved(rows: list[Row], file: Path = file, head: Row = head) -> None:
+            file.write_text(json.dumps(head | {"rows": rows}, indent=1, default=float))
+
+        before = json.loads(file.read_text())["rows"] if given.more and file.exists() else []
+        records = given.records or QUESTIONS[question][2]
+        rows = asked(
+            question,
+            records,
+            given.seeds,
+            given.workers,
+            given.minutes,
+            before=before,
+            saved=saved,
         )
+        count = len({row["record"] for row in rows})
+        print(f"\n**{question}**, seeds {given.seeds}, {count} records\n", flush=True)
+        print(report(question, rows), flush=True)
 
 
 if __name__ == "__main__":

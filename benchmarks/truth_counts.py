@@ -55,7 +55,7 @@ FAULTS = (
         "eccentric by 4 steps", replace(EVEN, eccentric=4.0), r"eccentric|once a turn|a turn|uneven"
     ),
     Fault("quadrature of 0.05 step", replace(EVEN, quadrature=0.05), r"uneven|quadrature|lines"),
-    Fault("slow motion", EVEN, r"slow|few counts|speed", motion="slow"),
+    Fault("slow motion", EVEN, r"slow|few|speed", motion="slow"),
     Fault("rests 20 to 27 %", EVEN, r"rest|low_speed|stand", motion="points"),
     Fault("encoder in the loop", EVEN, r"to and fro|loop|shakes?", loop=True),
 )
@@ -93,6 +93,8 @@ def counts(k: int, seed: int, seeds: str) -> list[Row]:
     motion = (fault.motion if fault else "") or ("fourier", "chirp", "points", "fourier")[
         int(rng.integers(4)) if fault is None else int(rng.integers(2))
     ]
+    if motion == "slow" and (cell // (len(FAULTS) * len(robots))) % 2:
+        motion = "crawl"
     encoder = (
         fault.encoder if fault else Encoder(2 * pi / STEPS[(cell // len(robots)) % len(STEPS)])
     )
@@ -107,7 +109,10 @@ def counts(k: int, seed: int, seeds: str) -> list[Row]:
     else:
         told, tau = encoded(robot, move, encoder, seed), truth.torque(move)
         tau = tau + noise(tau, 0.9, 0.01, seed)
-    record, unseen = record_of(move, tau, told), Unseen(truth, seed)
+    record, unseen = (
+        record_of(move, tau, told),
+        Unseen(truth, seed, slow=motion in ("slow", "crawl")),
+    )
     low = [0.02 * j.speed for j in robot.joints]
     rows = {"rows": {"low_speed": low}} if motion == "points" and not fault else {}
     own: Row = {

@@ -70,7 +70,8 @@ def least_squares(W: Array, Y: Array) -> Array:
 
 
 class Unseen:
-    """Two motions that no record of a robot has, a Fourier one and one from point to point.
+    """Two motions that no record of a robot has, a Fourier one and one from point to point; of slow
+    records two slow ones, since they do not tell what fast ones need.
 
     Attributes
     ----------
@@ -79,11 +80,13 @@ class Unseen:
         Without noise.
     """
 
-    def __init__(self, truth: Truth, seed: int) -> None:
-        moves = [
-            world.fourier(truth.robot, seed + 500_000),
-            world.points(truth.robot, seed + 500_000, rest=0.0),
-        ]
+    def __init__(self, truth: Truth, seed: int, *, slow: bool = False) -> None:
+        other = seed + 500_000
+        moves = (
+            [world.slow(truth.robot, other), world.slow(truth.robot, other + 1)]
+            if slow
+            else [world.fourier(truth.robot, other), world.points(truth.robot, other, rest=0.0)]
+        )
         q, qd, qdd = (
             np.concatenate([getattr(m, key)[::10] for m in moves]) for key in ("q", "qd", "qdd")
         )

@@ -368,14 +368,21 @@ def fourier(robot: Robot, seed: int, seconds: float = 10.0, slow: float = 1.0) -
 
 
 def _slowed(robot: Robot, t: Array, q: Array, qd: Array, qdd: Array, slow: float) -> Motion:
-    fast = np.array([j.speed for j in robot.joints]) / slow
-    scale = fast / np.abs(qd).max(axis=0)
+    q = q - (q.max(axis=0) + q.min(axis=0)) / 2
+    reach = np.array([j.reach for j in robot.joints])
+    speed = np.array([j.speed for j in robot.joints]) / slow
+    scale = np.minimum(speed / np.abs(qd).max(axis=0), reach / np.abs(q).max(axis=0))
     return Motion(t, q * scale, qd * scale, qdd * scale)
 
 
 def slow(robot: Robot, seed: int, seconds: float = 10.0) -> Motion:
     """The Fourier motion at a twelfth of the speed."""
     return fourier(robot, seed, seconds, slow=12.0)
+
+
+def crawl(robot: Robot, seed: int, seconds: float = 10.0) -> Motion:
+    """The Fourier motion at a hundredth of the speed."""
+    return fourier(robot, seed, seconds, slow=100.0)
 
 
 def chirp(robot: Robot, seed: int, seconds: float = 10.0) -> Motion:
@@ -436,6 +443,7 @@ MOTIONS: Mapping[str, Callable[..., Motion]] = {
     "chirp": chirp,
     "points": points,
     "slow": slow,
+    "crawl": crawl,
 }
 
 
@@ -502,7 +510,10 @@ class Lines:
     edges: tuple[Array, ...] = field(repr=False)
 
     def counts(self, q: Array) -> Array:
-        """Counts, integers, shape of q (..., n)."""
+        """Counts, integers, shape of q (..., n); ValueError where q leaves the scale."""
+        for j, edges in enumerate(self.edges):
+            if q[..., j].min() < edges[0] or q[..., j].max() >= edges[-1]:
+                raise ValueError(f"joint {j + 1} leaves its scale of {len(edges)} lines")
         columns = [
             np.searchsorted(self.edges[j], q[..., j], side="right") - 1 + self.first[j]
             for j in range(len(self.step))
