@@ -18,13 +18,11 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel
-from runtime.signals.decimation import Decimation, Plan
+from runtime.signals.decimation import PIECE, Plan, decimated_pieces
 from runtime.signals.filters import States
 
 Array = np.ndarray
 
-# samples evaluated at a time: those that an emitted module takes at once, whose rows stay in cache
-BLOCK = 4096
 PROBES = 64  # random states that tell signals apart
 
 
@@ -84,12 +82,9 @@ def decimated_signals(
     """
     signals, N = partial(_signals, model, entries, constants, {}), len(states)
     if plan is None:
-        blocks = [signals(states[t0 : t0 + BLOCK]).copy() for t0 in range(0, N, BLOCK)]
+        blocks = [signals(states[t0 : t0 + PIECE]).copy() for t0 in range(0, N, PIECE)]
         return np.concatenate(blocks, axis=1)
-    decimation = Decimation(plan, len(entries.source))
-    for t0, t1 in plan.pieces(BLOCK):
-        decimation.take(signals(states[t0:t1]), t0)
-    return decimation.result()
+    return decimated_pieces(lambda t0, t1: signals(states[t0:t1]), len(entries.source), plan)
 
 
 def _signals(

@@ -31,6 +31,7 @@ digits at n_d = 100.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -50,7 +51,9 @@ LONGEST, MOST_KEPT = (
     320,
     8,
 )  # samples and kept samples of a block; the time is flat around these
-PIECE = 4096  # samples of a signal treated at a time: rows of 32 kB, which stay in cache
+# samples of a signal treated at a time, as many as an emitted module takes at once: rows of 32 kB,
+# which stay in cache
+PIECE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +116,11 @@ class Plan:
     A: Array
     Ax: Array
 
-    def pieces(self, samples: int = PIECE) -> list[tuple[int, int]]:
-        """How signals must be cut: pieces [t0, t1) of about `samples` samples, of whole blocks but
-        for the first and the last.
+    def pieces(self) -> list[tuple[int, int]]:
+        """How signals are cut: pieces [t0, t1) of about PIECE samples, of whole blocks but for the
+        first and the last.
         """
-        length = max(1, samples // self.L) * self.L
+        length = max(1, PIECE // self.L) * self.L
         cuts = [0, *range(self.phase + length, self.N, length), self.N]
         return list(pairwise(cuts))
 
@@ -154,55 +157,42 @@ def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
     )
 
 
-class Decimation:
-    """The decimation of S signals by one plan: `take` every piece of the plan, then `result`. Room
-    is reused from one decimation to the next.
+def decimate(u: Array, plan: Plan) -> Array:
+    """Kept samples, shape (S, K), of signals u, shape (S, N)."""
+    return decimated_pieces(lambda t0, t1: u[:, t0:t1], len(u), plan)
+
+
+def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> Array:
+    """The same of S signals that are read once, piece by piece: read(t0, t1) gives the samples [t0,
+    t1) of every signal, shape (S, t1 - t0), which need not last.
     """
-
-    def __init__(self, plan: Plan, S: int) -> None:
-        self.plan, m2 = plan, len(plan.Mx)
-        self.products = np.empty((plan.blocks, S, plan.PQY.shape[1]))
-        self.first, self.last = np.empty((S, len(plan.X0))), np.empty((S, len(plan.A)))
-        self.x, self.v = np.empty((plan.blocks + 1, S, m2)), np.empty((plan.blocks, S, m2))
-
-    def take(self, u: Array, t0: int) -> None:
-        """Samples t0, t0 + 1, ... of every signal, shape (S, B): one of the pieces of the plan."""
-        p, t1 = self.plan, t0 + u.shape[1]
-        start = max(t0, p.phase)
+    p, m2 = plan, len(plan.Mx)
+    products = np.empty((p.blocks, S, p.PQY.shape[1]))
+    first, last = np.empty((S, len(p.X0))), np.empty((S, len(p.A)))
+    for t0, t1 in p.pieces():
+        u, start = read(t0, t1), max(t0, p.phase)
         b0, b1 = (start - p.phase) // p.L, min(p.blocks, (t1 - p.phase) // p.L)
         if b1 > b0:
             blocks = u[:, start - t0 : start - t0 + (b1 - b0) * p.L].reshape(-1, p.L)
-            self.products[b0:b1] = (blocks @ p.PQY).reshape(len(u), b1 - b0, -1).swapaxes(0, 1)
-        copy_overlap(u, t0, self.first, 0)
-        copy_overlap(u, t0, self.last, p.N - self.last.shape[1])
-
-    def result(self) -> Array:
-        """The kept samples, shape (S, K)."""
-        p, x, v = self.plan, self.x, self.v
-        (blocks, S, m2), K = v.shape, p.blocks * p.G
-        x[0] = self.first @ p.X0
-        recursion(p.step, x, self.products[..., :m2])
-        end = self.last @ p.A + x[-1] @ p.Ax
-        y = np.empty((S, p.K))
-        y[:, K:] = end[:, m2:]
-        if blocks:
-            v[-1] = end[:, :m2]
-            states = x[:-1].reshape(-1, m2)
-            drive = self.products[..., m2 : 2 * m2] + (states @ p.Mx).reshape(v.shape)
-            recursion(p.step, v[::-1], drive[:0:-1])
-            outputs = self.products[..., 2 * m2 :] + (
-                states @ p.Yx + v.reshape(-1, m2) @ p.Yv
-            ).reshape(blocks, S, -1)
-            y[:, :K] = outputs.swapaxes(0, 1).reshape(S, K)
-        return y
-
-
-def decimate(u: Array, plan: Plan) -> Array:
-    """Kept samples, shape (S, K), of signals u, shape (S, N)."""
-    decimation = Decimation(plan, len(u))
-    for t0, t1 in plan.pieces():
-        decimation.take(u[:, t0:t1], t0)
-    return decimation.result()
+            products[b0:b1] = (blocks @ p.PQY).reshape(S, b1 - b0, -1).swapaxes(0, 1)
+        copy_overlap(u, t0, first, 0)
+        copy_overlap(u, t0, last, p.N - last.shape[1])
+    K, x, v = p.blocks * p.G, np.empty((p.blocks + 1, S, m2)), np.empty((p.blocks, S, m2))
+    x[0] = first @ p.X0
+    recursion(p.step, x, products[..., :m2])
+    end = last @ p.A + x[-1] @ p.Ax
+    y = np.empty((S, p.K))
+    y[:, K:] = end[:, m2:]
+    if p.blocks:
+        v[-1] = end[:, :m2]
+        states = x[:-1].reshape(-1, m2)
+        drive = products[..., m2 : 2 * m2] + (states @ p.Mx).reshape(v.shape)
+        recursion(p.step, v[::-1], drive[:0:-1])
+        outputs = products[..., 2 * m2 :] + (states @ p.Yx + v.reshape(-1, m2) @ p.Yv).reshape(
+            p.blocks, S, -1
+        )
+        y[:, :K] = outputs.swapaxes(0, 1).reshape(S, K)
+    return y
 
 
 def recursion(a: Array, x: Array, drive: Array) -> None:

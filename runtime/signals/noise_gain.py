@@ -52,7 +52,6 @@ class Bandwidth:
     gain : of the decimation at frequency 0.
     speed : rho_k, k = 0, 1 ...: correlation of dqd.
     decimation : r_k of the decimation filter; r_0 = 1 alone without decimation.
-    torque : variance left by the decimation of white noise of variance 1.
     """
 
     before: Array
@@ -60,11 +59,6 @@ class Bandwidth:
     gain: float
     speed: Array
     decimation: Array
-
-    @property
-    def torque(self) -> float:
-        """r_0, variance of decimated white noise of variance 1."""
-        return float(self.decimation[0])
 
 
 def bandwidth(signals: Signals, rate: float) -> Bandwidth:
