@@ -11,10 +11,9 @@ import numpy as np
 
 from symgen.certify.printed import definitions, equations, evaluated
 from symgen.certify.witness import Witness
-from symgen.derive.columns import element_names, unit
+from symgen.derive.columns import acting, element_names, unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
-from symgen.description.robot import Element
 from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping
 
@@ -134,19 +133,12 @@ def _same_elements(table: Any, constants: Mapping[str, float], witness: Witness)
         return False
     for name, (e, j) in expected.items():
         kind, when, row = table[name]
-        right = {i: c.value(constants) for i, c in _row(e, j).items()}
+        right = {i: c.value(constants) for i, c in acting(e, j).items()}
         if (kind, when) != (e.kind, e.when or "both") or {*row} != {*right}:
             return False
         if any(abs(row[i] - c) > EVALUATED_TWICE * abs(c) for i, c in right.items()):
             return False
     return True
-
-
-def _row(e: Element, j: int) -> dict[Any, Any]:
-    """Row {joint: G}, or form {(i, j): B}, i <= j, of an element's key."""
-    if j in e.along:
-        return dict(e.along[j])
-    return {place: c for place, c in e.form[j].items() if place[0] <= place[1]}
 
 
 def certified_formulas(regrouping: Regrouping, text: str) -> str:

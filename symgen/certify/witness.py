@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symgen.derive.exact import Array
+from symgen.derive.loop_residual import inertia_of
 from symgen.derive.loops import close
 from symgen.derive.models import DISSIPATIVE, EMITTED
 from symgen.description.expression import ONE
@@ -100,17 +101,12 @@ class Witness:
                 self.chi[self.robot.parameters.index(X[name][0])] += value - X[name][1]
         self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
-        self.A = self._inertia()  # (N, n, n)
+        self.A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
         massless = np.linalg.matrix_rank(self.A).min() < self.q.shape[1]
         self.left_out = {
             *["gravity"] * absorbing,
             *["forward_dynamics", "forward_dynamics_derivatives"] * bool(massless),
         }
-
-    def _inertia(self) -> Array:
-        from symgen.derive.lagrange import by_columns  # CasADi, loaded late
-
-        return by_columns(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:
         """Gamma of the actuated joints, (..., n)."""

@@ -5,6 +5,7 @@ joints.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Scalar
 from symgen.derive.time_limit import require_time
+from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, KINDS, PRISMATIC, Element, Robot, parameter
 
 UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
@@ -27,6 +29,12 @@ def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
 def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
     """{name: (element, key)}."""
     return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
+
+
+def acting(e: Element, j: int) -> dict[Any, Expression]:
+    """Row {joint: G}, or form {(i, k): B}, i <= k, of an element's key."""
+    form = {place: b for place, b in sorted(e.form.get(j, {}).items()) if place[0] <= place[1]}
+    return form or dict(e.along[j])
 
 
 def unit(robot: Robot, name: str) -> str:

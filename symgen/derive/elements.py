@@ -24,13 +24,8 @@ def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
 
 
 def _coordinate(motion: Motion, kind: str, j: int) -> Scalar:
-    match kind:
-        case "inertia":
-            return motion.qdd(j)
-        case "viscous" | "coulomb":
-            return motion.qd(j)
-        case _:
-            return motion.q(j)
+    rates = {"inertia": motion.qdd, "viscous": motion.qd, "coulomb": motion.qd}
+    return rates.get(kind, motion.q)(j)
 
 
 def _along(motion: Motion, e: Element, j: int) -> Scalar:

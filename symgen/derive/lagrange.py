@@ -36,7 +36,7 @@ University, 1965.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -44,7 +44,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symgen.derive.loop_residual import newton
+from symgen.derive.loop_residual import inertia_of, newton
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
@@ -221,7 +221,7 @@ class Lagrange:
         """A = d2E/dqd2, (..., n, n): column i is Gamma for qdd_i = 1 from rest, less that at
         rest.
         """
-        return by_columns(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
+        return inertia_of(lambda qdd: self.torque(q, 0 * q, qdd, chi), q)
 
     def jacobian(self, q: Array, frame: int | None = None) -> Array:
         """Velocity of the origin, then angular velocity w from hat(w) = Rdot R', of `frame`
@@ -311,12 +311,6 @@ class Lagrange:
         """G' D_tree at actuated q, qd, qdd (..., n_a), order `robot.joints`: (..., n_a, p)."""
         *state, G = self.motion(q, qd, qdd)
         return np.swapaxes(G, -1, -2) @ self.regressor(*state)
-
-
-def by_columns(torque: Callable[[Array], Array], q: Array) -> Array:
-    """A (..., n, n) of torques that are A qdd + b in qdd (..., n); q gives their shape."""
-    rest = torque(0 * q)
-    return np.stack([torque(0 * q + e) - rest for e in np.eye(q.shape[-1])], axis=-1)
 
 
 def _axial(W: Array) -> Array:

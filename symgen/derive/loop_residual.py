@@ -70,6 +70,12 @@ def differences(
     return r[..., 0, :], np.swapaxes(J, -1, -2)
 
 
+def inertia_of(torque: Callable[[Array], Array], q: Array) -> Array:
+    """A (..., n, n) of torques that are A qdd + b in qdd (..., n); q gives their shape."""
+    rest = torque(0 * q)
+    return np.stack([torque(0 * q + e) - rest for e in np.eye(q.shape[-1])], axis=-1)
+
+
 def newton(
     residual: Callable[[Array], Array],
     q: Array,

@@ -10,7 +10,7 @@ from textwrap import wrap
 from typing import Any
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import element_names
+from symgen.derive.columns import acting, element_names
 from symgen.derive.model import Entry
 from symgen.derive.models import EMITTED
 from symgen.description.expression import Expression
@@ -330,11 +330,7 @@ def element_lines(robot: Robot, language: Language) -> list[str]:
     """Entries {parameter: (kind, direction of motion, row or form)} of the elements, as source."""
     entries = []
     for name, (e, j) in element_names(robot).items():
-        if j in e.form:
-            acts = {f"({i}, {k})": b for (i, k), b in sorted(e.form[j].items()) if i <= k}
-        else:
-            acts = {str(i): g for i, g in e.along[j].items()}
-        text = ", ".join(f"{place}: {source(language, g)}" for place, g in acts.items())
+        text = ", ".join(f"{at}: {source(language, g)}" for at, g in acting(e, j).items())
         entries.append(
             (
                 robot.parameters.index(name),
