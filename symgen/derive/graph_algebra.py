@@ -110,10 +110,10 @@ class GraphAlgebra:
         return self.graph.call(SIGN, rate)
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
-        way = 1 if when == "positive" else -1
-        direction, speed = (
-            self.graph.call(POS, x * way) * way for x in (self.graph.call(SIGN, rate), rate)
-        )
+        forward = when == "positive"
+        sides = [x if forward else -x for x in (self.graph.call(SIGN, rate), rate)]
+        parts = [self.graph.call(POS, x) for x in sides]
+        direction, speed = (x if forward else -x for x in parts)
         return direction, speed
 
     def name(self, value: Scalar, name: str) -> Scalar:
