@@ -17,11 +17,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 LARGEST_PRIME = 1000  # of the trial division under square roots
 
-Monomial = tuple[tuple["str | Number | Call", int], ...]
+Atom: TypeAlias = "str | Number | Call"
+Monomial = tuple[tuple[Atom, int], ...]
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Expression:
 
     @staticmethod
     def symbol(name: str) -> Expression:
-        return Expression({((name, 1),): Fraction(1)})
+        return _atom(name)
 
     @staticmethod
     def of(value: Expression | int | Fraction) -> Expression:
@@ -130,7 +131,7 @@ class Expression:
             ((m, c),) = self.terms.items()
             m, root = _with_simple_roots(tuple((a, -n) for a, n in m))
             return Expression({m: root / c})
-        return _atom("inv", self)
+        return _atom(Call("inv", self))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Expression) and self.terms == other.terms
@@ -191,21 +192,25 @@ class Expression:
                 terms[tuple((a, n) for a, n in m if a not in wanted)] = c
         return Expression(terms)
 
-    def substitute(self, values: Mapping[str, Expression]) -> Expression:
-        """Replace symbols by expressions."""
+    def mapped(self, image: Callable[[Atom], Expression]) -> Expression:
+        """Replace every atom by its image."""
         result = Expression()
         for m, c in self.terms.items():
             term = Expression({(): c})
             for a, n in m:
-                if isinstance(a, Call):
-                    base = call(a.function, a.argument.substitute(values))
-                elif isinstance(a, Number):
-                    base = Expression({((a, 1),): Fraction(1)})
-                else:
-                    base = values.get(a, Expression.symbol(a))
-                term = term * base**n
+                term = term * image(a) ** n
             result = result + term
         return result
+
+    def substitute(self, values: Mapping[str, Expression]) -> Expression:
+        """Replace symbols by expressions."""
+
+        def image(a: Atom) -> Expression:
+            if isinstance(a, Call):
+                return call(a.function, a.argument.substitute(values))
+            return values.get(a, _atom(a)) if isinstance(a, str) else _atom(a)
+
+        return self.mapped(image)
 
     def evaluate(
         self,
@@ -288,13 +293,10 @@ def decimal(c: Fraction) -> str:
 
 
 def _factors(m: Monomial, c: Fraction) -> str:
-    up = [f"{a}" if n == 1 else f"{a}**{n}" for a, n in m if n > 0 and not _is_inverse(a)]
-    down = [(f"{a}" if n == -1 else f"{a}**{-n}") for a, n in m if n < 0]
-    down += [
-        f"({a.argument})" if n == 1 else f"({a.argument})**{n}"
-        for a, n in m
-        if n > 0 and isinstance(a, Call) and a.function == "inv"
-    ]
+    inverses = {a for a, _ in m if isinstance(a, Call) and a.function == "inv"}
+    up = [_power(f"{a}", n) for a, n in m if n > 0 and a not in inverses]
+    down = [_power(f"{a}", -n) for a, n in m if n < 0]
+    down += [_power(f"({a.argument})", n) for a, n in m if n > 0 and a in inverses]
     c = abs(c)
     text = decimal(c)
     if m and "/" in text:
@@ -305,8 +307,8 @@ def _factors(m: Monomial, c: Fraction) -> str:
     return "*".join(up) + "".join(f"/{d}" for d in down)
 
 
-def _is_inverse(a: str | Number | Call) -> bool:
-    return isinstance(a, Call) and a.function == "inv"
+def _power(base: str, n: int) -> str:
+    return base if n == 1 else f"{base}**{n}"
 
 
 def _order(m: Monomial) -> tuple[Any, ...]:
@@ -341,8 +343,8 @@ def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
     return tuple(powers), factor
 
 
-def _atom(function: str, argument: Expression) -> Expression:
-    return Expression({((Call(function, argument), 1),): Fraction(1)})
+def _atom(a: Atom) -> Expression:
+    return Expression({((a, 1),): Fraction(1)})
 
 
 def _sqrt_of_rational(c: Fraction) -> Expression:
@@ -352,15 +354,13 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
     if c < 0:
         raise ValueError("square root of a negative number")
     rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
-    if (whole := _isqrt(rest)) is not None:
-        return result * whole
     for l in range(2, LARGEST_PRIME):
         while rest % (l * l) == 0:
             rest, result = rest // (l * l), result * l
         if rest % l == 0:
-            rest, result = rest // l, result * _atom("sqrt", Expression.number(l))
-    whole = _isqrt(rest)
-    return result * whole if whole is not None else result * _atom("sqrt", Expression.number(rest))
+            rest, result = rest // l, result * _atom(Call("sqrt", Expression.number(l)))
+    whole = math.isqrt(rest)
+    return result * (whole if whole**2 == rest else _atom(Call("sqrt", Expression.number(rest))))
 
 
 @lru_cache(maxsize=4096)
@@ -374,7 +374,7 @@ def call(function: str, argument: Expression) -> Expression:
         return argument.inverse()
     if function == "sqrt":
         c = argument.constant
-        return _atom("sqrt", argument) if c is None else _sqrt_of_rational(c)
+        return _atom(Call("sqrt", argument)) if c is None else _sqrt_of_rational(c)
     turns, rest = quarter_turns(argument)
     if function == "sin":
         turns -= 1  # sin x = cos(x - pi/2)
@@ -386,34 +386,22 @@ def call(function: str, argument: Expression) -> Expression:
         sign, turns = -sign, turns - 2
     if not rest:
         return Expression.number(sign if turns == 0 else 0)
-    return (
-        _atom("cos", rest) * sign if turns == 0 else _atom("sin", rest) * -sign
-    )  # cos(x + pi/2) = -sin x
+    if turns == 0:
+        return _atom(Call("cos", rest)) * sign
+    return _atom(Call("sin", rest)) * -sign  # cos(x + pi/2) = -sin x
 
 
 def with_known_cosines(e: Expression) -> Expression:
     """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
-    if not any(
-        isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN
-        for a in e.atoms
-    ):
-        return e
-    result = Expression()
-    for m, c in e.terms.items():
-        term = Expression({(): c})
-        for a, n in m:
-            square = (
-                KNOWN.get(a.argument)
-                if isinstance(a, Call) and a.function in ("cos", "sin")
-                else None
-            )
-            if square is None:
-                term = term * Expression({((a, n),): Fraction(1)})
-            else:
-                assert isinstance(a, Call)
-                term = term * _sqrt_of_rational(square if a.function == "cos" else 1 - square) ** n
-        result = result + term
-    return result
+
+    def image(a: Atom) -> Expression:
+        known = isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN
+        if not known:
+            return _atom(a)
+        square = KNOWN[a.argument]
+        return _sqrt_of_rational(square if a.function == "cos" else 1 - square)
+
+    return e.mapped(image)
 
 
 def quarter_turns(angle: Expression) -> tuple[int, Expression]:
@@ -433,11 +421,6 @@ def twelfths(angle: float, within: float) -> int | None:
 
 def _leading(e: Expression) -> Fraction:
     return e.terms[min(e.terms, key=_order)]
-
-
-def _isqrt(n: int) -> int | None:
-    r = math.isqrt(n)
-    return r if r * r == n else None
 
 
 KNOWN = {

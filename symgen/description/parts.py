@@ -12,9 +12,11 @@ for inertia, viscous, coulomb, offset, stiffness; forms for inertia, viscous, st
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import partial
+from itertools import combinations, combinations_with_replacement
+from math import prod
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, ValidationInfo
@@ -131,6 +133,11 @@ class Frame:
     def q(self) -> str:
         """Name of the joint variable."""
         return f"q{self.j}"
+
+    @property
+    def at_zero(self) -> tuple[Expression, ...]:
+        """The row, in the order of GEOMETRY, without q_j."""
+        return self.gamma, self.b, self.alpha, self.d, self.theta0, self.r0
 
     @property
     def theta0(self) -> Expression:
@@ -290,13 +297,8 @@ def row_of(e: Expression, joints: tuple[int, ...]) -> dict[int, Expression]:
     """The row G of s = G q; raises ValueError if the expression is not linear and homogeneous in
     the q's.
     """
-    row = {j: e.coefficient(f"q{j}") for j in joints}
-    rest = e
-    for j, c in row.items():
-        rest = rest - c * Expression.symbol(f"q{j}")
-    if rest or any(moves(c) for c in row.values()):
-        raise ValueError(f"{e} is not a combination of joint positions such as q5 + q6 or 2*q3")
-    return {j: c for j, c in row.items() if c}
+    what = "a combination of joint positions such as q5 + q6 or 2*q3"
+    return {j: c for (j,), c in _cofactors(e, combinations(joints, 1), what).items()}
 
 
 def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Expression]:
@@ -304,21 +306,28 @@ def form_of(e: Expression, joints: tuple[int, ...]) -> dict[tuple[int, int], Exp
     not one.
     """
     form: dict[tuple[int, int], Expression] = {}
-    rest = e
-    for i in joints:
-        for j in joints:
-            if i > j:
-                continue
-            c = e.coefficient(f"q{i}", f"q{j}")
-            rest = rest - c * Expression.symbol(f"q{i}") * Expression.symbol(f"q{j}")
-            if c:
-                half = c if i == j else c * Fraction(1, 2)
-                form[i, j] = form[j, i] = half
-    if rest or any(moves(c) for c in form.values()):
-        raise ValueError(
-            f"{e} is not a quadratic form in the joint positions such as q6**2 + 2*q5*q6"
-        )
+    what = "a quadratic form in the joint positions such as q6**2 + 2*q5*q6"
+    pairs = combinations_with_replacement(joints, 2)
+    for (i, j), c in _cofactors(e, pairs, what).items():
+        form[i, j] = form[j, i] = c if i == j else c * Fraction(1, 2)
     return form
+
+
+def _cofactors(
+    e: Expression, products: Iterable[tuple[int, ...]], what: str
+) -> dict[tuple[int, ...], Expression]:
+    """The constants c of e = sum of c q_i q_j ..., by the joints of each product that occurs;
+    raises ValueError if the expression is not such a sum.
+    """
+    cofactors, rest = {}, e
+    for joints in products:
+        names = [f"q{j}" for j in joints]
+        if c := e.coefficient(*names):
+            cofactors[joints] = c
+            rest = rest - prod(map(Expression.symbol, names), start=c)
+    if rest or any(map(moves, cofactors.values())):
+        raise ValueError(f"{e} is not {what}")
+    return cofactors
 
 
 def moves(c: Expression) -> bool:

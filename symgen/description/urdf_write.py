@@ -109,18 +109,18 @@ def _numbers(row: Array) -> str:
 
 
 def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
-    T = transform(
-        [e.value(robot.constants) for e in (f.gamma, f.b, f.alpha, f.d, f.theta0, f.r0)]
-    )  # iTj at q_j = 0
+    T = transform([e.value(robot.constants) for e in f.at_zero])  # iTj at q_j = 0
+    limit = _limit(robot, f)
+    endless = f.sigma == REVOLUTE and "lower" not in limit
     lines = [
-        f'  <joint name="q{f.j}" type="{_kind(robot, f)}">',
+        f'  <joint name="q{f.j}" type="{"continuous" if endless else _TYPES[f.sigma]}">',
         f'    <parent link="link{f.ant}"/>',
         f'    <child link="link{f.j}"/>',
         f'    <origin xyz="{_numbers(T[:3, 3])}" rpy="{_numbers(_roll_pitch_yaw(T[:3, :3]))}"/>',
     ]
     if f.sigma == FIXED:
         return [*lines, "  </joint>"]
-    lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**_limit(robot, f))}/>"]
+    lines += ['    <axis xyz="0 0 1"/>', f"    <limit {_attributes(**limit)}/>"]
     own = one_joint_parameters(robot, _DYNAMICS)
     dynamics = {
         key: values[name]
@@ -135,12 +135,6 @@ def _joint(robot: Robot, f: Frame, values: Mapping[str, float]) -> list[str]:
             f'    <mimic joint="q{leader}" {_attributes(multiplier=multiplier, offset=offset)}/>'
         )
     return [*lines, "  </joint>"]
-
-
-def _kind(robot: Robot, f: Frame) -> str:
-    return (
-        "continuous" if f.sigma == REVOLUTE and "lower" not in _limit(robot, f) else _TYPES[f.sigma]
-    )
 
 
 def _limit(robot: Robot, f: Frame) -> dict[str, float]:

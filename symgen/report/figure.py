@@ -8,9 +8,8 @@ import math
 from typing import Any
 
 from symgen.derive.closure import Closure
-from symgen.description.expression import Expression
+from symgen.description.parts import GEOMETRY
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.errors import SymgenError
 
 
 def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
@@ -19,30 +18,20 @@ def figure(robot: Robot, closure: Closure) -> dict[str, Any]:
     """
     follows = {
         j: {
-            "of": {i: _value(robot, g, f"q{j}") for i, g in closure.row[j].items()},
-            "offset": _value(robot, closure.offset[j], f"q{j}"),
+            "of": {i: g.value(robot.constants) for i, g in closure.row[j].items()},
+            "offset": closure.offset[j].value(robot.constants),
         }
         for j in robot.passive
         if j not in closure.tied
     }
     frames = [
         {"j": f.j, "ant": f.ant, "sigma": f.sigma}
-        | {
-            name: _value(robot, e, f"{name} of frame {f.j}")
-            for name, e in (
-                ("gamma", f.gamma),
-                ("b", f.b),
-                ("alpha", f.alpha),
-                ("d", f.d),
-                ("theta", f.theta0),
-                ("r", f.r0),
-            )
-        }
+        | {name: e.value(robot.constants) for name, e in zip(GEOMETRY, f.at_zero, strict=True)}
         for f in robot.frames
     ]
     return {
         "frames": frames,
-        "gravity": [_value(robot, e, "gravity") for e in robot.gravity],
+        "gravity": [e.value(robot.constants) for e in robot.gravity],
         "joints": joint_ranges(
             robot, closure, sum(abs(f[name]) for f in frames for name in ("b", "d", "r"))
         ),
@@ -81,21 +70,3 @@ def passive_text(robot: Robot, closure: Closure) -> dict[int, str]:
         j: "solved from the loop" if j in closure.tied else words[j in robot.constraints]
         for j in robot.passive
     }
-
-
-def _value(robot: Robot, e: Expression, what: str) -> float:
-    """The number of an expression for the constants of the robot file. Raises SymgenError where
-    there is none.
-    """
-    try:
-        value = e.value(robot.constants)
-    except (ArithmeticError, ValueError) as error:
-        raise SymgenError(
-            f"{robot.name}: {what} = {e} has no value for the constants {dict(robot.constants)}: "
-            f"{error}"
-        ) from error
-    if not math.isfinite(value):
-        raise SymgenError(
-            f"{robot.name}: {what} = {e} is not finite for the constants {dict(robot.constants)}"
-        )
-    return value

@@ -4,7 +4,6 @@ hold its numbers.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +11,8 @@ import numpy as np
 
 from symgen.description.fields import located
 from symgen.description.files import TREES
-from symgen.description.robot import FIXED, Frame, Robot
-from symgen.description.tree import Array, Tree
+from symgen.description.robot import FIXED, Robot
+from symgen.description.tree import Tree
 from symgen.description.tree_frames import Table, placed
 from symgen.description.tree_parts import TreePart, part_of
 from symgen.description.tree_robot import JOINT_TERMS, parse_tree, robot_of_tree, ten_of
@@ -104,10 +103,9 @@ def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
         j for j in ours.keys() ^ theirs.keys() if j in ours or theirs[j].sigma != FIXED
     ]  # kept frames come last
     for j in ours.keys() & theirs.keys():
-        rows = [_row(f, one.constants) for f, one in ((ours[j], text.robot), (theirs[j], robot))]
-        if (ours[j].ant, ours[j].sigma) != (theirs[j].ant, theirs[j].sigma) or np.abs(
-            rows[0] - rows[1]
-        ).max() > POSE:
+        pairs = zip(ours[j].at_zero, theirs[j].at_zero, strict=True)
+        apart = max(abs(x.value(text.robot.constants) - y.value(robot.constants)) for x, y in pairs)
+        if apart > POSE or (ours[j].ant, ours[j].sigma) != (theirs[j].ant, theirs[j].sigma):
             different.append(j)
     if different:
         raise DescriptionError(
@@ -115,9 +113,3 @@ def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
             "say --chain, --lock and --exact as when the one was "
             "converted from the other"
         )
-
-
-def _row(f: Frame, constants: Mapping[str, float]) -> Array:
-    return np.array(
-        [getattr(f, name).value(constants) for name in ("gamma", "b", "alpha", "d", "theta0", "r0")]
-    )
