@@ -2,7 +2,7 @@
 tables: measured, or else simulated.
 
     prepared = prepare(quick=False)             # model, study, record
-    demo = demonstrate(prepared, quick=False)   # identification, resolution, other treatments
+    demo = demonstrate(prepared, quick=False)   # identification and resolution
     demo.verdict, demo.files(folder)
 
 Settings are those of the dataset and of design defaults, chosen before the published tables were
@@ -22,13 +22,11 @@ import runtime
 import symgen
 from runtime import Cestac, Record, Study
 from runtime.errors import DataUnavailableError
-from runtime.identification.coupling import recoupled
 from runtime.loop.reference import point_to_point
-from runtime.model.drives import Drives
 from runtime.records.datasets import dataset_study
 from runtime.resolution.c.workspace import model_of_runs
 from runtime.settings.controller import Points
-from runtime.settings.study import CestacSettings, Lowpass, Signals, study_from_mapping
+from runtime.settings.study import CestacSettings, study_from_mapping
 from symgen.certify.modules import c_file
 from symgen.demo import tx40_tables as chapter
 from symgen.demo.simulated_record import Prepared, simulated_record
@@ -38,8 +36,6 @@ DATASET = "tx40"
 SEED = 1
 DURATION, SHORT = 9.0, 4.0  # s of the simulated record, and of that of the quick form
 FURTHER = tuple(2 * pi / counts for counts in (50000, 20000, 500))  # rad: the curve beside Table 3
-FASTER = 100.0  # Hz, the other cut-off
-SLOW = 0.01  # of the top speed of each joint: rows below it are left out in a variant
 ROUNDING = 1e-9  # rad, of the conversion to joint positions
 
 
@@ -75,30 +71,19 @@ def demonstrate(
     advice = runtime.advise(compiled, record, study, columns=names, asked=asked)
     result = replace(result, advice=advice)
 
-    def resolution(study: Study, **settings: Any) -> Cestac:
-        study = changed(study, "cestac", **settings)
-        columns = names if study.cestac.columns == "essential" else None
-        return runtime.cestac(compiled, record, study, columns=columns)
+    def resolution(**settings: Any) -> Cestac:
+        other = changed(study, "cestac", **settings)
+        return runtime.cestac(compiled, record, other, columns=names)
 
     progress("encoder resolution")
-    main = resolution(study)
+    main = resolution()
     if quick:
-        return Demonstration(prepared, result, main, None, None, {}, {})
+        return Demonstration(prepared, result, main, None, None)
     progress("curve of %e against resolution")
-    curve = replace(main, levels=(*main.levels, *resolution(study, delta=FURTHER).levels))
+    curve = replace(main, levels=(*main.levels, *resolution(delta=FURTHER).levels))
     progress("torque resolution")
-    torque = resolution(study, delta=chapter.DELTA[:1], torque=chapter.PHI)
-    progress("other choices in the resolution study")
-    combinations = {"essential, two-point, joint side, no median, 50 Hz (the defaults)": main} | {
-        label: resolution(other, **settings)
-        for label, other, settings in _combinations(study, len(model.BASE_PARAMETERS))
-    }
-    progress("other treatments of the record")
-    variants = {"as in this report": result.essential} | {
-        label: runtime.essential(compiled, treated, other)
-        for label, (other, treated) in _treatments(model, study, record).items()
-    }
-    return Demonstration(prepared, result, main, curve, torque, combinations, variants)
+    torque = resolution(delta=chapter.DELTA[:1], torque=chapter.PHI)
+    return Demonstration(prepared, result, main, curve, torque)
 
 
 def recorded_step(record: Record) -> float:
@@ -112,48 +97,3 @@ def recorded_step(record: Record) -> float:
 def changed(study: Study, section: str, **settings: Any) -> Study:
     """The study with some settings of a section replaced."""
     return replace(study, **{section: replace(getattr(study, section), **settings)})
-
-
-def _faster(study: Study) -> Study:
-    return changed(
-        study, "signals", lowpass=replace(study.signals.lowpass or Lowpass(), cutoff=FASTER)
-    )
-
-
-def _combinations(study: Study, b: int) -> list[tuple[str, Study, dict[str, Any]]]:
-    """One choice changed at a time."""
-    return [
-        (f"all {b} columns", study, {"columns": "all"}),
-        ("motor side", study, {"side": "motor"}),
-        ("uniform", study, {"rounding": "uniform"}),
-        ("gaussian", study, {"rounding": "gaussian"}),
-        ("true quantisation", study, {"rounding": "quantise"}),
-        (f"median window {Signals().median}", study, {"median": Signals().median}),
-        (f"{FASTER:g} Hz", _faster(study), {}),
-    ]
-
-
-def _treatments(model: Any, study: Study, record: Record) -> dict[str, tuple[Study, Record]]:
-    """Study and record by label, one choice changed at a time."""
-
-    def without(share: float) -> Study:
-        return changed(
-            study, "rows", low_speed=tuple(share * float(limit) for limit in model.LIMITS["qd"])
-        )
-
-    late = round(2e-3 * record.rate)  # samples
-    delayed = replace(record, t=record.t[late:], q=record.q[late:], tau=record.tau[:-late])
-    drives = Drives.from_mapping(model.DRIVES)
-    return {
-        f"rows below {SLOW:.0%} of top speed left out": (without(SLOW), record),
-        f"rows below {3 * SLOW:.0%} of top speed left out": (without(3 * SLOW), record),
-        "whole record, rest included": (
-            changed(study, "rows", window=(0.0, float(record.t[-1]))),
-            record,
-        ),
-        "no median filter": (changed(study, "signals", median=1), record),
-        f"{FASTER:g} Hz": (_faster(study), record),
-        "rows weighted by joint": (changed(study, "estimate", method="wls"), record),
-        "torque 2 ms later": (study, delayed),
-        "drives without coupling": (study, recoupled(record, drives, drives.decoupled("none"))),
-    }

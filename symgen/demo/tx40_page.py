@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from runtime import Cestac, Estimate, Identification
-from runtime.estimators.essential import Essential
 from runtime.markup import number
 from runtime.reporting.files import Files, identification_files, resolution_files
 from runtime.reporting.page import Section
@@ -19,10 +17,7 @@ from runtime.table import Table
 from symgen.demo import tx40_tables as chapter
 from symgen.demo.simulated_record import Prepared
 
-TOLERANCE = 0.07  # kg m^2 between the mean ZZ1R and Table 3, at every Delta
-KEY = "ZZ1R"
 COLOURED = ("ZZ1R", "MX2R", "FV1", "FS1", "Ia3", "FS5")
-SHOWN = ("ZZ1R", "FS1", "FV1", "FV5", "FS5", "FVM6", "FSM6", "Ia4", "XX3R")  # of the treatments
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +32,6 @@ class Demonstration:
         At the steps of Table 3.
     curve, torque : Cestac or None
         At more position steps, and with the torque steps of Table 4; None in the quick form.
-    combinations : mapping of str to Cestac
-        Other choices in the resolution study, by label; empty in the quick form.
-    variants : mapping of str to Essential
-        All and essential parameters of this report, then under other treatments of the record, by
-        label; empty in the quick form.
     """
 
     prepared: Prepared
@@ -49,8 +39,6 @@ class Demonstration:
     resolution: Cestac
     curve: Cestac | None
     torque: Cestac | None
-    combinations: Mapping[str, Cestac]
-    variants: Mapping[str, Essential]
 
     @property
     def verdict(self) -> str:
@@ -78,21 +66,7 @@ class Demonstration:
             f"{result.essential.estimate.relative_error:.1f} % of the torques of "
             f"{result.model.NAME} unexplained, {result.prediction_error:.1f} % on a half of the "
             "record that the fit has not seen. As to the torques (residual of least squares), "
-            f"{steps}.{self.resolution.finer_for_values} {self.physical}"
-        )
-
-    @property
-    def physical(self) -> str:
-        """Whether a robot can have the parameters, a sentence."""
-        answer = self.result.feasibility
-        if answer is None:
-            return ""
-        blocking = ", ".join(name for name, _ in answer.blocking)
-        return (
-            "A physical robot can have all of these parameters."
-            if answer.feasible
-            else f"No physical robot can have all of them (in the way: {blocking}): fit under "
-            "these conditions before you simulate."
+            f"{steps}.{self.resolution.finer_for_values}"
         )
 
     def files(self, folder: Path) -> Files:
@@ -112,12 +86,12 @@ class Demonstration:
 
 
 def sections(demo: Demonstration) -> list[Section]:
-    """Table 2, Table 3 with the curve, the combinations, Table 4, what differs and why."""
-    sections = [_table_2(demo), *([_treatments(demo)] if demo.variants else []), _table_3(demo)]
+    """Table 2, Table 3 with the curve, Table 4, contradictions."""
+    sections = [_table_2(demo), _table_3(demo)]
     title = "Encoder resolution: %e, residual and verdict"
     sections.append(resolution_section(demo.resolution, title, curve=demo.curve, names=COLOURED))
     if demo.torque is not None:
-        sections += [_combinations(demo), _table_4(demo.torque)]
+        sections.append(_table_4(demo.torque))
     title = "Where the chapter contradicts itself, and what is done here"
     return [*sections, Section(title, chapter.CONTRADICTIONS)]
 
@@ -181,55 +155,6 @@ def _table_2(demo: Demonstration) -> Section:
     return Section("Table 2: least squares, chapter and ours", text, tables=[table])
 
 
-def _treatments(demo: Demonstration) -> Section:
-    """How the parameters that differ move when the same record is treated otherwise."""
-    published = (number(chapter.TABLE_2.get(name, math.nan)) for name in SHOWN)
-    rows = [("Table 2", "-", "28", *published)]
-    for label, variant in demo.variants.items():
-        fit = variant.all_parameters
-        values = (number(fit[name], ".4g") for name in SHOWN)
-        rows.append((label, f"{fit.relative_error:.2f}", str(len(variant.names)), *values))
-    fits = [variant.all_parameters for variant in demo.variants.values()]
-    base, slow, late = fits[0], fits[2], fits[7]
-    text = (
-        ()
-        if demo.prepared.note
-        else (
-            "What differs from Table 2, and why. Dry friction depends on how low speed is "
-            "treated: where a joint turns round or rests, the filters round sign(qd) off and it "
-            "takes a sign the arm did not feel, which lowers every FS. Leaving those rows out "
-            f"raises FS5 from {base['FS5']:.2f} to {slow['FS5']:.2f} and lowers FV5 from "
-            f"{base['FV5']:.2f} to {slow['FV5']:.2f} (their errors are correlated by "
-            f"{_correlation(base, 'FS5', 'FV5'):+.2f}); including the rest lowers it further. "
-            "That is about a third of the distance to 3.78.",
-            "The rest of FS5 is no trade within this record: its correlation with FSM6, the dry "
-            "friction of motor 6 felt by joint 5, is only "
-            f"{_correlation(base, 'FS5', 'FSM6'):+.2f}; cut-off, median window, weights and a "
-            "delay of the torque move it by at most 2 %. Where joints 5 and 6 turn the same way "
-            f"joint 5 feels FS5 + FSM6 = {base['FS5'] + base['FSM6']:.2f} N m; Table 2 does not "
-            "print FSM6, so the sum cannot be compared. The chapter's own FS5 falls to 3.09 in "
-            "Table 3. The remainder is unexplained; friction of another day or temperature is a "
-            "guess.",
-            f"FS1 is the opposite case: {percent(base['FS1'], 5.78):+.0f} %, and more without the "
-            "slow rows. Moving the torque 2 ms later, which this record prefers (error "
-            f"{late.relative_error:.2f} instead of {base.relative_error:.2f} %), brings it to "
-            f"{percent(late['FS1'], 5.78):+.0f} % and FV1 to {percent(late['FV1'], 8.07):+.0f} %. "
-            "XX3R and Ia4 have %sigma of 6 to 9 here. The shoulder offset r3 = 0.035 m of the "
-            "real arm, which Table 1 leaves out, was tried apart: it moves FS5 by 0.1 % and the "
-            "error by less than 0.01 %.",
-        )
-    )
-    header = ("treatment", "error %", "essential", *SHOWN)
-    table = Table("All parameters fitted; one choice changed at a time", header, rows)
-    return Section("The same record treated otherwise", text, tables=[table])
-
-
-def _correlation(fit: Estimate, first: str, second: str) -> float:
-    """Correlation of two estimates, eq. (10)."""
-    C, i, k = fit.covariance, fit.names.index(first), fit.names.index(second)
-    return float(C[i, k] / math.sqrt(C[i, i] * C[k, k]))
-
-
 def _table_3(demo: Demonstration) -> Section:
     """Mean values by resolution: chapter, ours, difference."""
     levels = demo.resolution.levels
@@ -252,32 +177,6 @@ def _table_3(demo: Demonstration) -> Section:
         "left out.",
     )
     return Section("Table 3: encoder resolution, chapter and ours", text, tables=[table])
-
-
-def _combinations(demo: Demonstration) -> Section:
-    """What other choices give for the key parameter, passing or not."""
-    published = chapter.TABLE_3[KEY]
-    rows = [("Table 3", *(cell for value in published for cell in (number(value), "")), "")]
-    for label, result in demo.combinations.items():
-        i = result.names.index(KEY)
-        means = [float(level.mean[i]) for level in result.levels]
-        off = [mean - value for mean, value in zip(means, published, strict=True)]
-        marks = ["" if abs(d) <= TOLERANCE else " *" for d in off]
-        cells = (
-            c
-            for m, d, mark in zip(means, off, marks, strict=True)
-            for c in (f"{m:.3f}", f"{d:+.3f}{mark}")
-        )
-        rows.append((label, *cells, "no" if any(marks) else "yes"))
-    steps = (c for r in demo.resolution.levels for c in (f"{KEY}, {r.level.label}", "off by"))
-    text = (
-        "One choice changed at a time against the defaults, which the design fixed: the mean of "
-        f"{KEY} should lie within {TOLERANCE} of Table 3 at each step (* where it does not). The "
-        "columns of the essential parameters are those found at 50 Hz, also in the study at 100 "
-        "Hz.",
-    )
-    table = Table("kg m^2", ("choice", *steps, f"within {TOLERANCE}"), rows)
-    return Section("Other choices in the resolution study", text, tables=[table])
 
 
 def _table_4(result: Cestac) -> Section:

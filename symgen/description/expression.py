@@ -80,7 +80,7 @@ class Expression:
 
     @staticmethod
     def symbol(name: str) -> Expression:
-        return _atom(name)
+        return Expression({((name, 1),): Fraction(1)})
 
     @staticmethod
     def of(value: Expression | int | Fraction) -> Expression:
@@ -354,7 +354,7 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
     if c < 0:
         raise ValueError("square root of a negative number")
     rest, result = c.numerator * c.denominator, Expression.number(Fraction(1, c.denominator))
-    for l in range(2, LARGEST_PRIME):
+    for l in range(2, min(LARGEST_PRIME, rest + 1)):
         while rest % (l * l) == 0:
             rest, result = rest // (l * l), result * l
         if rest % l == 0:

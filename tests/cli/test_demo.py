@@ -100,7 +100,6 @@ def test_measured_record(tx40_data, tmp_path):
     check_table_2(shown)
     check_table_3(shown)
     check_coupling(shown)
-    check_slow_rows(shown)
     check_report(shown, tmp_path)
 
 
@@ -118,7 +117,6 @@ def check_table_3(shown):
     assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(
         tx40_tables.TABLE_3["ZZ1R"], abs=0.07
     )
-    assert len(shown.combinations) == 8
     assert len(shown.torque.levels) == 1 + 2 * len(tx40_tables.PHI)
 
 
@@ -135,21 +133,12 @@ def check_coupling(shown):
     )
 
 
-def check_slow_rows(shown):
-    """Why FS5 is 27 % below Table 2: a third of it is the treatment of low speed."""
-    base, slow = (list(shown.variants.values())[k].all_parameters for k in (0, 2))
-    assert slow["FS5"] > base["FS5"] + 0.3 and slow["FV5"] < base["FV5"] - 0.1
-
-
 def check_report(shown, folder):
     html = shown.files(folder)["report.html"]
     for words in (
         "Table 2",
         "Table 3",
         "Table 4",
-        "Other choices",
-        "true quantisation",
-        "within 0.07",
         "Gaussian rounding is called pessimistic",
     ):
         assert words in html
