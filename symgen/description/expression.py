@@ -395,11 +395,10 @@ def with_known_cosines(e: Expression) -> Expression:
     """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
 
     def image(a: Atom) -> Expression:
-        known = isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN
-        if not known:
-            return _atom(a)
-        square = KNOWN[a.argument]
-        return _sqrt_of_rational(square if a.function == "cos" else 1 - square)
+        if isinstance(a, Call) and a.function in ("cos", "sin") and a.argument in KNOWN:
+            square = KNOWN[a.argument]
+            return _sqrt_of_rational(square if a.function == "cos" else 1 - square)
+        return _atom(a)
 
     return e.mapped(image)
 

@@ -263,7 +263,7 @@ def _standard(table: Table, body: Body) -> Array:
     return sum((ten_of(own, X) for own, X in links if own is not None), start=np.zeros(10))
 
 
-def inertial_of(ten: Sequence[float]) -> Inertial:
+def inertial_of(ten: Sequence[float] | Array) -> Inertial:
     """Mass, centre and tensor about it, axes of the frame, of XX XY XZ YY YZ ZZ MX MY MZ M."""
     *J, mx, my, mz, M = (float(x) for x in ten)
     c, I, pose = np.array([mx, my, mz]) / M if M else np.zeros(3), np.zeros((3, 3)), np.eye(4)
