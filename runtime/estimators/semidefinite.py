@@ -368,8 +368,8 @@ def triangle(B: Array) -> Array:
     """Columns of the upper triangles of symmetric matrices, shape (k, n, n), entries off the
     diagonal times sqrt(2): shape (n (n + 1)/2, k).
     """
-    i, j, factor = _upper(B.shape[1])
-    return np.asarray((B[:, i, j] * factor).T)
+    j, i = np.tril_indices(B.shape[1])
+    return np.asarray((B[:, i, j] * np.where(i == j, 1.0, np.sqrt(2.0))).T)
 
 
 @lru_cache(maxsize=8)
@@ -381,13 +381,6 @@ def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]
     return np.vstack(
         [on_standard(triangle(c.B), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
     ), np.concatenate([*ones, []])
-
-
-@lru_cache(maxsize=32)
-def _upper(n: int) -> tuple[Array, Array, Array]:
-    """Row and column of the entries of an upper triangle, column by column, and their factors."""
-    j, i = np.tril_indices(n)
-    return i, j, np.where(i == j, 1.0, np.sqrt(2.0))
 
 
 def trace(z: Array) -> float:

@@ -38,8 +38,17 @@ def weighted(
 ) -> System:
     """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been
     named.
+
+    s_j comes from joint j alone; from the common ordinary least squares where joint j has too few
+    rows. Never zero.
     """
-    start = _by_joint(observation, settings, options)
+    system = ordinary(observation, settings, options)
+    raw, fit = system.raw, system.solve()
+    own = joint_scatter(raw, options.rank_tolerance)  # nan where a joint has too few rows
+    scales = floored(raw, np.where(np.isnan(own), common_scales(raw, fit.X, fit.rank), own))
+    start = replace(
+        system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known_variance=True
+    )
     if settings.weights == "covariance":
         observation.require_rows("weights: covariance")
         return _covariance(start)
@@ -52,22 +61,6 @@ def by_weights(
     """The rows as `settings.weights` asks, as they are for "none"."""
     rows = ordinary if settings.weights == "none" else weighted
     return rows(observation, settings, options)
-
-
-def _by_joint(
-    observation: Observation, settings: EstimateSettings, options: LinearOptions
-) -> System:
-    """s_j from joint j alone; from the common ordinary least squares where joint j has too few
-    rows. Never zero.
-    """
-    system = ordinary(observation, settings, options)
-    raw, fit = system.raw, system.solve()
-    own = joint_scatter(raw, options.rank_tolerance)
-    common = common_scales(raw, fit.X, fit.rank)
-    scales = floored(raw, np.where(np.isnan(own), common, own))
-    return replace(
-        system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known_variance=True
-    )
 
 
 def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:

@@ -149,13 +149,14 @@ def _constraints(
     """g(p) with its bounds, each divided by its scale."""
     settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
     M = q.shape[0]
-    rows: list[tuple[Any, Any, Any]] = []  # expression, lower, upper: (M, n) or (n,)
     half = (limits.upper - limits.lower) / 2
-    rows.append(((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0))
-    rows.append((qd / _rows(limits.qd, M), -1.0, 1.0))
-    rows.append((qdd / _rows(limits.qdd, M), -1.0, 1.0))
-    rows += _torques(symbolic, problem, limits, q, qd, qdd)
-    rows += _distances(symbolic, settings, q)
+    rows: list[tuple[Any, Any, Any]] = [  # expression, lower, upper: (M, n) or (n,)
+        ((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0),
+        (qd / _rows(limits.qd, M), -1.0, 1.0),
+        (qdd / _rows(limits.qdd, M), -1.0, 1.0),
+        *_torques(symbolic, problem, limits, q, qd, qdd),
+        *_distances(symbolic, settings, q),
+    ]
     ends = []
     for k, (family, coefficients) in enumerate(zip(settings.parts, p, strict=True)):
         begin, end = (

@@ -69,16 +69,17 @@ def fit(start: Beginning) -> Fitted:
         loop_of(start.observation, start.settings.method), start.observation, start.options
     )
     observation, first = start.observation, start.solution
-    X = _start(search.loop, start)
+    if start.options.start == "iv":
+        X = iv.fit(replace(start, options=FixedPointOptions())).solution.X
+    else:
+        X = initial(search.loop, start, start.options.start)
     D = np.maximum(np.abs(X), np.sqrt(np.diag(standard_deviations(start.system, first)[1])))
     y = search.measured()
     e, converged = y - search.simulated(X), True
     for _ in range(2):
-        weights = 1 / np.repeat(_deviations(e, observation), observation.rows)
-        X, converged = search.minimum(X, y, D, weights)
+        X, converged = search.minimum(X, y, D, _weights(e, observation))
         e = y - search.simulated(X)
-    J = search.slope(X)
-    weights = 1 / np.repeat(_deviations(e, observation), observation.rows)
+    J, weights = search.slope(X), _weights(e, observation)
     T = np.linalg.inv(np.linalg.qr(J * weights[:, None] * D, mode="r")) * D[:, None]
     r, c = J.shape
     rows = split_rows(np.column_stack([J, e]) * weights[:, None], observation.blocks())
@@ -100,12 +101,6 @@ def fit(start: Beginning) -> Fitted:
             "trail": search.trail,
         },
     )
-
-
-def _start(loop: ClosedLoop, start: Beginning) -> Array:
-    if start.options.start != "iv":
-        return initial(loop, start, start.options.start)
-    return iv.fit(replace(start, options=FixedPointOptions())).solution.X
 
 
 class Search:
@@ -173,15 +168,16 @@ class Search:
         return np.asarray(solution.x), bool(solution.success)
 
 
-def _deviations(e: Array, observation: Observation) -> Array:
-    """Root mean square of the residual of each joint, shape (n,), never zero."""
+def _weights(e: Array, observation: Observation) -> Array:
+    """1/s_j of every row, s_j the root mean square of the residual of its joint, never zero."""
     s = np.array(
         [
             np.sqrt(np.mean(e[observation.joint(j)] ** 2)) if observation.rows[j] else 0.0
             for j in range(observation.n)
         ]
     )
-    return np.asarray(np.maximum(s, 1e-9 * max(float(s.max()), 1e-12)))
+    s = np.maximum(s, 1e-9 * max(float(s.max()), 1e-12))
+    return np.asarray(1 / np.repeat(s, observation.rows))
 
 
 def _relative(e: Array, y: Array, observation: Observation) -> list[float]:

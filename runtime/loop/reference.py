@@ -113,7 +113,12 @@ def reference_of(
     if settings.file is not None:
         reference = read_reference(Path(folder or "") / settings.file, rate, n)
     elif settings.record is not None:
-        reference = of_record(_named(records, settings.record), controller)
+        if not 0 <= settings.record < len(records):
+            raise SettingsError(
+                f"record {settings.record}; the study has {len(records)}",
+                path=("controller", "reference", "record"),
+            )
+        reference = of_record(records[settings.record], controller)
     elif settings.motion is not None:
         motion = motion_from_mapping(settings.motion)
         _check_length(motion.duration, rate, "motion")
@@ -168,15 +173,6 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
     if not all(name in table.names for name in (*names["qd"], *names["qdd"])):
         return plain
     return Reference(rate, plain.q, *table.read([names["qd"], names["qdd"]]))
-
-
-def _named(records: Sequence[Record], index: int) -> Record:
-    if not 0 <= index < len(records):
-        raise SettingsError(
-            f"record {index}; the study has {len(records)}",
-            path=("controller", "reference", "record"),
-        )
-    return records[index]
 
 
 def of_record(record: Record, controller: Controller) -> Reference:
