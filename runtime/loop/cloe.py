@@ -74,13 +74,16 @@ def fit(start: Beginning) -> Fitted:
     else:
         X = initial(search.loop, start, start.options.start)
     D = np.maximum(np.abs(X), np.sqrt(np.diag(standard_deviations(start.system, first)[1])))
-    y = search.measured()
+    y = observation.Y
+    if search.position:
+        y = search.loop.outputs([part.record.q for part in search.loop.parts], observation)
     e, converged = y - search.simulated(X), True
     for _ in range(2):
         X, converged = search.minimum(X, y, D, _weights(e, observation))
         e = y - search.simulated(X)
     J, weights = search.slope(X), _weights(e, observation)
     T = np.linalg.inv(np.linalg.qr(J * weights[:, None] * D, mode="r")) * D[:, None]
+    joints = [observation.joint(j) for j in range(observation.n) if observation.rows[j]]
     r, c = J.shape
     rows = split_rows(np.column_stack([J, e]) * weights[:, None], observation.blocks())
     message = (
@@ -97,7 +100,7 @@ def fit(start: Beginning) -> Fitted:
         " ".join(part for part in parts if part),
         {
             "output": start.options.output,
-            "output_error": _relative(e, y, observation),
+            "output_error": [percent(e[rows], y[rows]) for rows in joints],  # 100 ||y - y_s||/||y||
             "trail": search.trail,
         },
     )
@@ -117,11 +120,6 @@ class Search:
         self.loop, self.observation, self.options = loop, observation, options
         self.position = options.output == "position"
         self.trail: list[dict[str, Any]] = []
-
-    def measured(self) -> Array:
-        """y, shape (r,)."""
-        signals = [part.record.q for part in self.loop.parts]
-        return self.loop.outputs(signals, self.observation) if self.position else self.observation.Y
 
     def _full(self, X: Array) -> Array:
         return full(self.observation.names, X, self.loop.model.BASE_PARAMETERS)
@@ -178,9 +176,3 @@ def _weights(e: Array, observation: Observation) -> Array:
     )
     s = np.maximum(s, 1e-9 * max(float(s.max()), 1e-12))
     return np.asarray(1 / np.repeat(s, observation.rows))
-
-
-def _relative(e: Array, y: Array, observation: Observation) -> list[float]:
-    """100 ||y - y_s||/||y|| by joint."""
-    joints = [observation.joint(j) for j in range(observation.n) if observation.rows[j]]
-    return [percent(e[rows], y[rows]) for rows in joints]

@@ -176,7 +176,14 @@ class Simulator:
             (np.zeros((N, n)),) * 3 if seed is None else self._noise(np.random.default_rng(seed), N)
         )
         pushed = pushed if disturbance is None else pushed + np.asarray(disturbance)
-        known = self._feedforward(reference) if feedforward is None else np.asarray(feedforward)
+        known: Array = (
+            np.zeros_like(reference.q) if feedforward is None else np.asarray(feedforward)
+        )
+        if feedforward is None and self.controller.feedforward == "values":
+            X_file = parameters_of(self.model, self.controller)
+            known = self.model.inverse_dynamics(
+                reference.q, reference.qd, reference.qdd, X_file, **self.constants
+            )
         signals = np.hstack(
             [reference.q, reference.qd, known + self.law.ca * reference.qdd, noise, pushed]
         )
@@ -297,19 +304,6 @@ class Simulator:
             raise InputError(f"start {q}; expected {n} finite joint positions")
         y = q if ideal else self.law.shown(q)
         return np.concatenate([q, np.zeros(n), y, y, np.zeros(2 * n)])
-
-    def _feedforward(self, reference: Reference) -> Array:
-        """Torque of the reference with the parameters of the robot file, (N, n), where the settings
-        ask for it.
-        """
-        if self.controller.feedforward != "values":
-            return np.zeros_like(reference.q)
-        X = parameters_of(self.model, self.controller)
-        return np.asarray(
-            self.model.inverse_dynamics(
-                reference.q, reference.qd, reference.qdd, X, **self.constants
-            )
-        )
 
     def _noise(self, rng: np.random.Generator, N: int) -> tuple[Array, Array, Array]:
         """Encoder noise, torque on the arm, noise of the recorded torque: (N, n) each."""
