@@ -52,11 +52,6 @@ Array = np.ndarray
 ALIKE = ("around", "reference")  # estimate.options that are the loop's, whatever the method
 
 
-def has_loop(study: Study) -> bool:
-    """Whether the study simulates a closed loop."""
-    return study.cestac.place == "loop" or study.estimate.method in CLOSED_LOOP
-
-
 @dataclass(frozen=True)
 class Loop:
     """The loop of one study.
@@ -180,7 +175,7 @@ def loop_of(
     """The loop of a study that simulates one; else None. simulator : default: that of
     study.controller.
     """
-    if not has_loop(study):
+    if study.cestac.place != "loop" and study.estimate.method not in CLOSED_LOOP:
         return None
     if study.controller is None:
         asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method

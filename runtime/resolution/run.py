@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,26 +30,6 @@ Array = np.ndarray
 USABLE = ("ok", "weak-instruments")  # Status of an estimate that counts as a run
 
 
-@dataclass(frozen=True, eq=False)
-class Workspace:
-    """A task as it runs in one thread.
-
-    Attributes
-    ----------
-    task : Task
-    model : GeneratedModel
-    columns : GeneratedModel
-        The model, its regressor filling the columns of the task alone.
-    in_c : CompiledWorkspace or None
-        Where the runs are ordinary least squares of a compiled model on low-passed positions.
-    """
-
-    task: Task
-    model: GeneratedModel
-    columns: GeneratedModel
-    in_c: CompiledWorkspace | None
-
-
 def run_block(task: Task, keys: Sequence[tuple[int, int]]) -> Runs:
     """Several runs, one after the other; key = (level, run)."""
     return Runs.of([one_run(task, key) for key in keys], len(task.names))
@@ -60,13 +39,13 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     """One estimate from perturbed measurements; key = (level, run). X of nan where the method finds
     no estimate.
     """
-    level, work = task.levels[key[0]], workspace(task)
+    level, (columns, in_c) = task.levels[key[0]], workspace(task)
     draw = key[1:] if task.settings.common else key
-    if work.in_c is not None:
-        fit = work.in_c.fit(level, draw)
+    if in_c is not None:
+        fit = in_c.fit(level, draw)
         return Run(*key, tuple(fit.X.tolist()), fit.residual_norm)
-    observation = perturbed(work.columns, work.task, level, draw)
-    X = _estimated(work, observation, level)
+    observation = perturbed(columns, task, level, draw)
+    X = _estimated(task, observation, level)
     norm = float(np.linalg.norm(observation.Y - observation.W @ X))
     return Run(*key, tuple(X.tolist()), norm)
 
@@ -75,20 +54,20 @@ def moved_estimate(task: Task, errors: Sequence[Array]) -> Array:
     """X, shape (b,), of linear least squares with the positions of every record moved by `errors`,
     shape (N, n) each, torques as measured.
     """
-    work = workspace(task)
-    if work.in_c is not None:
-        return work.in_c.moved_fit(errors).X
+    columns, in_c = workspace(task)
+    if in_c is not None:
+        return in_c.moved_fit(errors).X
     positions = [record.q + error for record, error in zip(task.records, errors, strict=True)]
     torques = [record.torque for record in task.records]
-    return _estimated(work, system_of(work.columns, work.task, positions, torques), Level(0.0))
+    return _estimated(task, system_of(columns, task, positions, torques), Level(0.0))
 
 
-def _estimated(work: Workspace, observation: Observation, level: Level) -> Array:
+def _estimated(task: Task, observation: Observation, level: Level) -> Array:
     """X of the method of the task, shape (b,); of nan where it finds no estimate."""
-    if work.task.estimate.method in LINEAR:
-        return linear_system(observation, work.task.estimate).solve().X
+    if task.estimate.method in LINEAR:
+        return linear_system(observation, task.estimate).solve().X
     try:
-        estimate = estimate_of(*with_deviation(observation, work.task, level), model=work.model)
+        estimate = estimate_of(*with_deviation(observation, task, level), model=task.model)
         if estimate.status in USABLE:
             return estimate.X
     except InputError:
@@ -99,20 +78,21 @@ def _estimated(work: Workspace, observation: Observation, level: Level) -> Array
 _of_thread = threading.local()  # task and workspace of the last run of this thread
 
 
-def workspace(task: Task) -> Workspace:
-    """The workspace of a task, made at its first run in this thread."""
+def workspace(task: Task) -> tuple[GeneratedModel, CompiledWorkspace | None]:
+    """What a task runs on, made at its first run in this thread: the model, its regressor filling
+    the columns of the task alone; and the workspace in C, where the runs are ordinary least squares
+    of a compiled model on low-passed positions.
+    """
     if getattr(_of_thread, "task", None) is not task:
         model = task.model
         lowpass = all(record.selection.signals.reader == "lowpass" for record in task.records)
         plain = task.estimate.method == "ols" and not task.estimate.options and task.loop is None
-        in_c = None
-        if isinstance(model, CompiledSignals) and lowpass and plain:
-            in_c = CompiledWorkspace(task, model)
+        in_c = isinstance(model, CompiledSignals) and lowpass and plain
         numbers = [model.BASE_PARAMETERS.index(name) for name in task.names]
         entries = {(k, j) for k in numbers for j in np.flatnonzero(model.STRUCTURE[k]).tolist()}
-        _of_thread.work = Workspace(task, model, narrowed(model, entries), in_c)
+        _of_thread.work = narrowed(model, entries), CompiledWorkspace(task, model) if in_c else None
         _of_thread.task = task
-    work: Workspace = _of_thread.work
+    work: tuple[GeneratedModel, CompiledWorkspace | None] = _of_thread.work
     return work
 
 

@@ -51,7 +51,8 @@ class Bandwidth:
     after : C, the same after decimation.
     gain : of the decimation at frequency 0.
     speed : rho_k, k = 0, 1 ...: correlation of dqd.
-    decimation : r_k of the decimation filter; r_0 = 1 alone without decimation.
+    decimation : r_k of the decimation filter; r_0, the variance of decimated white noise, is 1
+        without decimation.
     """
 
     before: Array
