@@ -244,8 +244,8 @@ class Barrier:
                 )
         for places, B in self.forms:
             # coefficients of a positive definite sum: those of the identity, by least squares
-            k, identity = B.reshape(len(B), -1), np.eye(B.shape[1]).ravel()
-            inside = np.linalg.lstsq(k.T, identity, rcond=None)[0]
+            forms, identity = B.reshape(len(B), -1), np.eye(B.shape[1]).ravel()
+            inside = np.linalg.lstsq(forms.T, identity, rcond=None)[0]
             chi[places] = np.maximum(chi[places], inside * float(self.size[0]))
         return chi
 

@@ -176,4 +176,5 @@ def _filtered(own: Prepared, study: Study, number: int) -> Samples:
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)
     signals = (record.t, states.q, states.qd, states.qdd, torque(record.tau), torque(known))
-    return Samples(*(x[kept] for x in signals), np.full(len(kept), number), cutoff)
+    used = {name: x[kept] for name, x in zip(SIGNALS, signals, strict=False)}
+    return Samples(**used, record=np.full(len(kept), number), cutoff=cutoff)

@@ -426,13 +426,13 @@ class Identification:
         was made under them.
         """
         details = self.model_estimate.details
-        active, eigenvalues = details["active"], details["smallest_eigenvalues"]
-        rows = [
-            (name, f"{value:.4e}", "at its limit" if name in active else "")
-            for name, value in eigenvalues.items()
-        ]
         return Table(
-            "Conditions of a physical robot", ("condition", "smallest eigenvalue", ""), rows
+            "Conditions of a physical robot",
+            ("condition", "smallest eigenvalue", "at its limit"),
+            [
+                (name, number(value, ".3e"), "yes" if name in details["active"] else "")
+                for name, value in details["smallest_eigenvalues"].items()
+            ],
         )
 
     def to_json(self) -> str:

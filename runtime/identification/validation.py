@@ -11,7 +11,7 @@ Errors are reported per joint since a wrong wrist hides in a total that the shou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +31,7 @@ from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import Observation
 from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings
-from runtime.table import Table, aligned
+from runtime.table import Table
 
 Array = np.ndarray
 
@@ -118,9 +118,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation(Result):
-    """Predictions for every part and every set of columns; joints are their labels; `missing`: sets
-    that could not be fitted, each with its reason.
-    """
+    """Predictions for every part and set of columns; `missing`: sets that could not be fitted."""
 
     joints: tuple[str, ...]
     predictions: tuple[Prediction, ...]
@@ -308,9 +306,7 @@ class Direction:
 
 @dataclass(frozen=True)
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
-    """What the record separates badly: correlated pairs, the groups they form, the smallest
-    singular directions.
-    """
+    """What the record separates badly: correlated pairs, their groups, the weakest directions."""
 
     pairs: tuple[Pair, ...]
     groups: tuple[tuple[str, ...], ...]
@@ -322,35 +318,42 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
         """One sentence per group: which parameters trade against each other, how strongly, and what
         to do.
         """
-        return tuple(self._warning(group) for group in self.groups)
+        sentences = []
+        for group in self.groups:
+            pairs = [p for p in self.pairs if p.first in group]
+            strongest = max(pairs, key=lambda p: abs(p.correlation))
+            between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
+            sentences.append(
+                f"{', '.join(group[:-1])} and {group[-1]} trade against each other on this record "
+                f"(correlation {between}{strongest.correlation:+.2f}): what they do together is "
+                "known better than each value. Set one of them to a value known otherwise, or "
+                "record a motion that tells them apart (symgen excite)."
+            )
+        return tuple(sentences)
 
-    def _warning(self, group: Sequence[str]) -> str:
-        strongest = max(
-            (p for p in self.pairs if p.first in group), key=lambda p: abs(p.correlation)
+    def tables(self, name: Callable[[str], str] = str) -> list[Table]:
+        """Pairs, where there are any, and directions; name : how a parameter is written."""
+        pairs = Table(
+            f"Pairs with |correlation| above {self.threshold:g}, all parameters fitted",
+            ("first", "second", "correlation"),
+            [(name(p.first), name(p.second), f"{p.correlation:+.3f}") for p in self.pairs],
         )
-        between = f"{strongest.first}, {strongest.second} " if len(group) > 2 else ""
-        return (
-            f"{' and '.join([', '.join(group[:-1]), group[-1]])} trade against each other on this "
-            f"record (correlation {between}"
-            f"{strongest.correlation:+.2f}): what they do together is known better than each "
-            "value. Set one of them to a value known otherwise, or "
-            "record a motion that tells them apart (symgen excite)."
+        directions = Table(
+            "Directions that W sees least (columns of norm 1), all parameters fitted",
+            ("singular value ratio", "combination"),
+            [
+                (f"{d.ratio:.2e}", " ".join(f"{w:+.2f} {own}" for own, w in d.weights.items()))
+                for d in self.directions
+            ],
+            wide=(1,),
         )
+        return [pairs, directions] if self.pairs else [directions]
 
     def to_table(self) -> str:
-        """Groups, pairs and directions as text."""
-        lines: list[Sequence[str]] = [("pair", "correlation")]
-        lines += [(f"{p.first} {p.second}", f"{p.correlation:+.4f}") for p in self.pairs]
-        weak: list[Sequence[str]] = [("singular value ratio", "direction (unit columns)")]
-        weak += [
-            (f"{d.ratio:.3e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()))
-            for d in self.directions
-        ]
-        head = (
-            f"groups with |correlation| above {self.threshold}: "
-            f"{'; '.join(', '.join(g) for g in self.groups) or 'none'}"
-        )
-        return "\n\n".join([head, aligned(lines), aligned(weak)])
+        """Groups, then the tables, each under its caption."""
+        groups = f"groups: {'; '.join(', '.join(group) for group in self.groups) or 'none'}"
+        tables = (f"{own.caption}\n{own.to_text()}" for own in self.tables())
+        return "\n\n".join([groups, *tables])
 
 
 def weak_directions(
@@ -359,8 +362,8 @@ def weak_directions(
     *,
     threshold: float = LIMIT.CORRELATION,
 ) -> WeakDirections:
-    """Parameters that trade against each other on this observation, and the three directions that W
-    sees least.   threshold : smallest |correlation| reported.
+    """Parameters that trade, and the three directions that W sees least.   threshold : smallest
+    |correlation| reported.
     """
     system = linear_system(observation, linear_companion(settings or EstimateSettings()))
     names = system.names

@@ -79,7 +79,7 @@ def supplementary_sections(result: Identification) -> list[Section]:
     """Physical consistency, load, friction, encoders, as far as they were asked for, and the parts
     that could not be computed.
     """
-    sections = [physical_section(result.model_estimate)] if result.feasible else []
+    sections = [physical_section(result)] if result.feasible else []
     if result.feasibility is not None:
         sections.append(
             Section("Physical consistency", (f"The parameters are {result.feasibility.text}.",))

@@ -150,20 +150,6 @@ def correlation_section(result: Identification) -> Section:
     """
     correlations = result.correlations
     groups = "; ".join(", ".join(group) for group in correlations.groups) or "none"
-    pairs = Table(
-        f"Pairs with |correlation| above {correlations.threshold:g}, all parameters fitted",
-        ("first", "second", "correlation"),
-        [(symbol(p.first), symbol(p.second), f"{p.correlation:+.3f}") for p in correlations.pairs],
-    )
-    directions = Table(
-        "Directions that W sees least (columns of norm 1), all parameters fitted",
-        ("singular value ratio", "combination"),
-        [
-            (f"{d.ratio:.2e}", " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items()))
-            for d in correlations.directions
-        ],
-        wide=(1,),
-    )
     text = (
         f"Groups, all parameters fitted: {groups}.",
         (
@@ -176,7 +162,7 @@ def correlation_section(result: Identification) -> Section:
     return Section(
         "Parameters that trade against each other",
         text,
-        tables=[*([pairs] if correlations.pairs else []), directions],
+        tables=correlations.tables(symbol),
         matrices=[matrix] if matrix else [],
     )
 
@@ -199,17 +185,9 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
     )
 
 
-def physical_section(fit: Estimate) -> Section:
+def physical_section(result: Identification) -> Section:
     """Conditions with their smallest eigenvalues, then the standard parameters."""
-    details = fit.details
-    conditions = Table(
-        "Conditions of a physical robot",
-        ("condition", "smallest eigenvalue", "at its limit"),
-        [
-            (name, number(value, ".3e"), "yes" if name in details["active"] else "")
-            for name, value in details["smallest_eigenvalues"].items()
-        ],
-    )
+    details = result.model_estimate.details
     masses = details.get("masses", {})
     standard = Table(
         "Standard parameters of one such robot",
@@ -217,7 +195,7 @@ def physical_section(fit: Estimate) -> Section:
         [(n, *_value_cells(v, masses.get(n))) for n, v in details["standard"].items()],
     )
     text = (
-        fit.message,
+        result.model_estimate.message,
         "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, "
         "inertia and friction not negative; all base parameters "
         "are fitted together. The standard parameters give exactly the torques of the base "
@@ -226,7 +204,7 @@ def physical_section(fit: Estimate) -> Section:
         "its range here: standard_parameters.csv holds one complete "
         "set, to be used as a whole.",
     )
-    return Section("Physical consistency", text, tables=[conditions, standard])
+    return Section("Physical consistency", text, tables=[result.eigenvalue_table(), standard])
 
 
 def _value_cells(value: float, mass: Mapping[str, Any] | None) -> tuple[str, str]:

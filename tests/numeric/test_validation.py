@@ -104,7 +104,7 @@ def test_parameters_that_trade_are_named():
     assert set(found.directions[0].weights) == {"MX1R", "MY1"}
     assert found.directions[0].ratio < 1e-3
     assert np.isclose(sum(w**2 for w in found.directions[0].weights.values()), 1, atol=1e-3)
-    assert "MX1R MY1" in str(found)
+    assert found.tables()[0].rows[0][:2] == ("MX1R", "MY1") and "MX1R, MY1" in str(found)
     (warning,) = found.warnings
     assert (
         warning.startswith(
