@@ -69,6 +69,7 @@ NOISES = list(world.NOISES)
 # (1) Intervals ------------------------------------------------------------------------------------
 
 MOVES = ("fourier", "chirp", "points")
+NOT_DRAWN = "feasible, no bootstrap"
 SHARE = 0.02  # deviation of the noise over the rms torque of the joint
 
 
@@ -111,17 +112,23 @@ def coverage(k: int, seed: int, seeds: str) -> list[Row]:
             if p not in fit.names
         ]
         rows.append(
-            {"noise": kind, "robot": robot.name, "motion": motion, "set": name, "count": len(z), "inside": int((z < LEVEL).sum()),
+            {"noise": kind, "robot": robot.name, "motion": motion, "set": named(name, fit), "count": len(z), "inside": int((z < LEVEL).sum()),
              "largest": float(z.max(initial=0.0)), "worst": fit.names[int(np.flatnonzero(known)[z.argmax()])] if len(z) else "",
              "error": total, "error of a joint": worst, "removed": max(removed, default=0.0), "chosen": result.model_columns}
         )  # fmt: skip
     return rows
 
 
+def named(name: str, fit: Any) -> str:
+    """Name of a set; feasible parameters whose deviations are those of least squares by themselves."""
+    drawn = dict(fit.details.get("options", {})).get("bootstrap", 1)
+    return NOT_DRAWN if name == "feasible" and not drawn else name
+
+
 def coverage_table(rows: list[Row]) -> str:
     lines = []
     for kind in NOISES:
-        for name in ("printed first", "essential", "all", "feasible"):
+        for name in ("printed first", "essential", "all", "feasible", NOT_DRAWN):
             own = among(rows, noise=kind, set=name)
             stated = [r for r in own if r["count"]]
             count, inside = sum(r["count"] for r in stated), sum(r["inside"] for r in stated)
@@ -132,7 +139,7 @@ def coverage_table(rows: list[Row]) -> str:
             ]
             lines.append(
                 (kind, name, len(own), len(stated), f"{percent(inside, count)} ({count})", f"{min(worst):.0f}" if worst else "-",
-                 f"{max((r['largest'] for r in stated), default=0.0):.1f}", middle([r["error"] for r in own]), middle([r["error of a joint"] for r in own]))
+                 f"{max((r['largest'] for r in stated), default=0.0):.3g}", middle([r["error"] for r in own]), middle([r["error of a joint"] for r in own]))
             )  # fmt: skip
     head = ("noise", "set", "records", "with intervals", "inside 95 %, % (values)", "worst motion, %", "largest error, deviations",
             "true error, median %", "of the worst joint, median %")  # fmt: skip
@@ -328,17 +335,25 @@ WORDS = {"good": 0, "doubtful": 1, "no": 2}
 CLASSES = ((0.0, 3.0), (3.0, 5.0), (5.0, 20.0), (20.0, np.inf))
 
 
-def verdict_table(rows: list[Row]) -> str:
+def by_class(rows: list[Row], key: str) -> list[tuple[Any, ...]]:
+    """Words by the class of an error."""
     lines = []
     for low, high in CLASSES:
-        own = [
-            r for r in rows if low <= r["error"] < high or (high == np.inf and r["error"] == np.inf)
-        ]
-        label = (
-            f"{low:g} to {high:g} %" if np.isfinite(high) else f"above {low:g} %, or not determined"
-        )
-        lines.append((label, len(own), *(sum(r["state"] == state for r in own) for state in WORDS)))
-    text = [markdown(("true error on unseen motion", "studies", "Yes", "With care", "No"), lines)]
+        own = [r for r in rows if low <= r[key] < high or r[key] == high == np.inf]
+        label = f"{low:g} to {high:g} %"
+        if not np.isfinite(high):
+            label = f"above {low:g} %, or not determined"
+        words = [sum(r["state"] == state for r in own) for state in WORDS]
+        lines.append((label, len(own), *words))
+    return lines
+
+
+def verdict_table(rows: list[Row]) -> str:
+    heads = {"error": "true error on unseen motion", "error of a joint": "that of the worst joint"}
+    text = [
+        markdown((head, "studies", "Yes", "With care", "No"), by_class(rows, key))
+        for key, head in heads.items()
+    ]
     error = [min(r["error"], 1e6) for r in rows]
     tell = "Can the values be told apart?"
     without = [
@@ -358,6 +373,10 @@ def verdict_table(rows: list[Row]) -> str:
     }
     if all(r["grade"] is not None for r in rows):
         ranks["the grade"] = rank([r["grade"] for r in rows], error)
+    joint = [min(r["error of a joint"], 1e6) for r in rows]
+    ranks["the word, with the error of the worst joint"] = rank(
+        [WORDS[r["state"]] for r in rows], joint
+    )
     text.append(
         markdown(
             ("rank correlation with the true error", "Spearman"),
@@ -503,6 +522,12 @@ def stribeck(truth: Truth, move: Motion) -> Array:
 
 def causes_table(rows: list[Row]) -> str:
     lines = []
+    hidden = [
+        r
+        for r in rows
+        if r["wrong"].startswith("zero") and f"the zero of joint {r['joint']}" in r["equivalent"]
+    ]
+    rows = [r for r in rows if r not in hidden]
     for label in ("", *(w.label for w in WRONG)):
         own = among(rows, wrong=label)
         lines.append(
@@ -531,7 +556,7 @@ def causes_table(rows: list[Row]) -> str:
     wrong = [r for r in rows if r["wrong"]]
     return (
         markdown(head, lines)
-        + f"\n\nWrong studies told by name: {sum(r['named'] for r in wrong)} of {len(wrong)}.\n\n"
+        + f"\n\nWrong studies told by name: {sum(r['named'] for r in wrong)} of {len(wrong)}; {len(hidden)} zeros that no record can tell are left out.\n\n"
         + markdown(("told of right studies", "times"), sorted(right.items(), key=lambda x: -x[1]))
     )
 
