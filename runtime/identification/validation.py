@@ -306,7 +306,9 @@ class Direction:
 
 @dataclass(frozen=True)
 class WeakDirections(Result, keys="threshold pairs groups directions", schema=1):
-    """What the record separates badly: correlated pairs, their groups, the weakest directions."""
+    """What the record separates badly: correlated pairs, the groups they form, the smallest
+    singular directions.
+    """
 
     pairs: tuple[Pair, ...]
     groups: tuple[tuple[str, ...], ...]
@@ -315,9 +317,7 @@ class WeakDirections(Result, keys="threshold pairs groups directions", schema=1)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One sentence per group: which parameters trade against each other, how strongly, and what
-        to do.
-        """
+        """One sentence per group: which parameters trade, how strongly, and what to do."""
         sentences = []
         for group in self.groups:
             pairs = [p for p in self.pairs if p.first in group]
