@@ -215,15 +215,18 @@ def rows_of(
     names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
     numbers = column_numbers(names, model.BASE_PARAMETERS)
     window = states[selection.samples]
-    store = decimated_columns(model, window, selection.plan, constants or {}, numbers)
+    used = np.flatnonzero(selection.mask.any(axis=0))
+    inside = slice(used[0], used[-1] + 1) if len(used) else slice(0)
+    store = decimated_columns(model, window, selection.plan, constants or {}, numbers, inside)
     selection = certain(model, states, selection, constants)
-    mask = selection.mask.ravel()
+    mask = selection.mask[:, inside].ravel()
+    rows = store.reshape(len(names), len(mask))
     return Observation(
-        W=np.compress(mask, store.reshape(len(names), n * K), axis=1).T,
-        Y=torque.ravel()[mask],
+        W=(rows if mask.all() else np.compress(mask, rows, axis=1)).T,
+        Y=torque[:, inside].ravel()[mask],
         rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
         names=names,
-        t=np.tile(selection.t, n)[mask],
+        t=np.tile(selection.t[inside], n)[mask],
         record=np.zeros(int(mask.sum()), dtype=int),
         rate=selection.rate,
         dropped=selection.dropped,

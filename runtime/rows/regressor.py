@@ -51,6 +51,7 @@ def decimated_columns(
     plan: Plan | None,
     constants: Mapping[str, float],
     columns: Sequence[int] | None = None,
+    instants: slice = slice(None),
 ) -> Array:
     """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the
     window.
@@ -58,12 +59,13 @@ def decimated_columns(
     plan : of the decimation; None keeps every sample.
     columns : numbers of the columns wanted, in the order wanted; default: all b. Others are not
     filtered.
+    instants : those of the K that are stored.
     """
     wanted = (
         np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
     )
     entries = distinct_entries(model, constants, wanted)
-    signals = decimated_signals(model, entries, constants, plan, states)
+    signals = decimated_signals(model, entries, constants, plan, states)[:, instants]
     store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
     store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
     return store
