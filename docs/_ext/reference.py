@@ -160,7 +160,7 @@ def kind(schema: Mapping[str, Any]) -> str:
 
 
 def code(value: Any) -> str:
-    return "" if value is None else f"`{json.dumps(value, ensure_ascii=False)}`"
+    return "" if value is None else f"`{json.dumps(value, ensure_ascii=False, default=to_mapping)}`"
 
 
 def study_file() -> str:
@@ -180,6 +180,8 @@ def settings(cls: type, path: str = "") -> Iterator[tuple[str, type]]:
         for inner in classes(hint):
             if not (cls is not Study and inner.__name__ == "RecordSettings"):  # described once
                 here = f"{path}.{key}" if path else key
+                if hasattr(inner, "family"):
+                    here += f" of family {inner.family}"
                 yield here, inner
                 yield from settings(inner, here)
 

@@ -87,10 +87,12 @@ def workspace(task: Task) -> tuple[GeneratedModel, CompiledWorkspace | None]:
         model = task.model
         lowpass = all(record.selection.signals.reader == "lowpass" for record in task.records)
         plain = task.estimate.method == "ols" and not task.estimate.options and task.loop is None
-        in_c = isinstance(model, CompiledSignals) and lowpass and plain
+        room = None
+        if lowpass and plain and isinstance(model, CompiledSignals):
+            room = CompiledWorkspace(task, model)
         numbers = [model.BASE_PARAMETERS.index(name) for name in task.names]
         entries = {(k, j) for k in numbers for j in np.flatnonzero(model.STRUCTURE[k]).tolist()}
-        _of_thread.work = narrowed(model, entries), CompiledWorkspace(task, model) if in_c else None
+        _of_thread.work = narrowed(model, entries), room
         _of_thread.task = task
     work: tuple[GeneratedModel, CompiledWorkspace | None] = _of_thread.work
     return work
