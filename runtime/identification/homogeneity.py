@@ -1,23 +1,30 @@
 """Do several records of one robot tell the same parameters, within their stated deviations?
 
-Each record k is fitted alone with the same b columns: X_k, and S_k = D C_k D, the covariance of eq.
-(10) with the corrected deviations, which take blocks of
-time as independent, on its diagonal.
+Each record k is fitted alone with the same b columns, its rows whitened: the rows of a joint are
+those of a first-order recursion, a_j the correlation of neighbouring residuals, s_j the deviation
+of what is left,
 
-    per parameter    z = (X_ik - X_i,-k)/sqrt(s_ik^2 + s_i,-k^2),
-            X_i,-k the mean of the other records weighted by their deviations; Student's t with the
-                     blocks of the record less one as degrees of freedom; probabilities by Holm
-    in all           Q = sum_k (X_k - X)' S_k^-1 (X_k - X),
-            X = (sum_k S_k^-1)^-1 sum_k S_k^-1 X_k: (K - 1) b F((K - 1) b, least number of blocks
-            less b)
+    [W Y]_t -> ([W Y]_t - a_j [W Y]_(t-1))/s_j
 
-Each test has half of the level. The second is left out where a record has fewer than 2 b blocks:
-S_k is then known too badly to be inverted.
+so that blocks of time are longer than the memory of the residuals. Rows within SHORTEST of one
+that is left out do not count: there the filter smears what the model has as a step. A record k is
+compared with the others, X_-k fitted to all their blocks,
+
+    d = X_k - X_-k,     S = C_k + C_-k by the jackknife over blocks, B blocks in all
+
+    per parameter    z = d_i/sqrt(S_ii), Student's t with B - 2 degrees of freedom; probabilities
+                     by Holm
+    in all           (B - 1 - b)/((B - 2) b) d' S^-1 d: F(b, B - 1 - b), its probability times the
+                     number of comparisons
+
+Each test has half of the level. The second is left out where there are fewer than 2 b blocks: S is
+then known too badly to be inverted.
 Records that differ say that the robot changed (load, temperature, wear), that something in one
 record is wrong, or that the model leaves out what their motions do
 not share: the stated deviations know nothing of model error.
 
-References: Rao (1973), section 4b.3, for the likelihood of homogeneity; Holm (1979).
+References: Hotelling (1931) for the test in all; Cochrane and Orcutt (1949) for whitened rows; Holm
+(1979).
 """
 
 from __future__ import annotations
@@ -30,13 +37,14 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from runtime.errors import InputError
+from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import linear_companion
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
-from runtime.rows.observation import Observation
+from runtime.rows.observation import SHORTEST, Observation, split_rows
 from runtime.settings.study import EstimateSettings
 from runtime.table import Table
 
@@ -178,8 +186,7 @@ def homogeneity(
         Gives joint numbers.
     """
     linear = linear_companion(settings or EstimateSettings())
-    fits: dict[str, Estimate] = {}
-    blocks: dict[str, int] = {}
+    fits: dict[str, list[Array]] = {}
     untested = []
     for record, part in parts.items():
         own = EstimateSettings(linear.method, linear.weights, tuple(names), linear.options)
@@ -195,51 +202,71 @@ def homogeneity(
                 f"{lost or 'the parameters and their deviations'}"
             )
             continue
-        fits[record], blocks[record] = (
-            fit,
-            sum(1 for _ in part.block_rows(names, np.ones(part.n), part.residual_block)),
-        )
+        fits[record] = _blocks(part.columns(names), fit)
     if len(fits) < 2:
         return Homogeneity(tuple(fits), tuple(names), float("nan"), (), tuple(untested))
-    X = np.array([fit.X for fit in fits.values()])
-    s = np.array([np.fmax(fit.sigma, fit.sigma_corrected) for fit in fits.values()])
-    freedom = np.array([count - 1 for count in blocks.values()])
-    z, others = _against_others(X, s)
-    p = 2 * student.sf(np.abs(z), freedom[:, None])
-    tested = p[:1] if len(fits) == 2 else p  # of two records each contradicts the other alike
-    corrected = _holm(tested.ravel()).reshape(tested.shape)
-    corrected = np.broadcast_to(corrected, p.shape)
-    order = np.argsort(p, axis=None)
-    records = tuple(fits)
+    records, b = tuple(fits), len(names)
+    compared = records[1:] if len(fits) == 2 else records
+    rows, z, overall = [], [], []
+    for record in compared:
+        X, C = _fit(fits[record])
+        others, rest = _fit([rows for name in fits if name != record for rows in fits[name]])
+        S, B = C + rest, sum(map(len, fits.values()))
+        deviation = np.sqrt(np.diag(S))
+        z.append((X - others) / deviation)
+        rows.append((X, np.sqrt(np.diag(C)), others))
+        if 2 * b <= B:
+            square = z[-1] @ np.linalg.solve(S / np.outer(deviation, deviation), z[-1])
+            F = (B - 1 - b) / ((B - 2) * b) * square
+            overall.append(len(compared) * float(fisher.sf(F, b, B - 1 - b)))
+    p = 2 * student.sf(np.abs(z), B - 2)
+    corrected = _holm(p.ravel()).reshape(p.shape)
     named = [
         Disagreement(
-            records[k],
+            compared[k],
             names[i],
-            float(X[k, i]),
-            float(s[k, i]),
-            float(others[k, i]),
-            float(z[k, i]),
+            *(float(part[i]) for part in rows[k]),
+            float(z[k][i]),
             float(corrected[k, i]),
         )
-        for k, i in zip(*np.unravel_index(order, p.shape), strict=True)
-        if corrected[k, i] < LIMIT.AGREEMENT_LEVEL / 2 and (len(fits) > 2 or k == 1)
+        for k, i in zip(*np.unravel_index(np.argsort(p, axis=None), p.shape), strict=True)
+        if corrected[k, i] < LIMIT.AGREEMENT_LEVEL / 2
     ]
-    least = min(blocks.values())
-    tests = [
-        float(corrected.min()),
-        _overall(X, s, list(fits.values()), least) if least >= 2 * len(names) else 1.0,
-    ]
-    return Homogeneity(
-        records, tuple(names), min(1.0, 2 * min(tests)), tuple(named), tuple(untested)
-    )
+    least = min([float(corrected.min()), *overall])
+    return Homogeneity(records, tuple(names), min(1.0, 2 * least), tuple(named), tuple(untested))
 
 
-def _against_others(X: Array, s: Array) -> tuple[Array, Array]:
-    """z of each record and parameter, and the mean of the other records; X, s : (K, b)."""
-    w = 1 / s**2
-    W = w.sum(axis=0) - w
-    others = ((w * X).sum(axis=0) - w * X) / W
-    return (X - others) / np.sqrt(s**2 + 1 / W), others
+def _blocks(part: Observation, fit: Estimate) -> list[Array]:
+    """Whitened rows [W Y] of every block of residuals; of rows that are not held, those over the
+    deviation of their joint.
+    """
+    if part.reduced:
+        scale = np.array([1 / joint.sigma_rho for joint in fit.per_joint])
+        return list(part.block_rows(part.names, scale, part.residual_block))
+    A, e = np.column_stack([part.W, part.Y]), part.Y - part.W @ fit.X
+    instant, block = np.rint(part.t * part.rate).astype(np.intp), part.blocks()
+    near = np.arange(-SHORTEST - 1, SHORTEST + 1)
+    whitened, of_block = [], []
+    for rows in map(part.joint, range(part.n)):
+        at = instant[rows, None] + near
+        held = np.isin(at, instant[rows]) | (at < instant.min()) | (at > instant.max())
+        held[0] = False
+        k = rows.start + np.flatnonzero(held.all(axis=1))
+        a = e[k] @ e[k - 1] / (e[k - 1] @ e[k - 1])
+        s = np.linalg.norm(e[k] - a * e[k - 1]) / np.sqrt(len(k))
+        whitened.append((A[k] - a * A[k - 1]) / s)
+        of_block.append(block[k])
+    return list(split_rows(np.vstack(whitened), np.concatenate(of_block)))
+
+
+def _fit(blocks: Sequence[Array]) -> tuple[Array, Array]:
+    """X, and its covariance by the jackknife, of the rows [W Y] of some blocks."""
+    A = np.vstack(blocks)
+    size = np.linalg.norm(A[:, :-1], axis=0)
+    R = np.linalg.qr(np.column_stack([A[:, :-1] / size, A[:, -1]]), mode="r")
+    T = np.linalg.inv(R[:-1, :-1]) / size[:, None]
+    X = T @ R[:-1, -1]
+    return X, block_covariance(blocks, X, T)
 
 
 def _holm(p: Array) -> Array:
@@ -249,18 +276,3 @@ def _holm(p: Array) -> Array:
     corrected = np.empty_like(p)
     corrected[order] = np.minimum(stepped, 1.0)
     return corrected
-
-
-def _overall(X: Array, s: Array, fits: Sequence[Estimate], blocks: int) -> float:
-    """Probability of Q."""
-    K, b = X.shape
-    inverses = []
-    for fit, own in zip(fits, s, strict=True):
-        scale = own / np.sqrt(np.diag(fit.covariance))
-        inverses.append(np.linalg.inv(fit.covariance * np.outer(scale, scale)))
-    mean = np.linalg.solve(np.sum(inverses, axis=0), np.einsum("kij,kj->i", np.array(inverses), X))
-    Q = sum(
-        float((x - mean) @ inverse @ (x - mean)) for x, inverse in zip(X, inverses, strict=True)
-    )
-    q = (K - 1) * b
-    return float(fisher.sf(Q / q, q, max(blocks - b, 1)))

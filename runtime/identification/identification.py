@@ -199,6 +199,12 @@ def identify(
             if len(names) > 1
             else {}
         )
+        parts = {**each, **parts} if each else {}
+        agreement = None
+        for columns in (reduced.all_parameters.names, reduced.names) if parts else ():
+            agreement = homogeneity(parts, columns, study.estimate, model=model)
+            if not agreement.untested:  # else fewer columns, that each record determines
+                break
         result = Identification(
             model=model,
             study=study,
@@ -209,9 +215,7 @@ def identify(
             comparison=comparison,
             validation=tuple(validation),
             sets=sets,
-            homogeneity=homogeneity({**each, **parts}, reduced.names, study.estimate, model=model)
-            if each
-            else None,
+            homogeneity=agreement,
             missing=tuple(missing),
             correlations=weak_directions(observation, study.estimate),
             coupling=coupling_fits(
