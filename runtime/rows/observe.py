@@ -194,7 +194,9 @@ def _observed_by_blocks(
     records = []
     for k, stream in enumerate(streams):
         own = in_time(parts.pop(0))
-        dropped = {**own.dropped, "trim": (2 * chosen.trim,) * stream.n}
+        first, last = instants[k].used
+        trimmed = instants[k].kept - (last - first)
+        dropped = {**own.dropped, "trim": (trimmed,) * stream.n}
         if not rows[k].any():
             raise InputError(nothing_left(dropped, instants[k].kept), file=stream.name)
         found = sentences(counts[k].findings, stream.name) if k in counts else ()

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.rows.sign_errors import switches
@@ -107,13 +109,19 @@ class Instants:
 
 
 def window_of(
-    times: Iterable[Array], window: tuple[float | None, float | None], file: str
+    times: Iterable[Array],
+    window: tuple[float | None, float | None],
+    file: str,
+    margin: int = 0,
 ) -> tuple[int, int]:
-    """Samples [start, stop) with t0 <= t <= t1, s, of all times; None leaves an end open."""
+    """Samples [start, stop) with t0 <= t <= t1, s, of all times; None leaves an end open.
+    margin : samples left out at each end of the record, a tenth of it at most.
+    """
     t0, t1 = window
-    start = stop = 0
+    start = stop = N = 0
     first = last = np.nan
     for t in times:
+        N += len(t)
         start += 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
         stop += len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
         first, last = (float(t[0]) if np.isnan(first) else first), float(t[-1])
@@ -122,27 +130,36 @@ def window_of(
             f"no sample in rows.window [{t0}, {t1}] s; the record spans [{first:g}, {last:g}] s",
             file=file,
         )
-    return start, stop
+    margin = min(margin, N // 10)
+    return max(start, margin), min(stop, N - margin)
 
 
 def instants_of(
     times: Iterable[Array], rate: float, signals: Signals, rows: Rows, file: str
 ) -> Instants:
-    """Window and decimation of a record of consecutive times, s, at a rate, Hz."""
-    start, stop = window_of(times, rows.window, file)
+    """Window and decimation of a record of consecutive times, s, at a rate, Hz.
+
+    The regressor near an end of the record is that of a low-pass which starts there. Decimation
+    spreads it over 27 instants (docs/truth.md, Ends of records), so that rows.trim: auto leaves
+    out END_PERIODS/cutoff ahead of the decimation, and TRIM instants after it.
+    """
+    auto, low = rows.trim == "auto", signals.lowpass
+    trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
+    margin = ceil(LIMIT.END_PERIODS * rate / low.cutoff) if auto and low is not None else 0
+    start, stop = window_of(times, rows.window, file, margin)
     factor = decimation_factor(signals, rate)
     kept = kept_samples(
         stop - start, factor, signals.decimate.phase if signals.decimate else "first"
     )
     K = len(kept)
-    if 2 * rows.trim >= K:
+    if 2 * trim >= K:
         raise InputError(
             f"{K} rows per joint after decimation by {factor}, of which rows.trim leaves "
-            f"out {2 * rows.trim}; "
+            f"out {2 * trim}; "
             "use a longer record or window, or a smaller rows.trim",
             file=file,
         )
-    return Instants(start, stop, factor, int(kept[0]), K, (rows.trim, K - rows.trim))
+    return Instants(start, stop, factor, int(kept[0]), K, (trim, K - trim))
 
 
 def select_rows(

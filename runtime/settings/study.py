@@ -166,15 +166,17 @@ class Rows(Settings):
     ----------
     window : pair of float or None, s
         [t0, t1], applied before the regressor is evaluated; null leaves an end open.
-    trim : int
-        Decimated samples left out at each end of the window, where the filters start.
+    trim : int or str
+        Decimated samples left out at each end of the window, where the filters start; auto: 3, and
+        ahead of the decimation the samples within 3/cutoff of an end of the record, at most a
+        tenth of it.
     low_speed : float or tuple of float, rad/s or m/s
         Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
         have another unit: 2 rpm.
     """
 
     window: Interval = (None, None)
-    trim: Annotated[Whole, Field(ge=0)] = 3
+    trim: Annotated[Whole, Field(ge=0)] | Literal["auto"] = "auto"
     low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
 
 
