@@ -205,7 +205,6 @@ def tx40(methods: Sequence[str]) -> tuple[str, str]:
         "tls": {"position_error": ENCODER["tx40"], "bootstrap": 0},
         "iv": IV,
         "feasible": {
-            "bootstrap": 0,
             "prior": "none",
             "reach": None,
         },  # the conditions alone: the values of the robot file are from Table 2

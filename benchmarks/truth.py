@@ -69,15 +69,11 @@ NOISES = list(world.NOISES)
 # (1) Intervals ------------------------------------------------------------------------------------
 
 MOVES = ("fourier", "chirp", "points")
-NOT_DRAWN = "feasible, no bootstrap"
 SHARE = 0.02  # deviation of the noise over the rms torque of the joint
 
 
 def coverage(k: int, seed: int, seeds: str) -> list[Row]:
-    """One record: parameters of each set inside their 95 % intervals, and errors on unseen motion.
-
-    The feasible set is fitted with its bootstrap in every fourth record of each noise, which costs 30 fits.
-    """
+    """One record: parameters of each set inside their 95 % intervals, and errors on unseen motion."""
     robots = robots_of(seeds)
     kind, robot = NOISES[k % 4], robots[(k // 4) % len(robots)]
     motion = MOVES[(k // 4 // len(robots)) % len(MOVES)]
@@ -92,9 +88,6 @@ def coverage(k: int, seed: int, seeds: str) -> list[Row]:
     settings = study(robot, motion)
     result = runtime.identify(model, record, settings)
     fits = dict(result.sets) or {"all": result.estimate}
-    if (k // 4) % 4 == 0:
-        own = study(robot, motion, estimate={"method": "feasible"})
-        fits["feasible"] = runtime.estimate(model, record, own)
     unseen = Unseen(truth, seed)
     rows = []
     for name, fit in (
@@ -112,23 +105,17 @@ def coverage(k: int, seed: int, seeds: str) -> list[Row]:
             if p not in fit.names
         ]
         rows.append(
-            {"noise": kind, "robot": robot.name, "motion": motion, "set": named(name, fit), "count": len(z), "inside": int((z < LEVEL).sum()),
+            {"noise": kind, "robot": robot.name, "motion": motion, "set": name, "count": len(z), "inside": int((z < LEVEL).sum()),
              "largest": float(z.max(initial=0.0)), "worst": fit.names[int(np.flatnonzero(known)[z.argmax()])] if len(z) else "",
              "error": total, "error of a joint": worst, "removed": max(removed, default=0.0), "chosen": result.model_columns}
         )  # fmt: skip
     return rows
 
 
-def named(name: str, fit: Any) -> str:
-    """Name of a set; feasible parameters whose deviations are those of least squares by themselves."""
-    drawn = dict(fit.details.get("options", {})).get("bootstrap", 1)
-    return NOT_DRAWN if name == "feasible" and not drawn else name
-
-
 def coverage_table(rows: list[Row]) -> str:
     lines = []
     for kind in NOISES:
-        for name in ("printed first", "essential", "all", "feasible", NOT_DRAWN):
+        for name in ("printed first", "essential", "all", "feasible"):
             own = among(rows, noise=kind, set=name)
             stated = [r for r in own if r["count"]]
             count, inside = sum(r["count"] for r in stated), sum(r["inside"] for r in stated)
@@ -599,7 +586,7 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
             "margin": float(result.feasibility.margin),
             "blocking": [c for c, _ in result.feasibility.blocking],
         }
-    own = study(robot, "fourier", estimate={"method": "feasible", "options": {"bootstrap": 0}})
+    own = study(robot, "fourier", estimate={"method": "feasible"})
     try:
         fit = runtime.estimate(model, record, own)
     except (runtime.InputError, ValueError) as e:

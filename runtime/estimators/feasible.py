@@ -21,7 +21,6 @@ options (all of `runtime.estimators.feasibility.RobotLimits` too):
                largest, to half a decade, that raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres
                "auto": from its frames; null
-    bootstrap  resampled records (blocks of time) behind `sigma_corrected`, 0 for none; seed
     explain    whether every condition in the way of least squares is named, and the ranges of
                masses are given; true
     linear     options of the least squares behind it: rank_tolerance, block
@@ -31,9 +30,15 @@ residual is at most 1 % larger: what the record says
 of it, the prior aside. A mass of which it says little is no value to use by itself.
 
 sigma and covariance are those of least squares without conditions, eq. (10): the theory of
-estimates on the boundary of a cone has no such
-formula. `sigma_corrected` is the scatter of the bootstrap, conditions included. A parameter held by
-an active condition is told by `details`.
+estimates on the boundary of a cone has no such formula. `sigma_corrected` of a parameter is
+
+    sqrt(s^2 + (X - X_0)^2)       X_0, s: least squares and its deviation by blocks of time
+
+Conditions that hold and a prior that is right take X nearer to the truth than X_0 is, a wrong prior
+further, by X - X_0 at most. Where s is right, such an interval holds the truth at least as often
+as it says, whatever the prior. Resampled records would not tell: those that end at the same limit,
+or at the value of the file, do not scatter. A parameter held by an active condition is told by
+`details`.
 
 Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020)
 for the distances.
@@ -48,7 +53,6 @@ from typing import Any, Literal
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators.block_covariance import gram_root, scatter
 from runtime.estimators.feasibility import (
     Feasibility,
     RobotLimits,
@@ -60,7 +64,7 @@ from runtime.estimators.feasibility import (
     scales,
     unsolved,
 )
-from runtime.estimators.linear import LinearOptions, System, percent
+from runtime.estimators.linear import System, assemble, percent
 from runtime.estimators.method import Beginning, Fitted
 from runtime.estimators.physical import reach_of
 from runtime.estimators.semidefinite import (
@@ -77,7 +81,7 @@ from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.progress import at
 from runtime.rows.factor import Array, Factor, factor, triangularise
 from runtime.rows.observation import Observation
-from runtime.settings.schema import Flag, NotNegative, Positive, Resamples, Seed, require
+from runtime.settings.schema import Flag, NotNegative, Positive, require
 
 WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
 DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error
@@ -103,10 +107,6 @@ class FeasibleOptions(RobotLimits):
         links together weigh less than a fifth of the water in a cube of that
         side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such
         bounds.
-    bootstrap : int
-        Resampled records (blocks of time) behind `sigma_corrected`; 0: none.
-    seed : int
-        Seed of the bootstrap.
     explain : bool
         Name every condition that least squares breaks, and give the ranges of the masses; false:
         the parameters alone, in a third of the time.
@@ -118,8 +118,6 @@ class FeasibleOptions(RobotLimits):
     prior: Distance | Literal["auto"] = "auto"
     weight: NotNegative | Literal["auto", "held-out"] = "held-out"
     reach: Positive | Literal["auto"] | None = "auto"
-    bootstrap: Resamples = 30
-    seed: Seed = 1
     explain: Flag = True
     linear: Mapping[str, Any] = field(default_factory=dict)
 
@@ -199,7 +197,7 @@ def fit(start: Beginning) -> Fitted:
     return Fitted(
         system,
         replace(free, X=X, residual_norm=residual_norm(system.weighted, X)),
-        corrected=bootstrapped(system, physical, options, weight) if options.bootstrap else None,
+        corrected=np.hypot(assemble(system, free).sigma_corrected, X - free.X),
         status="not-converged" if violated else "ok",
         message=" ".join(part for part in parts if part),
         details=details,
@@ -436,20 +434,3 @@ def fitted(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weig
 def residual_norm(rows: Factor, X: Array) -> float:
     """||Y - W X|| of a factored system."""
     return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))
-
-
-def bootstrapped(
-    system: System, physical: PhysicalModel, options: FeasibleOptions, weight: float
-) -> Array:
-    """Deviation of X, shape (b,), over records of resampled blocks of time; weights of the joints
-    stay.
-    """
-    fixed = options if options.prior == "none" else replace(options, weight=weight)
-    K, names = physical.rows(system.names), system.names
-    at(f"feasible, {options.bootstrap} records of resampled blocks")
-
-    def estimator(gram: Array) -> Array:
-        return np.asarray(K @ weighed(Factor(names, gram_root(gram), ()), physical, fixed)[0])
-
-    blocks = replace(system, options=LinearOptions()).block_rows()
-    return scatter(blocks, estimator, options.bootstrap, options.seed)

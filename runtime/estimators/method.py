@@ -97,8 +97,8 @@ class Method:
         Weights that it takes.
     closed_loop : bool
         Whether it simulates the closed loop of the records.
-    resamples : mapping
-        Options under which deviations that come from resampled records are left out.
+    brief : mapping
+        Options under which resampled records and explanations are left out.
     any_rank : bool
         Whether it has an answer where the rows do not determine all parameters.
     position_error : callable or None
@@ -110,7 +110,7 @@ class Method:
     fit: Callable[[Beginning], Fitted] | None = None
     weights: tuple[str, ...] = WEIGHTINGS
     closed_loop: bool = False
-    resamples: Mapping[str, Any] = field(default_factory=dict)
+    brief: Mapping[str, Any] = field(default_factory=dict)
     any_rank: bool = False
     position_error: Callable[[Any], float] | None = None
 

@@ -186,14 +186,9 @@ def identify(
                 cross_validation(observation, parts, how, name=fitted, model=model, fitted=known)
             )
         missing += [text for part in validation for text in part.missing]
-        best = best_set(validation[-1].errors() if validation and sets else {})
-        if best == "feasible" and sets:
-            at("physical parameters, records of resampled blocks")
-            options = {key: value for key, value in how[best].options.items() if key != "bootstrap"}
-            sets[best] = estimate_of(
-                observation, replace(how[best], options=options), model=model, provenance=provenance
-            )
-        comparison = direct_comparison(observation.first_rows, sets[best] if sets else fit)
+        errors = validation[-1].errors() if validation and sets else {}
+        best = best_set(errors, study.essential.first)
+        comparison = direct_comparison(observation.first_rows, sets.get(best, fit))
         each = (
             {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])}
             if len(names) > 1

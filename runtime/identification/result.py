@@ -183,10 +183,12 @@ class Identification:
 
     @property
     def model_columns(self) -> SetName:
-        """Which parameters stand for the robot: the set that predicts unseen data best, or all
-        where the method of the study is not linear.
+        """Which parameters stand for the robot (`runtime.identification.parameter_sets`); all where
+        the method of the study is not linear.
         """
-        return best_set(self.set_errors) if self.study.estimate.method in LINEAR else "all"
+        if self.study.estimate.method not in LINEAR:
+            return "all"
+        return best_set(self.set_errors, self.study.essential.first)
 
     @property
     def model_estimate(self) -> Estimate:

@@ -44,7 +44,7 @@ METHODS: Mapping[str, Method] = {
         by_weights,
         tls.fit,
         weights=("none", "joint", "iterated"),
-        resamples={"bootstrap": 0},
+        brief={"bootstrap": 0},
         position_error=lambda options: options.position_error,
     ),
     # instrumental variables of the simulated closed loop
@@ -58,7 +58,7 @@ METHODS: Mapping[str, Method] = {
         feasible.FeasibleOptions,
         by_weights,
         feasible.fit,
-        resamples={"bootstrap": 0, "explain": False},
+        brief={"explain": False},
         any_rank=True,
     ),
 }
@@ -183,8 +183,8 @@ def method_of(settings: EstimateSettings) -> Method:
 
 
 def point_estimate(settings: EstimateSettings) -> EstimateSettings:
-    """The settings of an estimate whose deviations nobody reads: without resampling."""
-    brief = method_of(settings).resamples
+    """The settings of an estimate whose deviations and explanations nobody reads."""
+    brief = method_of(settings).brief
     return replace(settings, options={**settings.options, **brief}) if brief else settings
 
 

@@ -70,6 +70,7 @@ TX40 = Dataset(
             "trim": 3,
             "low_speed": 0,
         },  # afterwards at rest: sign(qd) chatters and the torque creeps
+        "essential": {"first": True},
         "validate": {"split": [[0, 3.7], [3.7, 7.5]]},
     },
 )
@@ -109,6 +110,7 @@ EMPS = Dataset(
             "trim": 0,
             "low_speed": 0,
         },  # without the first 49 samples
+        "essential": {"first": True},
         "validate": {
             "record": [{**_EMPS_RECORD, "files": ["DATA_EMPS_PULSES.mat"], "name": "emps_pulses"}]
         },

@@ -208,9 +208,13 @@ class EssentialSettings(Settings):
     ----------
     threshold : float
         Largest ratio of sigma_rho to its first value.
+    first : bool
+        Whether the essential parameters may stand for the robot, as in the chapter; their
+        deviations take those that were removed as zero. Default: physical or all parameters.
     """
 
     threshold: Annotated[Real, Field(gt=1)] = 1.04
+    first: Flag = False
 
 
 class ValidateSettings(Settings):

@@ -85,7 +85,7 @@ def test_load_and_torque_constants(folder, tmp_path) -> None:
 
 
 def test_feasible(folder, tmp_path) -> None:
-    text = "estimate: {method: feasible, options: {bootstrap: 0, total_mass: 4.0}}\n"
+    text = "estimate: {method: feasible, options: {total_mass: 4.0}}\n"
     result = run(folder, text, "-o", str(tmp_path / "out"))
     assert result.exit_code == 0, result.output
     assert "smallest eigenvalue" in result.output and "physically feasible" in result.output

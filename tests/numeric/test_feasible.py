@@ -42,7 +42,7 @@ from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-PLAIN = {"bootstrap": 0, "prior": "none", "reach": None}  # the conditions alone
+PLAIN = {"prior": "none", "reach": None}  # the conditions alone
 FEASIBLE = EstimateSettings("feasible", options=PLAIN)
 
 
@@ -270,7 +270,7 @@ def test_limits_hold(arm) -> None:
 def test_held_out_weight_is_that_of_the_best_prediction(arm) -> None:
     """Wrong values ask for little pull, right ones for much."""
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 2.0, N=40)
-    options = {"bootstrap": 0, "reach": None}
+    options = {"reach": None}
     right, wrong = replace_values(arm), replace_values(arm)
     wrong.VALUES = {name: 3 * x for name, x in right.VALUES.items()}
     weights = [
@@ -318,16 +318,17 @@ def replace_values(arm):
     )
 
 
-def test_bootstrap_is_seeded_and_has_the_size_of_the_scatter(arm) -> None:
-    truth = arm.base_parameters(arm.VALUES)
-    settings = EstimateSettings("feasible", options={**PLAIN, "bootstrap": 12, "seed": 3})
-    first, again = (estimate_of(simulated(arm, truth, 0.3), settings, model=arm) for _ in range(2))
-    np.testing.assert_array_equal(first.sigma_corrected, again.sigma_corrected)
-    runs = np.array(
-        [estimate_of(simulated(arm, truth, 0.3, seed), FEASIBLE, model=arm).X for seed in range(20)]
-    )
-    ratio = np.median(first.sigma_corrected / runs.std(axis=0))
-    assert 0.5 < ratio < 2  # 12 resampled records and 20 new ones: 27 % at one deviation
+def test_deviation_holds_what_a_wrong_prior_moved(arm) -> None:
+    other = {name: 1.3 * value for name, value in arm.VALUES.items()}
+    truth = arm.base_parameters(other)
+    seen = simulated(arm, truth, 0.3)
+    least = estimate_of(seen, model=arm)
+    pull = EstimateSettings("feasible", options={"prior": "euclidean", "weight": 100.0})
+    pulled = estimate_of(seen, pull, model=replace_values(arm))
+    moved = pulled.X - least.X
+    assert (np.abs(pulled.X - truth) > 3 * least.sigma_corrected).any()
+    np.testing.assert_allclose(pulled.sigma_corrected**2, least.sigma_corrected**2 + moved**2)
+    assert (np.abs(pulled.X - truth) < 1.96 * pulled.sigma_corrected).mean() > 0.9
 
 
 def test_json_keeps_the_standard_parameters(arm) -> None:
@@ -373,7 +374,7 @@ def test_needs_the_model_and_values_for_a_pull(arm) -> None:
     with pytest.raises(SettingsError, match="no values of"):
         estimate_of(
             simulated(emitted("rx90"), np.ones(len(emitted("rx90").BASE_PARAMETERS)), 1.0),
-            EstimateSettings("feasible", options={"prior": "euclidean", "bootstrap": 0}),
+            EstimateSettings("feasible", options={"prior": "euclidean"}),
             model=emitted("rx90"),
         )
 
@@ -542,7 +543,7 @@ def test_values_given_in_part_pull_what_they_name(arm) -> None:
     seen = simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60)
     partial = replace_values(arm)
     partial.VALUES = {name: x for name, x in partial.VALUES.items() if name.endswith("2")}
-    found = estimate_of(seen, EstimateSettings("feasible", options={"bootstrap": 0}), model=partial)
+    found = estimate_of(seen, EstimateSettings("feasible"), model=partial)
     assert (
         found.status == "ok"
         and "(10 parameters of links have no value and stay free)" in found.message
@@ -552,7 +553,7 @@ def test_values_given_in_part_pull_what_they_name(arm) -> None:
     ):
         estimate_of(
             seen,
-            EstimateSettings("feasible", options={"bootstrap": 0, "prior": "entropic"}),
+            EstimateSettings("feasible", options={"prior": "entropic"}),
             model=partial,
         )
 

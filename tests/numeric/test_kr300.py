@@ -77,9 +77,9 @@ def test_errors_are_those_of_a_careful_identification(robot):
     assert errors(model, A, B, default)[0] <= 12.3
     own, other, _ = errors(model, A, B, careful)
     assert own <= 3.22 and other <= 21.4
-    own, other, plain = errors(model, A, B, careful, "feasible", bootstrap=0)
+    own, other, plain = errors(model, A, B, careful, "feasible")
     assert own <= 3.40 and other <= 10.8
-    own, other, known = errors(model, balanced(A), balanced(B), careful, "feasible", bootstrap=0)
+    own, other, known = errors(model, balanced(A), balanced(B), careful, "feasible")
     assert own <= 2.30 and other <= 7.4
     assert (
         known.details["weight"] > plain.details["weight"]
@@ -93,7 +93,7 @@ def test_a_mass_that_the_record_does_not_determine_is_told(robot, tmp_path):
     """
     _, A, B = robot
     model, study = symgen.model(kr300.DATA / "kr300.yaml"), study_from_mapping(kr300.study())
-    own, other, fit = errors(model, A, B, study, "feasible", bootstrap=0)
+    own, other, fit = errors(model, A, B, study, "feasible")
     assert own <= 3.36 and other <= 10.8 and fit.details["options"]["prior"] == "none"
     masses = fit.details["masses"]
     assert (
@@ -104,7 +104,7 @@ def test_a_mass_that_the_record_does_not_determine_is_told(robot, tmp_path):
     assert masses["M1"]["lowest"] < 1 and masses["M2"]["highest"] > 2 * masses["M2"]["lowest"]
     bounded = estimate_of(
         runtime.observe(model, A, study),
-        EstimateSettings("feasible", options={"bootstrap": 0, "total_mass": [800, 1600]}),
+        EstimateSettings("feasible", options={"total_mass": [800, 1600]}),
         model=model,
     )
     assert (

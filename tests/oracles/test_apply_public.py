@@ -120,7 +120,7 @@ def test_a_simulated_record_is_identified_and_applied(
         signals={"lowpass": {"cutoff": 8}},
         estimate={
             "method": "feasible",
-            "options": {"bootstrap": 0, "prior": "none", "reach": None},
+            "options": {"prior": "none", "reach": None},
         },
     )
     estimate = runtime.estimate(model, runtime.Record(t, states[0], tau + noise), study)
