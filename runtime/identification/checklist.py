@@ -88,7 +88,7 @@ class Checklist(Result):
         return (
             check.remedy
             if check is not None
-            else "use the essential parameters with their corrected deviations"
+            else "use the parameters printed first with their corrected deviations"
         ) + "."
 
     def _repr_html_(self) -> str:

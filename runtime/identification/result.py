@@ -475,6 +475,9 @@ class Identification:
                     "count": len(fit.names),
                     "relative_error": fit.relative_error,
                     "unseen": self.set_errors.get(name),
+                    "names": fit.names,
+                    "X": fit.X,
+                    "sigma_corrected": fit.sigma_corrected,
                 }
                 for name, fit in self.sets.items()
             ],

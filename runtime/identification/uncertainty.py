@@ -129,6 +129,8 @@ class Uncertainty(Result):
         kept besides).
     all_count : int
         Number of all parameters.
+    memory : float, s
+        How long the residuals remember: rows over those that count, in time.
     """
 
     bootstrap: BlockBootstrap
@@ -136,6 +138,7 @@ class Uncertainty(Result):
     f_tests: tuple[FTest, ...]
     sets: tuple[tuple[float, int, tuple[str, ...]], ...]
     all_count: int
+    memory: float
 
     @property
     def kept_by_f_test(self) -> int:
@@ -157,7 +160,9 @@ class Uncertainty(Result):
         white = f"not white on joint {', '.join(coloured)}" if coloured else "white on every joint"
         share = 100 * effective_share(self.whiteness)
         kept = self.all_count - sum(test.removed for test in self.f_tests)
+        long = self.memory > LIMIT.BLOCK_MEMORY * self.bootstrap.length
         return (
+            *((self.too_short,) if long else ()),
             (
                 f"Deviations by blocks drawn again are {spread} times sigma (10): "
                 f"{self.bootstrap.blocks} blocks of {self.bootstrap.length:.3g} s, "
@@ -173,6 +178,16 @@ class Uncertainty(Result):
                 "keeps "
                 f"{self.kept_by_f_test}."
             ),
+        )
+
+    @property
+    def too_short(self) -> str:
+        """That blocks do not see how long the residuals remember, a sentence."""
+        return (
+            f"The residuals remember {self.memory:.2g} s, the blocks last "
+            f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
+            "errs so slowly (friction, temperature, an offset), record for longer, or set longer "
+            "blocks: estimate: {options: {block: ...}}, s."
         )
 
     def to_table(self) -> str:
@@ -268,12 +283,14 @@ def uncertainty(
         Residuals whose whiteness is tested.
     """
     by_joint = whiteness(comparison, observation.rate)
+    share = effective_share(by_joint)
     return Uncertainty(
         bootstrap=block_bootstrap(observation, settings, essential.estimate),
         whiteness=by_joint,
-        f_tests=f_tests(essential, effective_share(by_joint)),
+        f_tests=f_tests(essential, share),
         sets=sets(essential),
         all_count=len(essential.all_parameters.names),
+        memory=1 / (share * observation.rate) if share > 0 else 0.0,
     )
 
 

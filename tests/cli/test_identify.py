@@ -176,7 +176,7 @@ def study_file(folder, text):
 
 BAD = {
     "nan": (nan_record, ["nan.csv", "tau2", "nan"]),
-    "short": (lambda f: plain_csv(f / "short.csv", N=20), ["short", "3 rows", "longer record"]),
+    "short": (lambda f: plain_csv(f / "short.csv", N=20), ["short", "2 rows", "longer record"]),
     "columns": (lambda f: plain_csv(f / "names.csv", header="t,a,b,c,d"), ["names.csv", "q1"]),
     "joints": (
         lambda f: plain_csv(

@@ -13,6 +13,10 @@ sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
 import truth
 import truth_simulator as world
+from truth_shared import Unseen, emitted, record_of, study
+
+import runtime
+from runtime.records.stream import RecordStream
 
 EVERY = pytest.mark.parametrize("name", list(world.ROBOTS))
 
@@ -90,3 +94,47 @@ def test_a_question_runs(question: str) -> None:
     assert not [row for row in rows if "broke" in row]
     table = truth.QUESTIONS[question][1](rows).splitlines()
     assert len({line.count("|") for line in table if line.startswith("|")}) == 1
+
+
+def test_intervals_printed_first_hold_the_truth() -> None:
+    """Eight records of two robots, white noise to AR(0.99): 95 % of the values, and no set without
+    intervals; the essential ones do not.
+    """
+    rows = [row for k in (0, 1, 2, 4, 5, 6, 20, 21) for row in truth.coverage(k, 7000 + k, "first")]
+
+    def share(name: str) -> float:
+        own = [row for row in rows if row["set"] == name]
+        return sum(row["inside"] for row in own) / sum(row["count"] for row in own)
+
+    assert share("printed first") > 0.93 and share("essential") < 0.85
+    assert {row["chosen"] for row in rows} <= {"feasible", "all"}
+
+
+@pytest.mark.parametrize("cutoff", [10.0, 20.0, 50.0])
+def test_ends_of_a_record_leave_nothing(cutoff: float) -> None:
+    """No noise, a motion that starts and ends at speed: in memory and in pieces."""
+    robot = world.ROBOTS["planar"]
+    body, move = world.Truth(robot, 5), world.fourier(robot, 5)
+    record, model = record_of(move, body.torque(move)), emitted("planar")[0]
+    asked = study(robot, "fourier", signals={"lowpass": {"cutoff": cutoff}})
+    fit = runtime.estimate(model, record, asked)
+    assert fit.relative_error < 0.1
+    assert Unseen(body, 5).errors(fit.names, fit.X)[0] < 0.05
+    pieces = runtime.estimate(model, RecordStream(record, 2000), asked)
+    assert pieces.rows == fit.rows
+    np.testing.assert_allclose(pieces.X, fit.X, atol=1e-6)
+    three = study(robot, "fourier", signals={"lowpass": {"cutoff": cutoff}}, rows={"trim": 3})
+    assert runtime.estimate(model, record, three).relative_error > 5 * fit.relative_error
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [("white", False), ("AR(0.99)", False), ("AR(0.999)", True)]
+)
+def test_correlation_longer_than_blocks_is_said(kind: str, said: bool) -> None:
+    robot = world.ROBOTS["anthropomorphic"]
+    body, move = world.Truth(robot, 3), world.fourier(robot, 3)
+    tau = body.torque(move)
+    noisy = tau + world.noise(tau, world.NOISES[kind], truth.SHARE, 3)
+    result = runtime.identify(emitted(robot.name)[0], record_of(move, noisy))
+    text = "\n".join(result.uncertainty.verdict)
+    assert ("corrected deviations may be too small" in text) == said

@@ -254,8 +254,8 @@ def test_roles_tell_the_order_of_removal():
     assert roles_of(result) == {
         "A1": "essential",
         "B1": "essential, the next to go: ratio 1.0500",
-        "C1": "removed no. 1, ratio 1.0010",
-        "D1": "removed no. 2, ratio 1.0100",
+        "C1": "goes as no. 1, ratio 1.0010",
+        "D1": "goes as no. 2, ratio 1.0100",
     }
 
 
