@@ -244,7 +244,8 @@ def _blocks(part: Observation, fit: Estimate) -> list[Array]:
         scale = np.array([1 / joint.sigma_rho for joint in fit.per_joint])
         return list(part.block_rows(part.names, scale, part.residual_block))
     A, e = np.column_stack([part.W, part.Y]), part.Y - part.W @ fit.X
-    instant, block = np.rint(part.t * part.rate).astype(np.intp), part.blocks()
+    instant = np.rint((part.t - part.t.min()) * part.rate).astype(np.intp)
+    block = part.blocks()
     near = np.arange(-SHORTEST - 1, SHORTEST + 1)
     whitened, of_block = [], []
     for rows in map(part.joint, range(part.n)):
