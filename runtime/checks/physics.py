@@ -98,15 +98,25 @@ def delayed(case: Case) -> Answer | None:
     late = None if case.problem is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
-    least = max(LIMIT.CERTAIN_DELAY * late.sigma_common, LIMIT.LATE)
-    j = int(np.nanargmax(late.before - late.after))
-    worth = abs(late.common) > least and late.before[j] > 1.1 * late.after[j]
+    gain = late.before - late.after
+    visible = late.before > LIMIT.DELAY_VISIBLE * late.after
+    j = int(np.nanargmax(gain))
+    all_of_them = (
+        abs(late.common) > max(LIMIT.CERTAIN_DELAY * late.sigma_common, LIMIT.LATE) and visible[j]
+    )
+    which, shift, sigma = "Torques are", late.common, late.sigma_common
+    certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE)
+    own = visible & (np.abs(late.shift) > certain)
+    if own.any() and not all_of_them:
+        j = int(np.argmax(np.where(own, gain, -np.inf)))
+        which = f"The torque of joint {late.joints[j]} is"
+        shift, sigma = late.shift[j], late.sigma[j]
     return Answer(
-        "doubtful" if worth else "good",
-        f"Torques are {'late' if late.common > 0 else 'early'} by {1e3 * abs(late.common):.1f} "
-        f"ms, deviation {1e3 * late.sigma_common:.1f} ms; correcting it changes the error of joint "
-        f"{late.joints[j]} from {late.before[j]:.1f} to {late.after[j]:.1f} %",
-        f"shift the torques by {-1e3 * late.common:+.1f} ms against the positions before "
+        "doubtful" if all_of_them or own.any() else "good",
+        f"{which} {'late' if shift > 0 else 'early'} by {1e3 * abs(shift):.1f} ms, deviation "
+        f"{1e3 * sigma:.1f} ms; correcting the delays changes the error of joint {late.joints[j]} "
+        f"from {late.before[j]:.1f} to {late.after[j]:.1f} %",
+        f"shift the torques by {-1e3 * shift:+.1f} ms against the positions before "
         "reading the record, or mend the logger",
     )
 

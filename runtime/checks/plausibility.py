@@ -177,6 +177,10 @@ def plausibility(
     checks = [first, *(found for check in CHECKS if (found := check(case)) is not None)]
     if case.problem is None:
         return Plausibility(tuple(checks))
+    if checks[1].state == "no":  # what explains a record with jumps better is no cause
+        question = "Is the study the best explanation of the record?"
+        checks.append(Check(question, "open", "Not asked: the positions jump"))
+        return Plausibility(tuple(checks))
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
@@ -185,7 +189,7 @@ def plausibility(
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = decisive(trials, case.problem.given)
+    named = decisive(trials, case.problem)
     asked = EXPLAINED if trials else EXPLAINED[:1]
     checks += [found for check in asked if (found := check(case, named)) is not None]
     hidden = dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent)

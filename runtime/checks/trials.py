@@ -20,6 +20,7 @@ from runtime.checks.fits import (
     Barrier,
     Fit,
     Grams,
+    fit_of,
     least_squares,
     physical_fit,
     quick_fit,
@@ -146,6 +147,27 @@ class Problem:
         """An alternative under the conditions of a physical robot."""
         fit = self.fit(grams)
         return Trial(alternative, bound, fit, self.given.score - fit.score)
+
+    def unseen(self, alternative: Alternative) -> float:
+        """Score of an alternative in nats, each of two parts of the rows by the parameters of the
+        other; parts are blocks of time by turns.
+        """
+        rows = self.rows(alternative)
+        if rows is None:
+            return np.inf
+        D, Y, mask = rows
+        turns = np.arange(len(Y)) * LIMIT.TURNS // len(Y) % 2
+        parts = [Grams.of(D, Y, mask & (turns == k)[:, None], self.tau) for k in (0, 1)]
+        score = 0.0
+        for part, other in (parts, parts[::-1]):
+            fit = self.fit(part)
+            over = (
+                other
+                if len(fit.X) == len(other.of_joints[0]) - 1
+                else other.mapped(self.physical.K)
+            )
+            score += fit_of(over, fit.X, self.N / 2, fit.penalty / 2).score
+        return score
 
     def beyond(self, V: Array) -> float:
         """Largest part of the torques V, shape (K, n, m), on the side of the files, that no
@@ -278,11 +300,11 @@ def tried(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[T
     return sorted(trials.values(), key=lambda trial: -trial.gain)
 
 
-def decisive(trials: Sequence[Trial], given: Fit) -> list[Trial]:
-    """Those that explain the record decisively better than the study as given: the best, and those
-    like it.
+def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
+    """Those that explain the record decisively better than the study as given, rows too that did
+    not give their parameters: the best, and those like it.
     """
-    better = []
+    given, better = problem.given, []
     for trial in trials:
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
             fewer, ratio = (
@@ -292,5 +314,13 @@ def decisive(trials: Sequence[Trial], given: Fit) -> list[Trial]:
             visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2)).any()
             if visible.any() or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
                 better.append(trial)
+    if not better:
+        return []
     alike = [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain]
-    return alike[: LIMIT.ALTERNATIVES_NAMED]
+    before = problem.unseen(unchanged(problem.samples.n))
+    search = np.log(len(trials) / LIMIT.BY_CHANCE)
+    return [
+        trial
+        for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
+        if before - problem.unseen(trial.alternative) > search
+    ]
