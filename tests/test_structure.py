@@ -106,12 +106,12 @@ BUDGET = {
         "loop": 1658,
         "excitation": 536,
         "resolution": 1859,
-        "checks": 1781,
+        "checks": 1803,
         "identification": 1921,
         "reporting": 961,
     },
 }
-TOTAL = {"symgen": 11_769, "runtime": 17_571}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 11_769, "runtime": 17_593}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is
