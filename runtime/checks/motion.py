@@ -106,7 +106,7 @@ def motion_excites(case: Case) -> Answer | None:
     """Parameters that the motion cannot tell; None where the study has no rows."""
     if case.observation is None:
         return None
-    return excited(case.observation, case.study.signals, case.records[0].rate)
+    return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
 
 
 def excited(observation: Observation, signals: Signals, rate: float) -> Answer | None:

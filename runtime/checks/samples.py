@@ -130,7 +130,7 @@ def motion_cutoff(record: Record, study: Study) -> float:
     motion where that is lower.
     """
     low = study.signals.lowpass
-    most = min(low.cutoff if low is not None else np.inf, 0.4 * record.rate)
+    most = min(low.hertz if low is not None else np.inf, 0.4 * record.rate)
     power = np.abs(np.fft.rfft(np.diff(record.q - record.q.mean(axis=0), axis=0), axis=0)) ** 2
     total = power.sum(axis=0)
     f = np.fft.rfftfreq(len(record) - 1, 1 / record.rate)
@@ -152,7 +152,7 @@ def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Arr
     def torque(tau: Array) -> Array:
         return lowpass_filtered(median_filtered(tau, study.signals.median), own.record.rate, low)
 
-    return low.cutoff, states, torque
+    return low.hertz, states, torque
 
 
 def usable(record: Record, study: Study, before: int, after: int) -> Array:

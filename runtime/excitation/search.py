@@ -42,6 +42,7 @@ from runtime.model.loading import is_trusted
 from runtime.parallel import results
 from runtime.records.record import Record
 from runtime.rows.observe import observe
+from runtime.rows.prepared import resolved
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Study
 from runtime.settings.trajectories import Motion, motion_from_mapping
@@ -82,11 +83,10 @@ def excite(
         No start keeps the limits, with the limit that was missed most; or the parameters are known
         neither from a record nor from the robot file.
     """
-    study = study or Study()
+    records = (records,) if isinstance(records, Record) else tuple(records)
+    study, _ = resolved(study or Study(), records)
     settings = study.excitation or ExcitationSettings()
-    known = _known(
-        model, (records,) if isinstance(records, Record) else tuple(records), study, settings
-    )
+    known = _known(model, records, study, settings)
     limits, weights = limits_of(model, settings.limits), known.weights
     if settings.criterion == "record" and not known.relative_sigma:
         raise InputError(

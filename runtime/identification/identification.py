@@ -48,7 +48,7 @@ from runtime.records.stream import Stream
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import halves
-from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.prepared import Prepared, prepared, resolved
 from runtime.settings.study import Study
 
 if TYPE_CHECKING:
@@ -117,13 +117,15 @@ def identify(
     InputError
         A record, setting or extra that does not suit what is asked for.
     """
-    study = study or Study()
     records = tuple(records) if isinstance(records, Sequence) else (records,)
+    asked_study = study or Study()
+    study, lowpass = resolved(asked_study, records)
     own = tuple(
         record if isinstance(record, Stream) else prepared(model, record, study)
         for record in records
     )
-    provenance = {**origin(records), **(provenance or {})}
+    chosen = {"lowpass": lowpass} if lowpass else {}
+    provenance = {**origin(records), **chosen, **(provenance or {})}
     simulator = simulator or simulator_of(model, study)
     if further is None:
         further = records_or_streams(
@@ -132,7 +134,7 @@ def identify(
     asked = variants is not None if plausible is None else plausible
     with started(workers) as processes:
         judged = (
-            processes.meanwhile(partial(plausibility, model, own, study, variants=variants))
+            processes.meanwhile(partial(plausibility, model, own, asked_study, variants=variants))
             if asked
             else None
         )

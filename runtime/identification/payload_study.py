@@ -49,7 +49,7 @@ from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.rows.factor import triangularise
 from runtime.rows.observation import Observation, split_rows, stack
-from runtime.rows.prepared import Prepared, decimated_torque, prepared
+from runtime.rows.prepared import Prepared, decimated_torque, prepared, resolved
 from runtime.settings.study import EstimateSettings, PayloadSettings, Study
 from runtime.table import Table
 
@@ -350,6 +350,7 @@ def payload_study(
             "a load needs all base parameters; remove estimate.columns",
             path=("estimate", "columns"),
         )
+    study, _ = resolved(study, [*without, *loaded])
     without, loaded = (
         [prepared(model, record, study) for record in records] for records in (without, loaded)
     )

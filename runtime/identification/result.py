@@ -231,6 +231,7 @@ class Identification:
         return (
             *(f"Time stamps of {name}: {text}." for name, text in texts),
             *known,
+            *filter(None, [self.estimate.provenance.get("lowpass")]),
             *self.observation.findings,
             *encoders,
         )

@@ -27,7 +27,7 @@ from runtime.records.stream import Stream
 from runtime.rows.observation import Observation, stack
 from runtime.rows.observe import observe
 from runtime.rows.position_errors import with_errors
-from runtime.rows.prepared import Source, prepared, record_of
+from runtime.rows.prepared import Source, prepared, record_of, resolved
 from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings, Study
 
@@ -213,10 +213,8 @@ def observed(
     simulator : Simulator, optional
         Closed loop that made the records.
     """
-    settings, several = (
-        study.estimate,
-        list(records) if isinstance(records, Sequence) else [records],
-    )
+    several = list(records) if isinstance(records, Sequence) else [records]
+    study, settings = resolved(study, several)[0], study.estimate
     for record in map(record_of, several):
         if record.n != len(model.JOINTS):
             message = (

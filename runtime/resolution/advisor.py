@@ -66,7 +66,7 @@ from runtime.resolution.rounding import VARIANCE, Mode
 from runtime.resolution.run import forget
 from runtime.rows.observation import stack
 from runtime.rows.position_errors import Perturbation, perturbation, solution
-from runtime.rows.prepared import Prepared, common_drives, prepared
+from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
@@ -164,9 +164,9 @@ def advise(
         A method that is not linear least squares, or a median filter, which no prediction goes
         through.
     """
-    study, model = study or Study(), usable(model)
-    study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     several = records if isinstance(records, Sequence) else (records,)
+    study, model = resolved(study or Study(), several)[0], usable(model)
+    study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     as_measured = [prepared(model, record, study) for record in several]
     whole = [own.record for own in as_measured]
     _refuse(study)
@@ -350,7 +350,7 @@ def assumptions(
         "no low-pass"
         if low is None
         else (
-            f"Butterworth of order {low.order} at {low.cutoff:g} Hz forward and backward on "
+            f"Butterworth of order {low.order} at {low.hertz:g} Hz forward and backward on "
             f"{' and '.join(low.on)}"
         )
     )

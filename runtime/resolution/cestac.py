@@ -55,7 +55,7 @@ from runtime.resolution.perturbed import (
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
-from runtime.rows.prepared import Prepared, common_drives, prepared
+from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
 if TYPE_CHECKING:
@@ -124,9 +124,9 @@ def cestac(
         Both workers and a scheduler; a method that finds no estimate, or fewer than two at one of
         the steps.
     """
-    study = study or Study()
-    settings, model = study.cestac, usable(model)
     several = records if isinstance(records, Sequence) else (records,)
+    study = resolved(study or Study(), several)[0]
+    settings, model = study.cestac, usable(model)
     as_measured = [prepared(model, record, study) for record in several]
     drives = drives or common_drives(model, as_measured)
     if settings.side == "motor" and drives is None:

@@ -163,7 +163,7 @@ class CoarseEncoders:
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))
         for part in self.parts:
             rate, low = part.record.rate, part.record.selection.signals.lowpass
-            band = 1.0 if low is None else 2 * low.cutoff / rate
+            band = 1.0 if low is None else 2 * low.hertz / rate
             every = max(1, len(part.x) // LIMIT.SPEEDS_COMPARED)
             speed = np.abs(part.at_encoders.qd[::every]) / rate  # per sample
             for k, step in enumerate(delta):

@@ -36,6 +36,7 @@ from runtime.rows.prepared import (
     Source,
     decimated_torque,
     prepared,
+    resolved,
 )
 from runtime.rows.segments import Cuts, Segment, Window, joined
 from runtime.rows.selection import instants_of, nothing_left
@@ -95,8 +96,8 @@ def observe(
     SettingsError
         Rows would be reduced, and `needed_by` needs them.
     """
-    study = study or Study()
     several = list(records) if isinstance(records, Sequence) else [records]
+    study = resolved(study or Study(), several)[0]
     if not several or (keep is not None and (len(several) > 1 or isinstance(several[0], Stream))):
         raise InputError(
             "no record to observe" if not several else "keep goes with one record in memory"

@@ -25,11 +25,18 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, check_states, drives_of
 from runtime.records.missing import COUNTS, require_positions
 from runtime.records.record import Record
-from runtime.records.stream import Stream
+from runtime.records.stream import PieceReader, Stream
 from runtime.rows.observation import Observation, column_numbers
 from runtime.rows.regressor import decimated_columns
-from runtime.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.rows.selection import (
+    Selection,
+    certain_rows,
+    nothing_left,
+    select_rows,
+    window_of,
+)
 from runtime.settings.study import Rows, Signals, Study, to_mapping
+from runtime.signals.cutoff import LOOKED_AT, cutoff
 from runtime.signals.decimation import decimate
 from runtime.signals.filters import States, filtered_states, median_filtered
 from runtime.signals.states import observed_states
@@ -134,9 +141,32 @@ Source: TypeAlias = Record | Prepared | Stream
 
 def prepared(model: GeneratedModel, record: Record | Prepared, study: Study) -> Prepared:
     """The record as `study` reads it; one that was prepared shares what was made of it."""
+    study, _ = resolved(study, [record])
     if isinstance(record, Prepared):
         return record.by(study)
     return Prepared(record, study, record.origin.drives or drives_of(model))
+
+
+def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
+    """The study with a number for signals.lowpass.cutoff: auto, one for all records, and what it
+    became and why, in words; empty where the study gives a number.
+
+    The first LOOKED_AT samples in the window of the study are looked at, of every record.
+    """
+    low = study.signals.lowpass
+    if low is None or low.cutoff != "auto":
+        return study, ""
+    positions = []
+    for record in map(record_of, records):
+        by_blocks = isinstance(record, Stream)
+        times = record.times() if by_blocks else [record.t]
+        start, stop = window_of(times, study.rows.window, record.name)
+        stop = min(stop, start + LOOKED_AT)
+        q = PieceReader(record).read(start, stop)[1] if by_blocks else record.q[start:stop]
+        positions.append((q, record.rate))
+    hertz, why = cutoff(positions, study.signals)
+    signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))
+    return replace(study, signals=signals), f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}."
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:

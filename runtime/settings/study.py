@@ -4,8 +4,8 @@
     study.signals.lowpass.order        # 4, the default
     to_mapping(study)                  # complete, defaults filled: written into every result
 
-Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1): Butterworth of order 4 at 50 Hz
-forward and backward on q and qd, central
+Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) but for the cut-off, which
+follows from the record: Butterworth of order 4 forward and backward on q and qd, central
 differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
 threshold 1.04, five CESTAC runs.
 Units: SI, rad, Hz. Values are checked where they are made, so a Study that exists is a valid one.
@@ -63,6 +63,8 @@ def version(number: int) -> int:
 
 
 Version = Annotated[Whole, AfterValidator(version)]
+CHAPTER_CUTOFF = 50.0
+"""Cut-off of the low-pass in the chapter, Hz."""
 
 
 class Lowpass(Settings):
@@ -70,8 +72,9 @@ class Lowpass(Settings):
 
     Attributes
     ----------
-    cutoff : float, Hz
-        Cutoff frequency.
+    cutoff : float or str, Hz
+        Cutoff frequency; auto: from the motion and the noise of the records
+        (`runtime.signals.cutoff`), 50, as in the chapter, for counts and where no record is.
     order : int
         Order of the filter.
     on : tuple of str
@@ -80,10 +83,15 @@ class Lowpass(Settings):
         Samples added at each end: matlab, 3*order, or scipy, 3*(order + 1) for an even order.
     """
 
-    cutoff: Positive = 50.0
+    cutoff: Positive | Literal["auto"] = "auto"
     order: Annotated[Whole, Field(ge=1, le=20)] = 4
     on: Many[Literal["q", "qd"]] = ("q", "qd")
     padding: Literal["matlab", "scipy"] = "matlab"
+
+    @property
+    def hertz(self) -> float:
+        """The cut-off as a number; that of the chapter where auto has no record to follow."""
+        return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
 
 
 class Decimate(Settings):

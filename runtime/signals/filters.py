@@ -134,14 +134,14 @@ def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
     """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends
     are extended.
     """
-    if low.cutoff >= rate / 2:
+    if low.hertz >= rate / 2:
         raise InputError(
-            f"low-pass at {low.cutoff:g} Hz for a record at {rate:g} Hz; expected less than the "
+            f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
             f"Nyquist frequency {rate / 2:g} Hz, "
             "set signals.lowpass.cutoff (or record.units.t, where the rate is not that of the "
             "record)"
         )
-    sos = butter(low.order, low.cutoff, fs=rate, output="sos")
+    sos = butter(low.order, low.hertz, fs=rate, output="sos")
     length = low.order + 1
     return sos, 3 * (length - 1) if low.padding == "matlab" else 3 * length
 
@@ -170,7 +170,7 @@ def decimation_factor(signals: Signals, rate: float) -> int:
             "signals.decimate.factor is auto but there is no low-pass to take the cut-off from, "
             "eq. (13); give a number"
         )
-    return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.cutoff) * (1 + CLOCK)))
+    return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.hertz) * (1 + CLOCK)))
 
 
 def kept_samples(N: int, factor: int, phase: str) -> Array:

@@ -75,7 +75,7 @@ def bandwidth(signals: Signals, rate: float) -> Bandwidth:
             path=("cestac", "median"),
         )
     low, factor = signals.lowpass, decimation_factor(signals, rate)
-    longest = 0.0 if low is None else MEMORY * rate / low.cutoff
+    longest = 0.0 if low is None else MEMORY * rate / low.hertz
     w = np.linspace(0, np.pi, max(FREQUENCIES, 2 ** ceil(log2(max(longest, 1)))) + 1)
     H = np.ones_like(w) if low is None else _power(butterworth(rate, low)[0], w)
     on = () if low is None else low.on

@@ -37,7 +37,8 @@ T = np.arange(N) / RATE
 
 
 def study(**sections):
-    return study_from_mapping({"signals": {"median": 1}, **sections})
+    signals = {"median": 1, "lowpass": {"cutoff": 50}, **sections.pop("signals", {})}
+    return study_from_mapping({"signals": signals, **sections})
 
 
 @pytest.fixture(scope="module")

@@ -122,7 +122,10 @@ def test_editors_see_what_the_reader_refuses(wrong):
 
 def test_editors_show_what_a_key_holds():
     definitions = json.loads(schema_text("study"))["$defs"]
-    assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == "Cutoff frequency. [Hz]"
+    assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
+        "Cutoff frequency; auto: from the motion and the noise of the records "
+        "(`runtime.signals.cutoff`), 50, as in the chapter, for counts and where no record is. [Hz]"
+    )
     for name, definition in definitions.items():
         assert [
             key for key, value in definition["properties"].items() if "description" not in value

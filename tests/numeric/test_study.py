@@ -35,13 +35,14 @@ controller: {law: {kind: cascade, kp: 160.18}}
 """
 
 
-def test_defaults_are_those_of_the_chapter():
+def test_defaults_are_those_of_the_chapter_but_for_the_cutoff():
     study = Study()
     assert (
         study.signals.lowpass.cutoff,
         study.signals.lowpass.order,
         study.signals.lowpass.on,
-    ) == (50, 4, ("q", "qd"))
+    ) == ("auto", 4, ("q", "qd"))
+    assert study.signals.lowpass.hertz == 50
     assert study.signals.decimate.factor == "auto"
     assert study.essential.threshold == 1.04
     assert study.cestac.runs == 5
@@ -50,7 +51,7 @@ def test_defaults_are_those_of_the_chapter():
 
 def test_study_file_of_the_design():
     study = study_from_text(DESIGN)
-    defaults = Study()
+    defaults = study_from_mapping({"signals": {"lowpass": {"cutoff": 50}}})
     assert (study.signals, study.estimate, study.essential, study.cestac) == (
         defaults.signals,
         defaults.estimate,

@@ -1,0 +1,75 @@
+"""The cut-off that follows from a record: `signals.lowpass.cutoff: auto`."""
+
+import numpy as np
+import pytest
+
+import runtime
+import symgen
+from runtime.records.stream import RecordStream
+from runtime.rows.prepared import resolved
+from runtime.settings.study import Signals, Study
+from runtime.signals.cutoff import cutoff
+
+RATE = 1000.0
+T = np.arange(10_000) / RATE
+FAST = 2.5
+"""Hz, highest frequency of the motion."""
+
+
+def motion(step: float = 0.0, phase: float = 0.0) -> np.ndarray:
+    q = np.stack([np.sin(2 * np.pi * f * T + phase) for f in (0.7, FAST)], axis=1)
+    return np.round(q / step) * step if step else q
+
+
+def test_the_motion_passes_and_coarser_steps_lower_the_cutoff():
+    found = [cutoff([(motion(step), RATE)], Signals())[0] for step in (1e-6, 1e-4, 1e-3, 1e-2)]
+    assert found == sorted(found, reverse=True) and found[0] < 50
+    assert found[-1] > FAST
+
+
+def test_spikes_that_the_median_takes_away_are_no_noise():
+    q = motion(1e-4)
+    spoilt = q.copy()
+    spoilt[500::900] += 0.3
+    found, expected = (cutoff([(x, RATE)], Signals())[0] for x in (spoilt, q))
+    assert found == pytest.approx(expected, rel=0.25)
+
+
+def test_a_joint_at_rest_and_the_reader_of_counts():
+    q = motion(1e-3)
+    still = np.column_stack([q, np.full(len(q), 0.3)])
+    assert cutoff([(still, RATE)], Signals()) == cutoff([(q, RATE)], Signals())
+    assert cutoff([(q, RATE)], Signals(reader="counts"))[0] == 50
+    assert cutoff([(np.ones((500, 2)), RATE)], Signals())[0] == 50
+    assert cutoff([(np.ones((500, 2)), 100.0)], Signals())[0] == 40
+
+
+@pytest.fixture(scope="module")
+def records() -> list[runtime.Record]:
+    rng = np.random.default_rng(1)
+    return [
+        runtime.Record(T, motion(step, phase), rng.standard_normal((len(T), 2)), name=name)
+        for step, phase, name in ((1e-3, 0.0, "coarse"), (1e-5, 1.0, "fine"))
+    ]
+
+
+def test_one_value_for_all_records_in_memory_and_by_blocks(records):
+    study, why = resolved(Study(), records)
+    alone = [resolved(Study(), [record])[0].signals.lowpass.cutoff for record in records]
+    assert alone[0] < study.signals.lowpass.cutoff < alone[1]
+    assert f"{study.signals.lowpass.cutoff:g} Hz" in why and "joint 2" in why
+    assert resolved(Study(), [RecordStream(r, 700) for r in records]) == (study, why)
+    assert resolved(study, records) == (study, "")
+
+
+def test_results_say_what_auto_became(records):
+    model = symgen.model("planar_2r")
+    result = runtime.identify(model, records)
+    hertz = result.study.signals.lowpass.cutoff
+    assert result.estimate.settings["signals"]["lowpass"]["cutoff"] == hertz
+    assert result.estimate.provenance["lowpass"] in result.time_stamps
+    measured = runtime.observe(model, records)
+    assert measured.settings["signals"]["lowpass"]["cutoff"] == hertz
+    study = runtime.Study(cestac={"delta": [1e-4], "runs": 2})
+    perturbed = runtime.cestac(model, records, study)
+    assert perturbed.reference.settings["signals"]["lowpass"]["cutoff"] == hertz
