@@ -36,7 +36,7 @@ from runtime.rows.selection import (
     window_of,
 )
 from runtime.settings.study import Rows, Signals, Study, to_mapping
-from runtime.signals.cutoff import LOOKED_AT, cutoff
+from runtime.signals.cutoff import EXCERPT, cutoff
 from runtime.signals.decimation import decimate
 from runtime.signals.filters import States, filtered_states, median_filtered
 from runtime.signals.states import observed_states
@@ -151,7 +151,7 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
     """The study with a number for signals.lowpass.cutoff: auto, one for all records, and what it
     became and why, in words; empty where the study gives a number.
 
-    The first LOOKED_AT samples in the window of the study are looked at, of every record.
+    The first EXCERPT samples in the window of the study are looked at, of every record.
     """
     low = study.signals.lowpass
     if low is None or low.cutoff != "auto":
@@ -161,7 +161,7 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
         by_blocks = isinstance(record, Stream)
         times = record.times() if by_blocks else [record.t]
         start, stop = window_of(times, study.rows.window, record.name)
-        stop = min(stop, start + LOOKED_AT)
+        stop = min(stop, start + EXCERPT)
         q = PieceReader(record).read(start, stop)[1] if by_blocks else record.q[start:stop]
         positions.append((q, record.rate))
     hertz, why = cutoff(positions, study.signals)

@@ -13,7 +13,7 @@ w = tan(pi f/rate); the acceleration goes through one for each of `lowpass.on`.
 N is flat in the positions: the median of the spectrum in the upper band, and at least that of the
 steps that the positions show, step^2/12 over the band. The spectrum is one of second differences,
 so that little leaks from the motion to the noise; it counts as motion where its running mean is
-above MOTION times the noise. Measured: docs/counts.md.
+above LIMIT.MOTION times the noise. Measured: docs/counts.md.
 """
 
 from __future__ import annotations
@@ -23,27 +23,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from runtime.limits import LIMIT
 from runtime.settings.study import CHAPTER_CUTOFF, Lowpass, Signals
 from runtime.signals.filters import median_filtered
 
 Array = np.ndarray
 
-LOOKED_AT = 2**16
+EXCERPT = 2**16
 """Samples of a record that are looked at."""
-LOWEST, PERIODS, HIGHEST = 2.0, 20, 0.4
-"""Ends of the grid: Hz, but that many periods in a record at least, and of the rate."""
-GRID, BINS = 60, 400
-"""Cut-offs compared, and bins of frequency, both on a logarithmic scale."""
-UPPER = (0.25, 0.48)
-"""Band of the noise, of the rate."""
-MOTION, SMOOTH = 4.0, 15
-"""Ratio to the noise from which the spectrum is that of the motion; lines of its running mean."""
-FEWEST = 64
-"""Samples of a record that has a spectrum."""
-SPIKE = 6.0
-"""Distance from the running median, of its rms, from which a sample is a spike."""
-NOTHING = 1e-7
-"""Bias that is none: of several such cut-offs the lowest is taken."""
 
 
 def cutoff(positions: Sequence[tuple[Array, float]], signals: Signals) -> tuple[float, str]:
@@ -52,12 +39,14 @@ def cutoff(positions: Sequence[tuple[Array, float]], signals: Signals) -> tuple[
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
     """
     low, parts = signals.lowpass or Lowpass(), []
-    highest = HIGHEST * min((rate for _, rate in positions), default=np.inf)
-    positions = [(q, rate) for q, rate in positions if len(q) > FEWEST]
+    highest = LIMIT.HIGHEST_CUTOFF * min((rate for _, rate in positions), default=np.inf)
+    positions = [(q, rate) for q, rate in positions if len(q) > LIMIT.FEWEST_LINES]
     if not positions or signals.reader == "counts":
         return min(CHAPTER_CUTOFF, highest), "the value of the chapter"
-    lowest = max(LOWEST, *(PERIODS * rate / len(q) for q, rate in positions))
-    grid = np.geomspace(min(lowest, highest), highest, GRID)
+    lowest = max(
+        LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * rate / len(q) for q, rate in positions)
+    )
+    grid = np.geomspace(min(lowest, highest), highest, LIMIT.CUTOFF_GRID)
     for q, rate in positions:
         f, motion, noise = spectra(q, rate, signals.median)
         ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * grid / rate)[:, None]
@@ -69,7 +58,7 @@ def cutoff(positions: Sequence[tuple[Array, float]], signals: Signals) -> tuple[
         return min(CHAPTER_CUTOFF, highest), "no joint moves above the noise of its position"
     bias = ((distorted + noisy) / np.where(power > 0, power, np.inf))[:, moving]
     worst = bias.max(axis=1)
-    best = int(np.flatnonzero(worst <= max(worst.min(), NOTHING))[0])
+    best = int(np.flatnonzero(worst <= max(worst.min(), LIMIT.NO_BIAS))[0])
     joint = 1 + int(moving[np.argmax(bias[best])])
     return float(f"{grid[best]:.2g}"), f"least bias by motion and noise, joint {joint} decides"
 
@@ -78,21 +67,20 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
     """Frequencies, shape (m,), Hz, and power of the acceleration there, shape (m, n): of the motion
     and of the noise. median : window that finds spikes, 1 for none.
     """
-    q = q[:LOOKED_AT]
     smooth = median_filtered(q, median)
     away = np.abs(q - smooth)
-    q = np.where(away > SPIKE * np.sqrt(np.mean(away**2, axis=0)), smooth, q)
+    q = np.where(away > LIMIT.SPIKE * np.sqrt(np.mean(away**2, axis=0)), smooth, q)
     a = np.diff(q, 2, axis=0)
     a = np.hanning(len(a) + 2)[1:-1, None] * (a - a.mean(axis=0))
     f = np.fft.rfftfreq(len(a), 1 / rate)[1:-1]
     power = np.abs(np.fft.rfft(a, axis=0)[1:-1]) ** 2 / (0.375 * len(a))  # of one sample
     gain = ((2 * np.sin(np.pi * f / rate)) ** 4)[:, None]
-    upper = (f > UPPER[0] * rate) & (f < UPPER[1] * rate)
+    upper = (f > LIMIT.UPPER_BAND[0] * rate) & (f < LIMIT.UPPER_BAND[1] * rate)
     level = np.median((power / gain)[upper], axis=0) / np.log(2)
     noise = gain * np.maximum(level, np.array([step(x) ** 2 for x in q.T]) / 12)
-    moves = uniform_filter1d(power, SMOOTH, axis=0) > MOTION * noise
+    moves = uniform_filter1d(power, LIMIT.SMOOTHED_LINES, axis=0) > LIMIT.MOTION * noise
     central = (np.cos(np.pi * f / rate) ** 4)[:, None]  # two central differences
-    starts = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], BINS)))
+    starts = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], LIMIT.CUTOFF_BINS)))
     sums = (
         np.add.reduceat(central * x, starts, axis=0)
         for x in (np.where(moves, np.maximum(power - noise, 0.0), 0.0), noise)
