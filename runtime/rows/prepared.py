@@ -158,11 +158,13 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
         return study, ""
     positions = []
     for record in map(record_of, records):
-        by_blocks = isinstance(record, Stream)
-        times = record.times() if by_blocks else [record.t]
+        times = record.times() if isinstance(record, Stream) else [record.t]
         start, stop = window_of(times, study.rows.window, record.name)
-        stop = min(stop, start + EXCERPT)
-        q = PieceReader(record).read(start, stop)[1] if by_blocks else record.q[start:stop]
+        part = start, min(stop, start + EXCERPT)
+        if isinstance(record, Stream):
+            q = PieceReader(record).read(*part)[1]
+        else:
+            q = record.q[slice(*part)]
         positions.append((q, record.rate))
     hertz, why = cutoff(positions, study.signals)
     signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))

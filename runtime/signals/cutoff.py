@@ -81,12 +81,9 @@ def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array
     moves = uniform_filter1d(power, LIMIT.SMOOTHED_LINES, axis=0) > LIMIT.MOTION * noise
     central = (np.cos(np.pi * f / rate) ** 4)[:, None]  # two central differences
     starts = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], LIMIT.CUTOFF_BINS)))
-    sums = (
-        np.add.reduceat(central * x, starts, axis=0)
-        for x in (np.where(moves, np.maximum(power - noise, 0.0), 0.0), noise)
-    )
-    count = np.diff([*starts, len(f)])
-    return np.add.reduceat(f, starts) / count, *sums
+    motion = np.where(moves, np.maximum(power - noise, 0.0), 0.0)
+    motion, noise = (np.add.reduceat(central * x, starts, axis=0) for x in (motion, noise))
+    return np.add.reduceat(f, starts) / np.diff([*starts, len(f)]), motion, noise
 
 
 def step(x: Array) -> float:
