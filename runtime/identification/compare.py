@@ -1,8 +1,8 @@
 """Which of several treatments of the same records predicts best? One call for "with all rows or
 without rest, with the counterbalance known or not".
 
-Every candidate is identified on its own terms; the set of parameters that predicts its validation
-records best stands for it. All of them are then judged on the
+Every candidate is identified on its own terms; the set of parameters that is printed first stands
+for it (`runtime.identification.parameter_sets`). All of them are then judged on the
 same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out
 what it cannot explain,
 

@@ -32,8 +32,8 @@ def compare(
     record.
 
     Of one study: as stated, without the rows of joints that stand, with known torques left out. In
-    each, the essential, the physical or all parameters are taken, whichever predict best. Exit code
-    1 where the best cannot be used.
+    each, the parameters that identify prints first are taken. Exit code 1 where the best cannot be
+    used.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
