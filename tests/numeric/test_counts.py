@@ -25,9 +25,9 @@ from runtime.rows.pieces import pieces
 from runtime.rows.prepared import decimated_torque, observation_from_states, prepared
 from runtime.rows.selection import UNCERTAIN, certain_rows, instants_of, select_rows
 from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping
+from runtime.signals.counts.boxes import box_moments
 from runtime.signals.counts.lattice import lattice
 from runtime.signals.counts.reading import MARGIN, STRETCH, read_counts, stretches
-from runtime.signals.counts.sites import box_moments
 from runtime.signals.counts.spline import Basis, Factor, next_density
 from runtime.signals.encoder_advice import encoder_sentences
 from runtime.signals.filters import filtered_states
@@ -61,12 +61,12 @@ def test_the_posterior_is_that_of_dense_linear_algebra():
     """
     rng = np.random.default_rng(0)
     basis = Basis(100, 2, 3, 0.1)
-    tau, nu = rng.random((2, 2, basis.padded))
+    tau, nu = rng.random((2, 2, basis.M * basis.m))
     density = 1 + rng.random((2, basis.M))
     factor = Factor.of(basis.precision(tau, density))
     c = factor.solve(basis.gradient(nu, density, np.zeros((2, basis.P))))
     Z = factor.inverse()
-    rows = np.zeros((basis.padded, basis.P))
+    rows = np.zeros((basis.M * basis.m, basis.P))
     jerk = np.zeros((basis.M, basis.P))
     for i in range(basis.M):
         jerk[i, i : i + 4] = np.array([-1, 3, -3, 1]) / basis.h**3
@@ -141,12 +141,12 @@ def test_a_motion_that_answers_its_counts_is_told_and_read_as_smooth():
         x, v = x + v / RATE + a / 2 / RATE**2, v + a / RATE
     counts = step * np.round(np.array(positions)[:, None] / step)
     inner, off = slice(400, -400), {}
-    for lines in ("detected", 0.01):
+    for lines in (0.01, "detected"):
         reading = read_counts(counts, RATE, step, lines=lines)
         off[lines] = np.sqrt(
             np.mean(((reading.q[:, 0] - positions) / reading.s_q[:, 0])[inner] ** 2)
         )
-    assert off["detected"] < 2 < 4 < off[0.01]
+    assert off["detected"] < 2 and off[0.01] < 3, off
     assert any("cross one line to and fro" in text for text in reading.findings)
     certain = reading.s_qd[:, 0] < np.abs(reading.qd[:, 0])
     assert (
@@ -324,11 +324,8 @@ def test_uneven_lines_are_detected_and_estimated():
     for lines in (0.01, "detected", "estimated"):
         reading = read_counts(position, RATE, step, lines=lines)
         errors[lines] = np.sqrt(((reading.q - q - np.mean(reading.q - q, axis=0)) ** 2).mean())
-        if lines != 0.01:
-            assert any("lines are uneven by 0.12 steps" in text for text in reading.findings), lines
-    assert (
-        errors["estimated"] < 0.6 * errors["detected"] and errors["detected"] < 1.05 * errors[0.01]
-    ), errors
+        assert any("by 0.12 steps (rms)" in text for text in reading.findings), lines
+    assert errors["estimated"] < 0.7 * errors["detected"], errors
     assert not read_counts(counted(q, step), RATE, step).findings
 
 

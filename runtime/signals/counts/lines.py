@@ -1,23 +1,18 @@
-"""Lines of an encoder that are not evenly spaced: their size by evidence, their places estimated
-with the motion.
+"""Places of the lines of an encoder that are not evenly spaced, estimated with the motion.
 
 A change of the count, from k to k + 1 between two samples, says that the motion crossed line k +
 1/2 + delta_k there:
 
     x(t_e) = k + 1/2 + delta_k + n_e
         n_e of variance (qd Ts)^2/12, time alone; delta_k of variance e^2, the same at every
-        crossing
-    marginal of the changes, x integrated out
-        log N = sum log w_e/2 - log|A|/2 + sum log(h/r_i)/2 - residual/2,   w_e = 1/((qd Ts)^2/12 +
-        e^2)
+        crossing; w_e = 1/((qd Ts)^2/12 + e^2)
     S delta = B' A^-1 g - B' ...                  S = diag(sum w) + 1/e^2 - B' A^-1 B,
                                             B of a class: sum of w_e b_e over its changes
 
-e is the value of SIZES of largest evidence, the jerk density following each. Classes of lines are
-those of period two and four (quadrature) and single
-lines crossed at least CROSSINGS times, in both directions; e^2 of a class by expectation
-maximisation. What is estimated is taken off the bounds, and
-what is left widens them.
+e is that of `runtime.signals.counts.boxes`. Classes of lines are those of period two and four
+(quadrature) and single lines crossed at least CROSSINGS times, in both directions; e^2 of a class
+by expectation maximisation. What is estimated is taken off the bounds, and what is left widens
+them.
 
 References: Harville (1977), random effects; Merry, van de Molengraft and Steinbuch (2010) for
 encoders.
@@ -25,28 +20,22 @@ encoders.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrs
 from scipy.sparse import csr_array, diags_array
 
-from runtime.signals.counts.spline import Basis, Factor, next_density
+from runtime.signals.counts.spline import Basis, Factor
 
 Array = np.ndarray
 
-SIZES = (0.25, 0.12, 0.06, 0.03, 0.01)
-"""Deviations of lines that are compared, steps; the last counts as even."""
-COMPARED, CLEAR = (0.1, 0.03, 0.01), 0.03
-"""Deviations whose evidence is compared first, and the difference by change that tells."""
 WEAK = 0.06
 """Precision of every count taken as a position, where no count changes: a hundredth of an
 interval's, since neighbours say the same.
 """
-PASSES = 2
-FEWEST = 50
-"""Changes below which lines count as even."""
+EVEN = 0.01
+"""Deviation of lines that is always allowed for, steps."""
 POOR = 0.8
 """Share of the deviation that is left, from which lines count as not estimated."""
 CROSSINGS, ENOUGH = 5, 20
@@ -73,71 +62,32 @@ class Changes:
 
     @classmethod
     def of(cls, y: Array, known: Array, near: int) -> Changes:
-        """Changes by one count, of y, shape (N,), at most `near` missing samples apart."""
-        at = np.flatnonzero(known)
-        step = np.diff(y[at])
-        e = np.flatnonzero((np.abs(step) == 1) & (np.diff(at) <= near + 1))
-        line = (y[at[e]] + y[at[e + 1]]) / 2
-        return cls(at[e], at[e + 1], line, np.floor(line).astype(int), step[e] > 0)
+        """Changes by one count, of y, at most `near` missing samples apart; known : samples that
+        have a count.
+        """
+        step = np.diff(y[known])
+        e = np.flatnonzero((np.abs(step) == 1) & (np.diff(known) <= near + 1))
+        before, after = known[e], known[e + 1]
+        line = (y[before] + y[after]) / 2
+        return cls(before, after, line, np.floor(line).astype(int), step[e] > 0)
 
 
 @dataclass(frozen=True, eq=False)
 class LineErrors:
-    """Of one encoder: deviation of the lines, steps; shift of the lines first, first + 1 ..., what
-    is left of the deviation once shifted; a sentence.
+    """Of one encoder: shift of the lines first, first + 1 ..., steps; what is left of their
+    deviation; a sentence.
     """
 
-    deviation: float
     first: int
     shift: Array
     left: float
-    finding: str = ""
+    finding: str
 
     def of(self, number: Array) -> Array:
         """Shifts of lines by their number; 0 for lines never crossed."""
         place = number - self.first
         inside = (place >= 0) & (place < len(self.shift))
-        return (
-            np.where(inside, self.shift[np.clip(place, 0, max(len(self.shift) - 1, 0))], 0.0)
-            if len(self.shift)
-            else np.zeros(len(number))
-        )
-
-
-def evidence(
-    basis: Basis,
-    changes: Sequence[Changes],
-    weak: tuple[Array, Array],
-    speed: Array,
-    r: Array,
-    e: float,
-    passes: int,
-) -> tuple[Array, Array]:
-    """Log evidence of the changes of every encoder with lines of deviation e, and the jerk density
-    that goes with it, shape (n,) each.
-
-    weak : precisions of single samples and these times the counts, shape (n, m M) each, which hold
-    the spline where no count changes.
-    speed : steps a sample, shape (n, m M).
-    r : density where the passes of MacKay's rule start; from above they are few.
-    """
-    tau, nu = weak[0].copy(), weak[1].copy()
-    fixed = -0.5 * np.divide(nu**2, tau, out=np.zeros_like(nu), where=tau > 0).sum(axis=1)
-    for j, each in enumerate(changes):
-        w, value = _weights(each, speed[j], e)
-        np.add.at(tau[j], each.before, w)
-        np.add.at(nu[j], each.before, w * value)
-        fixed[j] += 0.5 * np.log(w).sum() - 0.5 * (w * value**2).sum()
-    samples, g = (
-        basis.of_samples(tau),
-        basis.gradient(nu, np.ones((basis.n, basis.M)), np.zeros((basis.n, basis.P))),
-    )
-    unit = basis.of_prior(np.ones((basis.n, basis.M)))
-    for _ in range(passes):
-        r = next_density(basis, samples, unit, g, r)
-    factor = Factor.of(samples + unit / r[:, None])
-    fixed += 0.5 * basis.M * -np.log(r) + 0.5 * (g * factor.solve(g)).sum(axis=1)
-    return fixed - 0.5 * factor.log_determinants, r
+        return np.where(inside, self.shift[np.clip(place, 0, len(self.shift) - 1)], 0.0)
 
 
 def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, Array]:
@@ -149,67 +99,28 @@ def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, A
     return w, changes.line + (changes.before - changes.after) / 2 * s
 
 
-def line_errors(
+def estimated_lines(
     basis: Basis,
     y: Array,
     known: Array,
     rest: Array,
     c: Array,
     density: Array,
-    Ts: float,
-    *,
-    estimate: bool,
-) -> tuple[list[LineErrors], Array]:
-    """Size of the errors of the lines of every encoder, their places where `estimate` asks for
-    them, and the jerk density without these errors.
+    deviation: float,
+) -> LineErrors:
+    """Places of the lines of one encoder whose deviation is known, steps.
 
-    y, known, rest, c, density : as in `runtime.signals.counts.sites`, c from the changes
-    alone.
+    y, known, rest : counts, samples that have one, precision of the others.
+    c, density : the motion with bounds widened by the deviation.
     """
-    changes = [Changes.of(y[j], known[j], basis.m) for j in range(basis.n)]
-    weak = np.where(known, WEAK, rest), WEAK * y
-    speed = basis.at_samples(c, 1) * Ts
-
-    def judged(sizes: Sequence[float]) -> dict[float, tuple[Array, Array]]:
-        found, r = {}, density.mean(axis=1)
-        for number, e in enumerate(sizes):
-            found[e] = evidence(basis, changes, weak, speed, r, e, PASSES if number else 2 * PASSES)
-            r = found[e][1]
-        return found
-
-    first = judged(COMPARED)
-    best = np.max([first[e][0] for e in COMPARED[:-1]], axis=0)
-    crossings = np.array([len(each.line) for each in changes])
-    uneven = (best > first[SIZES[-1]][0] + CLEAR * crossings) & (crossings >= FEWEST)
-    if not uneven.any():
-        return [LineErrors(SIZES[-1], 0, np.zeros(0), SIZES[-1])] * basis.n, density
-    all_sizes, errors, densities = judged(SIZES), [], density.copy()
-    for j, each in enumerate(changes):
-        deviation = (
-            max(all_sizes, key=lambda e: float(all_sizes[e][0][j])) if uneven[j] else SIZES[-1]
-        )
-        if deviation > SIZES[-1]:
-            densities[j] = all_sizes[deviation][1][j]
-        if deviation == SIZES[-1] or not estimate:
-            text = (
-                f"lines are uneven by {deviation:g} steps (rms); bounds and stated deviations "
-                "are widened, lines: estimated asks for their places"
-            )
-            errors.append(
-                LineErrors(
-                    deviation, 0, np.zeros(0), deviation, text if deviation > SIZES[-1] else ""
-                )
-            )
-        else:
-            alone = Basis(basis.N, 1, basis.m, Ts)
-            rows = slice(j, j + 1)
-            place, shift, left, period, single = _shifts(
-                alone, each, (weak[0][rows], weak[1][rows]), speed[j], densities[rows], deviation
-            )
-            errors.append(
-                LineErrors(deviation, place, shift, left, _text(deviation, left, period, single))
-            )
-    return errors, densities
+    changes = Changes.of(y, known, basis.m)
+    weak = rest.copy()
+    weak[known] = WEAK
+    speed = basis.at_samples(c, 1)[0] * basis.Ts
+    first, shift, left, period, single = _shifts(
+        basis, changes, (weak[None], WEAK * y[None]), speed, density, deviation
+    )
+    return LineErrors(first, shift, left, _text(deviation, left, period, single))
 
 
 def _text(deviation: float, left: float, period: float, single: int) -> str:
@@ -259,7 +170,7 @@ def _shifts(
     interval, u = np.divmod(changes.before, basis.m)
     columns = (interval[:, None] + np.arange(4)).ravel()
     V = csr_array((basis.values[0][u].ravel(), (np.repeat(e, 4), columns)), (len(e), basis.P))
-    w, value = _weights(changes, speed, SIZES[-1])
+    w, value = _weights(changes, speed, EVEN)
     time = 1 / w
     variance_own = variance_period = deviation**2 / 2
     for _ in range(4):
@@ -291,7 +202,7 @@ def _shifts(
     return (
         first,
         shift,
-        max(left, SIZES[-1]),
+        max(left, EVEN),
         float(np.sqrt(np.mean(delta[len(own) :] ** 2))),
         len(own),
     )

@@ -104,9 +104,8 @@ class Reading:
         """Positions drawn from the posterior, shape (N, n)."""
         x = np.array(self.q)
         for part in self.parts:
-            drawn = (part.smoothed.draw(rng) * self.step[part.moving, None]).T + self.phase[
-                part.moving
-            ]
+            drawn = np.stack([each.draw(rng) for each in part.smoothed], axis=1)
+            drawn = drawn * self.step[part.moving] + self.phase[part.moving]
             head = max(
                 part.first - part.begin, 0
             )  # samples shared with the stretch before: from one draw to the next
@@ -124,7 +123,7 @@ class Part:
     encoders whose counts change in it.
     """
 
-    smoothed: Smoothed
+    smoothed: tuple[Smoothed, ...]
     begin: int
     first: int
     stop: int
@@ -134,9 +133,9 @@ class Part:
     def findings(self) -> tuple[str, ...]:
         """Sentences about the lines of its encoders."""
         return tuple(
-            f"encoder {j + 1}: {each.finding}"
-            for j, each in zip(self.moving, self.smoothed.errors, strict=True)
-            if each.finding
+            f"encoder {j + 1}: {said}"
+            for j, said in zip(self.moving, (each.said for each in self.smoothed), strict=True)
+            if said
         )
 
 
@@ -194,7 +193,7 @@ def _reading(
             x[first:stop] = own[kept]
         if part is not None:
             part = replace(part, begin=begin, first=first, stop=stop)
-            density[part.moving] += part.smoothed.density.mean(axis=1) * (stop - first) / N
+            density[part.moving] += [x.density * (stop - first) / N for x in part.smoothed]
             parts.append(part)
             found.update(dict.fromkeys(part.findings))
     for i, x in enumerate(states):
@@ -248,10 +247,12 @@ def _moved(k: Array, moving: Array, states: Sequence[Array], rate: float, lines:
         isinstance(lines, str)
         and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
     )
-    part = Part(smoothed(k[moving], 1 / rate, lines=ANYWHERE if shaken else lines), 0, 0, N, moving)
+    lines = ANYWHERE if shaken else lines
+    channels = tuple(smoothed(k[j], 1 / rate, lines=lines) for j in moving)
+    part = Part(channels, 0, 0, N, moving)
     for order in range(3):
-        for i, x in zip((order, order + 3), part.smoothed.state(order), strict=True):
-            states[i][:, moving] = x.T
+        for j, each in zip(moving, channels, strict=True):
+            states[order][:, j], states[order + 3][:, j] = each.state(order)
     for j, at in zip(moving, known, strict=True) if shaken else ():
         turned = np.zeros(N, dtype=bool)
         for a, b in at[to_and_fro(k[j, at])]:

@@ -22,38 +22,49 @@ evidence; docs/theory/counts.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
-from scipy.special import erfcx
 
-from runtime.signals.counts.lines import LineErrors, line_errors
+from runtime.errors import InputError
+from runtime.signals.counts.boxes import (
+    CLOCK_ERRORS,
+    COUNT_ERRORS,
+    Boxes,
+    Errors,
+    Posterior,
+    jerk_density,
+    of_most_evidence,
+)
+from runtime.signals.counts.lines import estimated_lines
 from runtime.signals.counts.spline import Basis, Factor, next_density
 
 Array = np.ndarray
 Lines = Literal["detected", "estimated"] | float
 
 KNOTS = 2e-3
-"""Distance of knots, s, or of samples where that is larger."""
-PASSES, FIRST = 12, 30
-"""Most passes over the sites, and over the changes alone ahead of them."""
+"""Least distance of knots, s, or of samples where that is larger."""
+RESOLVED, FARTHEST = 0.1, 0.064
+"""Distance of knots in units of the time r^(-1/5) in which white jerk of density r crosses an
+interval, and the largest one, s.
+"""
+WIDE = 0.12
+"""Error of a count from which the comparison starts, steps."""
+JUMPS, MOST_LOST, LIKELIER = 8, 30, 30.0
+"""Most jumps of the counts of an encoder, the counts lost in one that is looked for, and the rise
+of the evidence, nats, that tells one.
+"""
+LEAP, NEIGHBOURS = 5.0, 10
+"""A change of the count so many times all changes of so many samples on either side is none of a
+motion.
+"""
+FEWEST = 150
+"""Bounds from which an error of the counts is told: fewer do not tell it from an unusual motion."""
+FIRST = 30
+"""Most passes over the changes alone, ahead of those over the sites."""
 SETTLED = 0.1
 """Relative change of the jerk density at which the passes over the changes end."""
-DAMPING = 0.7
-FAR = 6.0
-"""Deviations from both of its bounds at which a sample says nothing."""
-CHANGE = 0.02
-"""Relative change of the precisions at which passes end."""
-LINES = 0.01
-"""Error of a line that is always allowed for, steps."""
-WINDOW, OF_RECORD = 0.05, 3.0
-"""Length of time that has a jerk density of its own, s, and the weight of the whole record in it,
-in determined jerks.
-"""
-RANGE = 1e-3
-"""Least share of a window's density in that of the record."""
 GAP = 10.0
 """Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long
 gap remains one that Cholesky factors.
@@ -66,106 +77,188 @@ density r crosses it.
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Posterior of n channels, in steps.
+    """Posterior of one encoder, in steps, about `origin`.
 
-    basis : Basis.
-    c : coefficients, shape (n, P).
-    Z : covariances, shape (4, n, P).
-    factor : of A.
-    density : r, shape (n, M), steps^2/s^5.
-    origin : shape (n, 1), what was taken off the counts.   errors : those of the lines, by channel.
+    said : a sentence about the errors of its counts, or none.
     """
 
     basis: Basis
-    c: Array
-    Z: Array
-    factor: Factor
-    density: Array
-    origin: Array
-    errors: tuple[LineErrors, ...] = ()
+    read: Posterior
+    origin: float
+    said: str
+
+    @property
+    def density(self) -> float:
+        """Mean density of the jerk, steps^2/s^5."""
+        return float(self.read.density.mean())
 
     def state(self, order: int) -> tuple[Array, Array]:
-        """Mean and deviation of the position, or of its derivative of that order, shape (n, N)
+        """Mean and deviation of the position, or of its derivative of that order, shape (N,)
         each.
         """
         N = self.basis.N
-        mean = self.basis.at_samples(self.c, order)[:, :N]
-        return mean + self.origin * (order == 0), np.sqrt(
-            np.maximum(self.basis.variances(self.Z, order)[:, :N], 0)
-        )
+        mean = self.basis.at_samples(self.read.c, order)[0, :N]
+        variance = self.basis.variances(self.read.Z, order)[0, :N]
+        return mean + self.origin * (order == 0), np.sqrt(np.maximum(variance, 0))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """Positions drawn from the posterior, shape (n, N)."""
-        return np.asarray(
-            self.basis.at_samples(self.c + self.factor.draw(rng))[:, : self.basis.N] + self.origin
-        )
+        """Positions drawn from the posterior, shape (N,)."""
+        drawn = self.basis.at_samples(self.read.c + self.read.factor.draw(rng))
+        return np.asarray(drawn[0, : self.basis.N] + self.origin)
 
 
 def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed:
-    """Posterior of counts, shape (n, N); nan: a sample that is missing.
+    """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
 
     lines : whether errors of the lines are "detected", and bounds widened, or "estimated"; or their
-    deviation in steps.
+    deviation in steps, less than which is not taken.
+
+    InputError where no motion goes with the counts.
     """
-    n, N = counts.shape
-    basis = Basis(N, n, max(1, round(KNOTS / Ts)), Ts)
-    known = np.zeros((n, basis.padded), dtype=bool)
-    known[:, :N] = np.isfinite(counts)
-    origin = np.asarray(np.round(np.nanmean(counts, axis=1)))[:, None]
-    y, rest = np.zeros(known.shape), np.zeros(known.shape)  # rest : precision of missing samples
-    y[:, :N] = np.where(known[:, :N], counts - origin, 0.0)
-    rest[:, :N] = np.where(known[:, :N], 0.0, (GAP * (np.ptp(y, axis=1, keepdims=True) + 1)) ** -2)
-    given = LINES if isinstance(lines, str) else lines
-    errors = [LineErrors(given, 0, np.zeros(0), given)] * n
-    tau, nu = _from_changes(y, known, rest, errors, basis.m)
-    c, density = _passed(basis, tau, nu, _first_density(y[:, :N]))
-    if isinstance(lines, str):
-        errors, density = line_errors(
-            basis, y, known, rest, c, density, Ts, estimate=lines == "estimated"
+    known = np.flatnonzero(np.isfinite(counts))
+    origin = float(np.round(counts[known].mean()))
+    y, rest = np.zeros((2, len(counts)))
+    y[known] = counts[known] - origin
+    rest[:] = (GAP * (np.ptp(y) + 1)) ** -2  # precision of missing samples
+    rest[known] = 0
+    given = Counts(y, known, rest, Ts)
+    sizes: tuple[float, ...] = COUNT_ERRORS
+    if not isinstance(lines, str):
+        sizes = (max(lines, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > lines))
+    jumps = _leaps(y, known)
+    for leap in jumps:
+        given = given.without(*leap)
+    boxes, read = given.read(sizes)
+    while len(jumps) < JUMPS and (jump := _jump(boxes, read)):
+        jumps.append(jump)
+        given = given.without(*jump)
+        boxes, read = given.read(sizes)
+    said = [
+        f"counts jump by {by} at {at * Ts:.4g} s, as if some were lost; taken out"
+        for at, by in jumps
+    ]
+    if lines == "estimated" and read.errors.count > COUNT_ERRORS[0]:
+        of_lines = estimated_lines(
+            boxes.basis, boxes.y, known, boxes.rest, read.c, read.density, read.errors.count
         )
-        if any(each.deviation > LINES for each in errors):
-            tau, nu = _from_changes(y, known, rest, errors, basis.m)
-            c, density = _passed(basis, tau, nu, density.mean(axis=1))
-    sites = np.flatnonzero(_sites(y, known, density, Ts))
-    of, value = sites // basis.padded, y.ravel()[sites]
-    low, high = value - 0.5, value + 0.5
-    for j, each in enumerate(errors):
-        if len(each.shift):
-            number = np.round(value[of == j]).astype(int)
-            low[of == j] += each.of(number - 1)
-            high[of == j] += each.of(number)
-    e2 = np.array([each.left for each in errors])[of] ** 2
-    t, u = tau.ravel()[sites], nu.ravel()[sites]
-    tau, pull, x, gaps = rest.copy(), np.zeros(y.shape), basis.at_samples(c), np.flatnonzero(rest)
-    for _ in range(PASSES):
-        tau.ravel()[sites], pull.ravel()[sites] = t, u - t * x.ravel()[sites]
-        pull.ravel()[gaps] = -rest.ravel()[gaps] * x.ravel()[gaps]
-        factor = Factor.of(basis.precision(tau, density))
-        c = c + factor.solve(basis.gradient(pull, density, c))
-        Z = factor.inverse()
-        density = _density(basis, c, Z, density)
-        x = basis.at_samples(c)
-        at, v = x.ravel()[sites], basis.variances(Z).ravel()[sites]
-        cavity = 1 / np.maximum(1 / v - t, 0.02 / v)
-        m = cavity * (at / v - u)
-        s = np.sqrt(cavity + e2)
-        near = np.flatnonzero(np.minimum(m - low, high - m) < FAR * s)
-        g, H = np.zeros((2, len(s)))
-        g[near], H[near] = box_moments((low - m)[near] / s[near], (high - m)[near] / s[near])
-        g, H = g / s, H / s**2
-        left = 1 - cavity * H
-        t_new, u_new = H / left, (g + H * m) / left
-        change = np.abs(t_new - t).sum() / t.sum()
-        t, u = t + DAMPING * (t_new - t), u + DAMPING * (u_new - u)
-        if change < CHANGE:
-            break
-    return Smoothed(basis, c, Z, factor, density, origin, tuple(errors))
+        boxes, errors = boxes.shifted(of_lines.of), replace(read.errors, count=of_lines.left)
+        read = boxes.again(errors, read)
+        said.append(of_lines.finding)
+    else:
+        said += _told(read.errors, sizes[0], len(boxes.sites))
+    return Smoothed(boxes.basis, read, origin, "; ".join(said))
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """Of one encoder: y, shape (N,), at the samples `measured`; precision `rest` of the others."""
+
+    y: Array
+    measured: Array
+    rest: Array
+    Ts: float
+
+    def read(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
+        """The motion between the bounds, with the errors of most evidence, or wider ones with which
+        it agrees with every count; a jittering clock is thought of where they are wide.
+        """
+        wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
+        boxes, read = self.first(Errors(wide))
+        if read.settled:
+            read = of_most_evidence(boxes, sizes, read)
+        if not read.settled or read.errors.count > wide:
+            others = [self.first(Errors(wide, CLOCK_ERRORS[-2])), self.first(Errors(sizes[-1]))]
+            found = [(b, of_most_evidence(b, sizes, r)) for b, r in others if r.settled]
+            boxes, read = max([(boxes, read), *found], key=lambda each: each[1].evidence)
+        for count in (x for x in sizes if x > read.errors.count):
+            if boxes.agrees(read):
+                break
+            boxes, read = self.first(replace(read.errors, count=count))
+        if not boxes.agrees(read):
+            raise InputError(
+                f"no motion goes with the counts, even if each were off by {sizes[-1]:g} steps; "
+                "read them by the low-pass (signals: reader: lowpass)"
+            )
+        return boxes, read
+
+    def first(self, errors: Errors) -> tuple[Boxes, Posterior]:
+        """Bounds of counts with these errors, and the motion between them.
+
+        Knots are as far apart as the motion allows that passes near the changes.
+        """
+        y, N, least = self.y, len(self.y), max(1, round(KNOTS / self.Ts))
+        basis = Basis(N, 1, least, self.Ts)
+        tau, nu = _from_changes(y, self.measured, self.rest, errors, least)
+        _, density = _passed(basis, tau, nu, _first_density(y))
+        h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
+        basis = Basis(N, 1, max(1, round(h / self.Ts)), self.Ts)
+        c, density = _passed(basis, tau, nu, density.max(axis=1))
+        sites = _sites(y, self.measured, density.mean(), self.Ts)
+        bounds = y[sites] - 0.5, y[sites] + 0.5
+        boxes = Boxes(
+            basis, basis.filled(y), self.measured, sites, *bounds, basis.filled(self.rest)
+        )
+        return boxes, boxes.posterior(errors, c, density, tau[sites], nu[sites])
+
+    def without(self, at: int, jump: int) -> Counts:
+        """These counts without a jump at a sample."""
+        y = self.y.copy()
+        y[self.measured[self.measured >= at]] -= jump
+        return replace(self, y=y)
+
+
+def _leaps(y: Array, known: Array) -> list[tuple[int, int]]:
+    """Samples at which counts change by LEAP times their neighbours, and by how many they jump."""
+    change = np.diff(y[known], prepend=y[known[0]], append=y[known[-1]])
+    beside = np.lib.stride_tricks.sliding_window_view(
+        np.pad(change, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1, axis=0
+    )[: len(known)]
+    others = np.delete(beside, NEIGHBOURS, axis=1)
+    leap = np.abs(change[: len(known)]) > LEAP * np.maximum(np.abs(others).max(axis=1), 1)
+    leap &= np.diff(known, prepend=known[0]) == 1  # across a gap any change is one of a motion
+    jump = np.round(change[: len(known)] - np.median(others, axis=1))
+    return [(int(known[i]), int(jump[i])) for i in np.flatnonzero(leap)[:JUMPS]]
+
+
+def _jump(boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
+    """Sample at which counts jump, and by how many, if the record is more likely without by
+    LIKELIER nats; not asked where counts have the least errors.
+    """
+    if read.errors.count <= COUNT_ERRORS[0] or len(boxes.sites) < FEWEST:
+        return None
+    at, most_likely = boxes.jump(read)
+    away = 1 if most_likely > 0 else -1
+    near = round(np.clip(most_likely, -MOST_LOST, MOST_LOST))
+    for jump in dict.fromkeys((near, near + away, near - away, away, 2 * away, 3 * away)):
+        if boxes.later(at, -jump, read).evidence > read.evidence + LIKELIER:
+            return at, jump
+    return None
+
+
+def _told(errors: Errors, least: float, sites: int) -> list[str]:
+    """Sentences about errors beside the rounding; none where they are the least that is taken, or
+    sites too few to tell.
+    """
+    said = []
+    if errors.count > least and sites > FEWEST:
+        said.append(
+            f"counts are off by {errors.count:g} steps (rms) beside their rounding, by uneven "
+            "lines or noise; bounds and stated deviations are widened, lines: estimated asks for "
+            "the places of the lines"
+        )
+    if errors.time > CLOCK_ERRORS[1]:
+        said.append(
+            f"time stamps are off by {errors.time:g} periods (rms); bounds and stated deviations "
+            "are widened where the joint is fast"
+        )
+    return said
 
 
 def _passed(basis: Basis, tau: Array, nu: Array, density: Array) -> tuple[Array, Array]:
     """The spline through Gaussian sites, and the jerk density that goes with it, shape (n, M),
     after at most FIRST passes from `density`, (n,).
     """
+    tau, nu = basis.filled(tau)[None], basis.filled(nu)[None]
     samples, unit = basis.of_samples(tau), basis.of_prior(np.ones((basis.n, basis.M)))
     g = basis.gradient(nu, np.ones((basis.n, basis.M)), np.zeros((basis.n, basis.P)))
     for _ in range(FIRST):
@@ -177,97 +270,53 @@ def _passed(basis: Basis, tau: Array, nu: Array, density: Array) -> tuple[Array,
         factor = Factor.of(samples + basis.of_prior(of_windows))
         for _ in range(2):
             c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), of_windows, c))
-        of_windows = _density(basis, c, factor.inverse(), of_windows)
+        of_windows = jerk_density(basis, c, factor.inverse(), of_windows)
     return c, of_windows
 
 
-def _sites(y: Array, known: Array, density: Array, Ts: float) -> Array:
+def _sites(y: Array, known: Array, density: float, Ts: float) -> Array:
     """Samples whose bounds count: both sides of every change and gap, and in between as often as
-    the motion forgets, bool of the shape of y.
+    the motion forgets; ascending, some of the samples `known`.
 
     Bounds of samples close together are one bound. Taken as many, each would see the others as
     independent knowledge.
     """
-    sites = np.zeros(y.shape, dtype=bool)
-    for j in range(len(y)):
-        at = np.flatnonzero(known[j])
-        change = np.flatnonzero((np.diff(y[j, at]) != 0) | (np.diff(at) > 1))
-        sites[j, at[[0, -1]]] = sites[j, at[change]] = sites[j, at[change + 1]] = True
-        ends = np.concatenate(
-            [[0], np.repeat(change, 2) + np.tile([0, 1], len(change)), [len(at) - 1]]
-        ).reshape(-1, 2)
-        spacing = SPACING * density[j].mean() ** -0.2 / Ts
-        a, length = ends[:, 0], ends[:, 1] - ends[:, 0]
-        parts = (length / spacing).astype(int)  # of every stretch without a change
-        which = np.repeat(np.arange(len(ends)), parts)
-        number = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
-        sites[j, at[(a[which] + number * (length / np.maximum(parts, 1))[which]).astype(int)]] = (
-            True
-        )
-    return sites
-
-
-def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
-    """g and H of a unit normal between a < b: g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) -
-    Phi(a), at mean m = 0 of unit variance.
-    """
-    flip = a + b < 0
-    low, high = np.where(flip, -b, a), np.where(flip, -a, b)
-    low = np.maximum(low, -8.0)
-    ratio = np.exp(np.minimum((low - high) * (low + high) / 2, 0))
-    at_low = np.sqrt(2 / np.pi) / (erfcx(low / np.sqrt(2)) - ratio * erfcx(high / np.sqrt(2)))
-    at_high = at_low * ratio
-    g = at_low - at_high
-    return np.where(flip, -g, g), np.clip(g * g + high * at_high - low * at_low, 0, 1 - 1e-9)
+    change = np.flatnonzero((np.diff(y[known]) != 0) | (np.diff(known) > 1))
+    ends = np.concatenate([[0], np.repeat(change, 2), [len(known) - 1]]).reshape(-1, 2)
+    ends[1:, 0] += 1
+    parts = (np.diff(ends)[:, 0] * Ts / (SPACING * density**-0.2)).astype(int)  # between changes
+    between = [np.linspace(a, b, k, endpoint=False) for (a, b), k in zip(ends, parts, strict=True)]
+    places = np.unique(np.concatenate([ends.ravel(), *between]).astype(int))
+    return np.asarray(known[places])
 
 
 def _first_density(y: Array) -> Array:
     """A density above any that the record asks for, from which MacKay's rule takes few passes,
-    shape (n,): root 1e4 s^(-5/2) times the range.
+    shape (1,): root 1e4 s^(-5/2) times the range.
     """
-    return np.asarray((np.ptp(y, axis=1) + 1) ** 2 * 1e8)
+    return np.array([(np.ptp(y) + 1) ** 2 * 1e8])
 
 
 def _from_changes(
-    y: Array, known: Array, rest: Array, errors: Sequence[LineErrors], near: int
+    y: Array, known: Array, rest: Array, errors: Errors, near: int
 ) -> tuple[Array, Array]:
     """First sites: at the two samples around a change of the count, at most `near` missing samples
-    apart; a hundredth of an interval at every other
-    sample, `rest` where it is missing."""
-    tau = np.where(known, 0.06, rest)
-    nu = tau * y
-    for j in range(len(y)):
-        at = np.flatnonzero(known[j])
-        e = np.flatnonzero((np.diff(y[j, at]) != 0) & (np.diff(at) <= near + 1))
-        if len(e) < 2:
-            continue
-        before, after = at[e], at[e + 1]
-        t, line = (before + after) / 2, (y[j, before] + y[j, after]) / 2
-        slope = np.diff(line) / np.diff(t)  # steps a sample, from change to change
-        slopes = np.abs([np.append(slope[:1], slope), np.append(slope, slope[-1:])])
-        speed = 0.5 * (np.append(slope[:1], slope) + np.append(slope, slope[-1:]))
-        line = line + errors[j].of(np.floor(line).astype(int))
-        weight = 6 / (
-            np.clip(slopes.max(axis=0) * (after - before), 0.02, 1) ** 2 + 12 * errors[j].left ** 2
-        )
-        for samples in (before, after):
-            np.add.at(tau[j], samples, weight)
-            np.add.at(nu[j], samples, weight * (line + (samples - t) * speed))
-    return tau, nu
-
-
-def _density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
-    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks;
-    shape (n, M).
+    apart; a hundredth of an interval at every other sample, `rest` where it is missing.
     """
-    squares, determined = (
-        basis.jerk(c) ** 2 * basis.h,
-        np.maximum(1 - basis.jerk_variances(Z) * basis.h / density, 1e-9),
-    )
-    whole = squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True)
-    size = max(1, round(WINDOW / basis.h))
-    squares, determined = (
-        size * uniform_filter1d(x, size, axis=1, mode="nearest") for x in (squares, determined)
-    )
-    least = np.maximum(RANGE * whole, basis.least_density)
-    return np.asarray(np.maximum((squares + OF_RECORD * whole) / (determined + OF_RECORD), least))
+    tau = rest.copy()
+    tau[known] = 0.06
+    nu = tau * y
+    e = np.flatnonzero((np.diff(y[known]) != 0) & (np.diff(known) <= near + 1))
+    if len(e) < 2:
+        return tau, nu
+    before, after = known[e], known[e + 1]
+    t, line = (before + after) / 2, (y[before] + y[after]) / 2
+    slope = np.diff(line) / np.diff(t)  # steps a sample, from change to change
+    slopes = np.array([np.append(slope[:1], slope), np.append(slope, slope[-1:])])
+    speed = slopes.mean(axis=0)
+    time = np.clip(np.abs(slopes).max(axis=0) * (after - before), 0.02, 1)
+    weight = 6 / (time**2 + 12 * errors.variance(speed))
+    for samples in (before, after):
+        np.add.at(tau, samples, weight)
+        np.add.at(nu, samples, weight * (line + (samples - t) * speed))
+    return tau, nu

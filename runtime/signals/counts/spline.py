@@ -45,8 +45,8 @@ class Basis:
     """
 
     def __init__(self, N: int, n: int, m: int, Ts: float) -> None:
-        self.N, self.n, self.m, self.M, self.h = N, n, m, -(-N // m), m * Ts
-        self.P, self.padded = self.M + 3, self.M * m
+        self.N, self.n, self.m, self.M, self.Ts, self.h = N, n, m, -(-N // m), Ts, m * Ts
+        self.P = self.M + 3
         u = np.arange(m) / m
         one = np.ones(m)
         self.values = (
@@ -62,6 +62,10 @@ class Basis:
         self.products = np.stack(
             [self.values[0][:, a] * self.values[0][:, b] for a, b in PAIRS], axis=1
         )
+
+    def filled(self, x: Array) -> Array:
+        """Samples, shape (N,), and zeros up to whole intervals."""
+        return np.pad(x, (0, self.M * self.m - self.N))
 
     @property
     def least_density(self) -> float:
@@ -156,6 +160,10 @@ class Factor:
     def solve(self, g: Array) -> Array:
         """A^-1 g, shape (n, P)."""
         return np.asarray(dpbtrs(self.L, g.reshape(-1, 1), lower=1)[0].reshape(g.shape))
+
+    def solve_each(self, g: Array) -> Array:
+        """A^-1 g of one channel for every row of g, shape (k, P)."""
+        return np.asarray(dpbtrs(self.L, np.asfortranarray(g.T), lower=1)[0].T)
 
     def draw(self, rng: np.random.Generator) -> Array:
         """A draw of N(0, A^-1), shape (n, P)."""

@@ -1,0 +1,284 @@
+"""Expectation propagation between the bounds that counts are, and the errors that counts and time
+stamps have, by its evidence.
+
+    tilted law of a sample    N(x; m, v) [Phi((hi - x)/e) - Phi((lo - x)/e)]
+                              m, v without this sample; e^2 = count^2 + (time qd Ts)^2
+    site
+        the normal law that gives the tilted law its mean and variance: precision tau, tau times
+        mean nu
+    evidence    log Z = sum_k log C_k + sum_k nu_k x_k/2 - log|A|/2 - sum_i log(r_i h^5)/2
+        C_k the factor that gives the site the mass of the tilted law; a constant is left out
+
+Sites are updated all at once, damped; more so where precisions change by more than the time before.
+Errors are compared from wide ones down: wide boxes settle in a few passes, and boxes that are too
+narrow for their counts lose evidence before they no longer settle.
+
+References: Minka (2001); Cunningham, Hennig and Lacoste-Julien (2011), boxes; MacKay (1992),
+evidence; docs/theory/counts.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.special import erfcx, log_ndtr
+
+from runtime.signals.counts.spline import Basis, Factor
+
+Array = np.ndarray
+
+PASSES = 40
+"""Most passes over the sites."""
+CHANGE = 0.02
+"""Relative change of the precisions at which passes end."""
+DAMPING, LEAST_DAMPING = 0.7, 0.1
+SLOWER = 0.95
+"""Ratio of two changes above which the next one is damped more."""
+CAVITY = 0.02
+"""Least share of a precision that is left without the sample. Sites at it have not settled, unless
+the others tell less than the interval itself.
+"""
+FAR = 6.0
+"""Deviations from both of its bounds at which a sample says nothing; beyond its bound by which it
+contradicts the motion.
+"""
+SUSPECTS, ENDS = 3, 10
+"""Windows of time in which a jump of the counts is looked for, and sites at either end that tell
+nothing of one.
+"""
+COUNT_ERRORS = (0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Errors of a count beside its rounding that are compared, steps (rms)."""
+CLOCK_ERRORS = (0.0, 0.05, 0.1, 0.2, 0.4)
+"""Errors of a time stamp that are compared, sampling periods (rms)."""
+MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1), (-1, 1), (-1, 0), (1, 0))
+"""Steps of the search in COUNT_ERRORS and in CLOCK_ERRORS, each as long as the evidence rises."""
+CLEAR = 3.0
+"""Rise of the evidence, nats, that counts as one."""
+WINDOW, OF_RECORD = 0.05, 3.0
+"""Length of time that has a jerk density of its own, s, and the weight of the whole record in it,
+in determined jerks.
+"""
+RANGE = 1e-3
+"""Least share of a window's density in that of the record."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of the counts of an encoder beside their rounding, steps, and of its time stamps, sampling
+    periods; rms.
+    """
+
+    count: float
+    time: float = 0.0
+
+    def variance(self, speed: Array) -> Array:
+        """Of counts at speeds in steps a sample."""
+        return np.asarray(self.count**2 + (self.time * speed) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """A motion given sites at S samples.
+
+    c : coefficients, shape (1, P).
+    density : r, shape (1, M).
+    tau, nu : of the sites, shape (S,).
+    Z, factor : covariances, shape (4, 1, P), and the factor of A.
+    errors : of the counts, as taken.
+    evidence : log Z; minus infinity where the sites have not settled.
+    """
+
+    c: Array
+    density: Array
+    tau: Array
+    nu: Array
+    Z: Array
+    factor: Factor
+    errors: Errors
+    evidence: float
+
+    @property
+    def settled(self) -> bool:
+        """Whether the sites have."""
+        return bool(np.isfinite(self.evidence))
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Bounds of one encoder.
+
+    y : counts, shape (m M,).
+    measured : samples that have one, ascending.
+    sites : those whose bounds count, ascending.
+    low, high : bounds of the sites, steps.
+    rest : precision of missing samples, shape (m M,).
+    """
+
+    basis: Basis
+    y: Array
+    measured: Array
+    sites: Array
+    low: Array
+    high: Array
+    rest: Array
+
+    @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
+    def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
+        """Sites passed until they settle, from precisions t and pulls u."""
+        basis, gaps = self.basis, np.flatnonzero(self.rest)
+        tau, pull = self.rest[None].copy(), np.zeros((1, len(self.rest)))
+        x, change, damping = basis.at_samples(c), np.inf, DAMPING
+        for _ in range(PASSES):
+            tau[0, self.sites], pull[0, self.sites] = t, u - t * x[0, self.sites]
+            pull[0, gaps] = -self.rest[gaps] * x[0, gaps]
+            factor = Factor.of(basis.precision(tau, density))
+            c = c + factor.solve(basis.gradient(pull, density, c))
+            Z, x = factor.inverse(), basis.at_samples(c)
+            mean, v = x[0, self.sites], basis.variances(Z)[0, self.sites]
+            cavity, m = self._without(mean, v, t, u)
+            e2 = errors.variance(basis.at_samples(c, 1)[0, self.sites] * basis.Ts)
+            mass, t_new, u_new = self._tilted(m, cavity, e2)
+            factors = mass + 0.5 * np.log1p(t * cavity)
+            factors -= 0.5 * (cavity * u**2 + 2 * u * m - t * m**2) / (1 + t * cavity)
+            evidence = factors.sum() + 0.5 * u @ mean
+            evidence -= 0.5 * (factor.log_determinants[0] + np.log(density).sum())
+            evidence -= 2.5 * basis.M * np.log(basis.h)
+            used, density = density, jerk_density(basis, c, Z, density)
+            before, change = change, np.abs(t_new - t).sum() / t.sum()
+            if change > SLOWER * before:
+                damping = max(DAMPING * damping, LEAST_DAMPING)
+            free = ((1 / v - t > CAVITY / v) | (v > CAVITY)).all()
+            t, u = t + damping * (t_new - t), u + damping * (u_new - u)
+            if change < CHANGE or not np.isfinite(change):
+                break
+        settled = change < CHANGE and free and np.isfinite(evidence)
+        likely = float(evidence) if settled else -np.inf
+        return Posterior(c, used, t, u, Z, factor, errors, likely)
+
+    def again(self, errors: Errors, start: Posterior) -> Posterior:
+        """The motion with other errors, from the sites of `start`."""
+        return self.posterior(errors, start.c, start.density, start.tau, start.nu)
+
+    def agrees(self, read: Posterior) -> bool:
+        """Whether sites have settled and the motion leaves the interval of no count by more than
+        FAR deviations.
+        """
+        x, v = self.basis.at_samples(read.c)[0], self.basis.variances(read.Z)[0]
+        e2 = read.errors.variance(self.basis.at_samples(read.c, 1)[0] * self.basis.Ts)
+        outside = np.abs(x - self.y)[self.measured] - 0.5
+        near = outside < FAR * np.sqrt((np.maximum(v, 0) + e2)[self.measured])
+        return read.settled and bool(near.all())
+
+    def jump(self, read: Posterior) -> tuple[int, float]:
+        """Sample from which counts are most likely off by the same number, and that number, among
+        the samples in the windows of time that others foretell worst, none near an end.
+
+        The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
+        its curvature sum tau - (B tau)' A^-1 (B tau).
+        """
+        x, v = self.basis.at_samples(read.c)[0], self.basis.variances(read.Z)[0]
+        speed = self.basis.at_samples(read.c, 1)[0, self.sites] * self.basis.Ts
+        cavity, m = self._without(x[self.sites], v[self.sites], read.tau, read.nu)
+        off = m - (self.low + self.high) / 2
+        window = (self.sites * self.basis.Ts / WINDOW).astype(int)
+        surprise = np.bincount(window, off**2 / (cavity + read.errors.variance(speed) + 1 / 12) - 1)
+        inside = np.isin(window, np.argsort(surprise)[-SUSPECTS:])
+        inside[:ENDS] = inside[-ENDS:] = False
+        at = self.sites[inside]
+        later = self.sites >= at[:, None]
+        tau, pull = read.tau * later, np.zeros((len(at), len(x)))
+        pull[:, self.sites] = tau
+        basis = Basis(self.basis.N, len(at), self.basis.m, self.basis.Ts)
+        ones = np.ones((len(at), basis.M))
+        B = basis.gradient(pull, ones, np.zeros((len(at), basis.P)))
+        curvature = tau.sum(axis=1) - np.einsum("ij,ij->i", B, read.factor.solve_each(B))
+        g = (later * (read.nu - read.tau * x[self.sites])).sum(axis=1)
+        best = int(np.argmax(g**2 / np.maximum(curvature, 1e-9)))
+        return int(at[best]), float(g[best] / max(curvature[best], 1e-9))
+
+    def later(self, at: int, counts: int, read: Posterior) -> Posterior:
+        """The motion if there were so many counts more from a sample on."""
+        moved = np.where(self.sites >= at, counts, 0)
+        boxes = replace(self, low=self.low + moved, high=self.high + moved)
+        nu = read.nu + read.tau * moved
+        return boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
+
+    def shifted(self, shift: Callable[[Array], Array]) -> Boxes:
+        """Bounds at lines that are shifted, by their number."""
+        number = np.round(self.y[self.sites]).astype(int)
+        return replace(self, low=self.low + shift(number - 1), high=self.high + shift(number))
+
+    def _without(self, mean: Array, v: Array, t: Array, u: Array) -> tuple[Array, Array]:
+        """Variance and mean of the position at each site without it."""
+        cavity = 1 / np.maximum(1 / v - t, CAVITY / v)
+        return cavity, cavity * (mean / v - u)
+
+    def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
+        """Log of the mass of every tilted law, and the site that goes with it."""
+        s = np.sqrt(v + e2)
+        a, b = (self.low - m) / s, (self.high - m) / s
+        near = np.flatnonzero(np.minimum(-a, b) < FAR)
+        g, H = np.zeros((2, len(s)))
+        g[near], H[near] = box_moments(a[near], b[near])
+        g, H = g / s, H / s**2
+        left = 1 - v * H
+        return log_mass(a, b), H / left, (g + H * m) / left
+
+
+def of_most_evidence(boxes: Boxes, sizes: Sequence[float], start: Posterior) -> Posterior:
+    """The motion with the errors, of `sizes` and CLOCK_ERRORS, whose evidence none beside them
+    exceeds.
+    """
+    best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
+    tried = {place}
+    for move in MOVES:
+        while (to := (place[0] + move[0], place[1] + move[1])) not in tried:
+            tried.add(to)
+            if not (0 <= to[0] < len(sizes) and 0 <= to[1] < len(CLOCK_ERRORS)):
+                break
+            read = boxes.again(Errors(sizes[to[0]], CLOCK_ERRORS[to[1]]), best)
+            if not read.evidence > best.evidence + CLEAR:
+                break
+            place, best = to, read
+    return best
+
+
+def log_mass(a: Array, b: Array) -> Array:
+    """log(Phi(b) - Phi(a)) of a < b."""
+    flip = a + b < 0
+    above, beyond = log_ndtr(np.where(flip, b, -a)), log_ndtr(np.where(flip, a, -b))
+    return np.asarray(above + np.log1p(-np.exp(np.minimum(beyond - above, -1e-300))))
+
+
+def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
+    """g and H of a unit normal between a < b: g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) -
+    Phi(a), at mean m = 0 of unit variance.
+    """
+    flip = a + b < 0
+    low, high = np.where(flip, -b, a), np.where(flip, -a, b)
+    low = np.maximum(low, -8.0)
+    ratio = np.exp(np.minimum((low - high) * (low + high) / 2, 0))
+    at_low = np.sqrt(2 / np.pi) / (erfcx(low / np.sqrt(2)) - ratio * erfcx(high / np.sqrt(2)))
+    at_high = at_low * ratio
+    g = at_low - at_high
+    return np.where(flip, -g, g), np.clip(g * g + high * at_high - low * at_low, 0, 1 - 1e-9)
+
+
+def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
+    """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks;
+    shape (n, M).
+    """
+    squares, determined = (
+        basis.jerk(c) ** 2 * basis.h,
+        np.maximum(1 - basis.jerk_variances(Z) * basis.h / density, 1e-9),
+    )
+    whole = squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True)
+    size = max(1, round(WINDOW / basis.h))
+    squares, determined = (
+        size * uniform_filter1d(x, size, axis=1, mode="nearest") for x in (squares, determined)
+    )
+    least = np.maximum(RANGE * whole, basis.least_density)
+    return np.asarray(np.maximum((squares + OF_RECORD * whole) / (determined + OF_RECORD), least))
