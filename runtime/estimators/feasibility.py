@@ -93,6 +93,8 @@ class Feasibility:
         t*: kg m^2 or kg of a pseudo-inertia, unit of a friction parameter.
     feasible : bool
         Whether t* >= 0.
+    physical : bool
+        Whether some robot has them, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
         Conditions that had to be released, in order, each with the t* before; empty where feasible.
     chi : ndarray, shape (p,)
@@ -103,10 +105,14 @@ class Feasibility:
     feasible: bool
     blocking: tuple[tuple[str, float], ...]
     chi: Array
+    physical: bool = False
 
     @property
     def text(self) -> str:
         """One sentence."""
+        if self.physical and not self.feasible:
+            named = ", ".join(name for name, _ in self.blocking)
+            return f"physically feasible, but not within the bounds of masses and centres: {named}"
         if self.feasible:
             least = "at least " if self.margin > 0.999 * LIMIT.LARGEST_MARGIN else ""
             return (
@@ -145,7 +151,7 @@ def feasibility(
         if not blame:
             break
         released = margin(conditions, rows, space)
-    return Feasibility(first.margin, not blocking, tuple(blocking), first.chi)
+    return Feasibility(first.margin, not blocking, tuple(blocking), first.chi, not blocking)
 
 
 def standard_parameters(

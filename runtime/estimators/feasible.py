@@ -20,7 +20,7 @@ options (all of `runtime.estimators.feasibility.RobotLimits` too):
                the fifth that is left out best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres
-               "auto": from its frames; null
+               "auto": from its frames where these say enough; null
     explain    whether every condition in the way of least squares is named, and the ranges of
                masses are given; true
     linear     options of the least squares behind it: rank_tolerance, block
@@ -105,8 +105,9 @@ class FeasibleOptions(RobotLimits):
     reach : float, str or None, m
         Size of the robot: no centre of mass lies further from the origin of its frame, and all
         links together weigh less than a fifth of the water in a cube of that
-        side, where `total_mass` and `bounds` say nothing. auto: from its frames; null: no such
-        bounds.
+        side, where `total_mass` and `bounds` say nothing. auto: from its frames, where at least two
+        links have a length and prismatic joints limits, and the record does not contradict it;
+        null: no such bounds.
     explain : bool
         Name every condition that least squares breaks, and give the ranges of the masses; false:
         the parameters alone, in a third of the time.
@@ -137,6 +138,10 @@ def fit(start: Beginning) -> Fitted:
     observation, system, free = start.observation, start.system, start.solution
     physical = physical_model(start.model)
     options = decided(start.options, start.model, physical)
+    guess = reach_text(options) if start.options.reach == "auto" else ""
+    if guess and contradicted(system.weighted, physical, options, start.options):
+        options = decided(replace(start.options, reach=None), start.model, physical)
+        guess += " The record contradicts them: they are left out."
     unconstrained = within_limits(physical, system.names, free.X, options)
     if (
         unconstrained.feasible
@@ -188,6 +193,7 @@ def fit(start: Beginning) -> Fitted:
         f"is {given:.3f} % instead of {without:.3f} %; at their limit: "
         f"{', '.join(active) or 'none'}.",
         prior_text(physical, options, weight),
+        guess,
         masses_text(masses, options),
         "The solver left a condition violated: try another margin, a prior, or bounds on the "
         "masses."
@@ -207,18 +213,19 @@ def fit(start: Beginning) -> Fitted:
 def within_limits(
     physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
 ) -> Feasibility:
-    """Whether X is that of a physical robot within the limits; no where no mass distribution fits
-    into them, whatever its sign.
+    """Whether X is that of a physical robot, and if it is, whether of one within the limits: these
+    are what is known or guessed of a robot, not physics.
     """
+    judged = feasibility(physical, names, X, blame=options.explain)
+    if not judged.feasible:
+        return judged
     try:
-        return feasibility(physical, names, X, options, blame=options.explain)
+        bounded = feasibility(physical, names, X, options, blame=False)
     except InputError:
-        return Feasibility(
-            float("nan"),
-            False,
-            (("the bounds of masses and centres", float("nan")),),
-            np.full(len(physical.standard), np.nan),
-        )
+        bounded = replace(judged, feasible=False)
+    named = dict.fromkeys(limit_rows(physical, options).names)
+    blocking = () if bounded.feasible else tuple((name, bounded.margin) for name in named)
+    return replace(bounded, physical=True, blocking=blocking)
 
 
 def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
@@ -321,6 +328,34 @@ def decided(
         total_mass=options.total_mass if said else (0.0, LIMIT.ROBOT_DENSITY * reach**3),
         centre={**own, **options.centre},
     )
+
+
+def reach_text(options: FeasibleOptions) -> str:
+    """Bounds that were guessed from the lengths of the robot, in words."""
+    if options.reach is None:
+        return ""
+    mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
+    total = f", {mass:.3g} kg in all" if mass == LIMIT.ROBOT_DENSITY * options.reach**3 else ""
+    return (
+        f"Masses and their centres are bounded by the size of the robot, {options.reach:.2g} m by "
+        f"its frames{total}: a guess, not physics; set reach, or reach: null for none."
+    )
+
+
+def contradicted(
+    rows: Factor, physical: PhysicalModel, bounded: FeasibleOptions, asked: FeasibleOptions
+) -> bool:
+    """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot
+    be.
+    """
+    K, errors = physical.rows(rows.names), []
+    for options in (replace(asked, prior="none", reach=None), replace(bounded, prior="none")):
+        try:
+            chi = fitted(rows, physical, options, 0.0)
+        except InputError:
+            return bool(errors)
+        errors.append(residual_norm(rows, K @ chi))
+    return errors[1] > LIMIT.WEIGHT_INCREASE * errors[0]
 
 
 def mass_ranges(

@@ -16,8 +16,6 @@ from runtime.model.inertia import SIGNED, is_form
 
 Array = np.ndarray
 
-FREE = {"rad": (-np.pi, np.pi), "m": (-1.0, 1.0)}  # range of a joint without limits
-
 
 def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
     """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n);
@@ -35,12 +33,15 @@ def reach_of(model: GeneratedModel) -> float:
     """Size of a robot, m: the largest distance between two of its frames in random poses, and once
     more the longest link, whose end no frame marks.
 
-    Joints move within their limits; without them revolute joints turn anywhere, prismatic ones
-    move by 1 m to both sides of zero. nan where the frames say nothing.
+    Joints move within their limits, without them revolute joints turn anywhere. nan where frames
+    say little: a prismatic joint without limits, or fewer than two links with a length.
     """
     limits = dict(getattr(model, "LIMITS", None) or {}).get("q")
+    units = joint_units(model)
+    if limits is None and "m" in units:
+        return float("nan")
     spans = (
-        np.array([FREE[unit] for unit in joint_units(model)])
+        np.array([(-np.pi, np.pi)] * len(units))
         if limits is None
         else np.array([(-x, x) if np.ndim(x) == 0 else x for x in limits], dtype=float)
     )
@@ -51,7 +52,8 @@ def reach_of(model: GeneratedModel) -> float:
         return float("nan")
     links = np.linalg.norm(np.diff(origins, axis=1), axis=2)
     spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
-    return float(spread.max() + links.max()) if spread.max() > 0 else float("nan")
+    several = (links.max(axis=0) > 0.1 * links.max()).sum() > 1
+    return float(spread.max() + links.max()) if several else float("nan")
 
 
 def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:

@@ -220,6 +220,10 @@ def identify(
             ),
             uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
         )
+        if physical and not result.determined:
+            groups = "; ".join(", ".join(group) for group in fit.groups)
+            text = f"physical consistency: the record does not tell apart {groups}"
+            result, physical = replace(result, missing=(*result.missing, text)), False
         whole = whole_records(own) if friction or study.payload is not None else []
         return replace(
             result,

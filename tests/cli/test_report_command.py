@@ -66,6 +66,7 @@ def test_noise_is_not_for_use(record, tmp_path):
     """With a method that no prediction of the resolution knows: it is said, the rest is there."""
     (tmp_path / "study.yaml").write_text(
         "symgen: 1\nrecord: {files: [record.csv]}\nestimate: {method: irls}\n"
+        "signals: {lowpass: {cutoff: 50}}\n"
     )
     result = run("planar_2r", tmp_path / "study.yaml", "-o", tmp_path / "out", "--json")
     assert result.exit_code == 1, result.output

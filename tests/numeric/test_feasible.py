@@ -26,7 +26,13 @@ from runtime.estimators.feasibility import (
     scales,
     standard_parameters,
 )
-from runtime.estimators.feasible import FeasibleOptions, residual_norm, weighed
+from runtime.estimators.feasible import (
+    FeasibleOptions,
+    decided,
+    residual_norm,
+    weighed,
+    within_limits,
+)
 from runtime.estimators.method import linear_companion, linear_system
 from runtime.estimators.physical import negative_elements, reach_of
 from runtime.estimators.semidefinite import closest, everything
@@ -587,6 +593,25 @@ def test_masses_have_the_range_of_all_physical_robots(arm) -> None:
     assert given.details["masses"]["M1"]["determined"] and "M1" not in given.message
 
 
-def test_prismatic_joints_without_limits_move_by_one_metre() -> None:
-    """SCARA: 2.27 m, not the 6.34 m of a travel of +-pi m, by which robots weigh up to 50.9 t."""
-    assert reach_of(symgen.model("scara")) == pytest.approx(2.27, abs=0.01)
+def test_lengths_that_say_little_give_no_reach() -> None:
+    """A slide of unknown travel, by which a SCARA weighed up to 50.9 t; one length alone."""
+    assert np.isnan(reach_of(symgen.model("scara"))) and np.isnan(
+        reach_of(symgen.model("planar_2r"))
+    )
+    assert reach_of(symgen.model("tx40")) > 0.5
+
+
+def test_bounds_are_told_as_bounds() -> None:
+    """Balls of 7 kg in a cube of 0.1 m: physical, outside a reach that was given."""
+    arm = symgen.model("tx40")
+    physical = physical_model(arm)
+    sizes = {"M": 7.0, "XX": 0.1, "YY": 0.1, "ZZ": 0.1, "MX": 3.0, "FV": 1.0, "FS": 1.0, "Ia": 1.0}
+    chi = np.array([sizes.get(n.rstrip("0123456789"), 0.0) for n in physical.standard])
+    for j in physical.links:
+        chi[physical.link(j)[1::3]] = 0.0
+        chi[physical.link(j)[3]] = chi[physical.link(j)[5]] = 2.0
+    X = physical.K @ chi
+    options = decided(FeasibleOptions(reach=0.1, prior="none"), arm, physical)
+    judged = within_limits(physical, physical.base, X, options)
+    assert judged.physical and not judged.feasible
+    assert "NOT" not in judged.text and "bounds of masses and centres" in judged.text

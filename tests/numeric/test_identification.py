@@ -297,9 +297,10 @@ def test_joints_of_which_no_row_is_left_are_told(model):
     """low_speed in degrees a second: too few rows for any test, and one sentence says why."""
     record = measured(model, 1)
     fastest = np.abs(np.gradient(record.q[:, 1], 1 / record.rate)).max()
-    result = runtime.identify(
-        model, record, replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest)))
-    )
+    study = replace(STUDY, rows=replace(STUDY.rows, low_speed=(1e3, 0.97 * fastest)))
+    result = runtime.identify(model, record, study, physical=True)
+    assert result.feasibility is None
+    assert any("physical consistency: the record does not tell" in x for x in result.missing)
     assert result.warnings[0] == "No row of joint 1 is used: rows.low_speed leaves them out."
     assert result.estimate.status == "rank-deficient"
 
