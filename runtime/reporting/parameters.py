@@ -95,7 +95,7 @@ def parameter_section(result: Identification) -> Section:
     text = [
         "The value to use stands first. σ is eq. (10), which takes residuals as independent; "
         "filtered ones are not, and the corrected deviation takes blocks of time as independent "
-        "instead: quote it. Two of them hold the truth about 95 times in 100 or more, as long as the "
+        "instead: quote it. Two of them hold the truth about 95 times in 100 or more while the "
         "model is right and the residuals do not remember for longer than two blocks; not so "
         "where parameters were removed. %σ is 100 σ/|value|, eq. (11).",
         "The role is an aid to reading: essential parameters explain the record nearly as well "
