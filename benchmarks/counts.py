@@ -1,13 +1,14 @@
 """Positions read as counts, beside positions as they are: the measured TX40 at coarser steps, other
 rates, uneven lines; a haptic device.
 
-    python benchmarks/counts.py [steps rates lines time haptic kr300] [--seeds 20]
+    python benchmarks/counts.py [steps tuned rates lines time haptic kr300] [--seeds 20]
 
 Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every
 joint and seed, torques stay as recorded. Errors are
 those of the main parameters against the estimate from the record itself. Estimates are kept in
 counts_runs.jsonl as they come; the same command
-goes on from there. The record comes from `symgen datasets`. `haptic`: change of its essential
+goes on from there. The record comes from `symgen datasets`. `tuned`: the low-pass at the best of a grid of
+cut-offs, phase by phase, and at cutoff: auto. `haptic`: change of its essential
 parameters by CESTAC of law phase, encoders at the motors.
 `kr300`: what the detector says of two records of degrees, A.mat and B.mat in SYMGEN_DATA/kr300.
 """
@@ -289,6 +290,36 @@ def times() -> str:
     return aligned(lines)
 
 
+CUTOFFS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0)
+
+
+def tuned(seeds: int) -> str:
+    """rms error of the main parameters in %, medians over phases: low-pass at the best of CUTOFFS,
+    chosen by that error, and at cutoff: auto.
+    """
+    model, study, record, names, reference = measured()
+
+    def error(q: Array, cutoff: float | Literal["auto"]) -> float:
+        low = replace(study.signals.lowpass, cutoff=cutoff)
+        one = replace(study, signals=replace(study.signals, lowpass=low))
+        e = estimate_of(observe(model, replace(record, q=q), one, columns=names), one.estimate)
+        off = np.array([e[name] for name in MAIN]) / reference - 1
+        return float(100 * np.sqrt(np.mean(off**2)))
+
+    lines: list[Sequence[str]] = [
+        ("step 2 pi/", "best, Hz", "rms %", "auto: rms %", "50 Hz: rms %")
+    ]
+    for k in STEPS:
+        rows = []
+        for seed in range(seeds):
+            q = quantised(record.q, 2 * np.pi / k, seed)
+            errors = {cutoff: error(q, cutoff) for cutoff in CUTOFFS}
+            best = min(errors, key=lambda cutoff: errors[cutoff])
+            rows.append((best, errors[best], error(q, "auto"), errors[50.0]))
+        lines.append((str(k), *(f"{x:.3g}" for x in np.median(rows, axis=0))))
+    return aligned(lines)
+
+
 def haptic(runs: int) -> str:
     """%e (21) of the essential parameters of the haptic device, rms and largest, by both readers."""
     model = symgen.model("haptic")
@@ -352,6 +383,9 @@ def main() -> None:
     for part in given.parts:
         if part == "time":
             print(times())
+            continue
+        if part == "tuned":
+            print(tuned(given.seeds))
             continue
         if part == "haptic":
             print(haptic(given.seeds))

@@ -159,7 +159,9 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
     positions = []
     for record in map(record_of, records):
         times = record.times() if isinstance(record, Stream) else [record.t]
-        start, stop = window_of(times, study.rows.window, record.name)
+        start, stop = 0, len(record)
+        if study.rows.window != (None, None):
+            start, stop = window_of(times, study.rows.window, record.name)
         part = start, min(stop, start + EXCERPT)
         if isinstance(record, Stream):
             q = PieceReader(record).read(*part)[1]
