@@ -105,7 +105,7 @@ def delayed(case: Case) -> Answer | None:
         abs(late.common) > max(LIMIT.CERTAIN_DELAY * late.sigma_common, LIMIT.LATE) and visible[j]
     )
     which, shift, sigma = "Torques are", late.common, late.sigma_common
-    certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE)
+    certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
     own = visible & (np.abs(late.shift) > certain)
     if own.any() and not all_of_them:
         j = int(np.argmax(np.where(own, gain, -np.inf)))

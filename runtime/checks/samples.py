@@ -146,7 +146,7 @@ def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Arr
     """Cut-off of the motion, Hz, the states of the positions as they are through a low-pass of it,
     shape (N, n) each, and the function that filters torques alike.
     """
-    low = Lowpass(cutoff=motion_cutoff(own.record, study))
+    low = Lowpass(cutoff=motion_cutoff(own.record, own.study))
     states = own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
 
     def torque(tau: Array) -> Array:

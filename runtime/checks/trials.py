@@ -318,9 +318,8 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
         return []
     alike = [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain]
     before = problem.unseen(unchanged(problem.samples.n))
-    search = np.log(len(trials) / LIMIT.BY_CHANCE)
     return [
         trial
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
-        if before - problem.unseen(trial.alternative) > search
+        if before - problem.unseen(trial.alternative) > np.log(len(trials))
     ]

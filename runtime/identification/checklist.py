@@ -11,7 +11,7 @@ eq. (10) alone.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,10 +42,13 @@ class Checklist(Result):
     checks : tuple of Check
     use : str
         What the parameters explain, in one sentence.
+    grade : float, %
+        Expected error of predictions of other motions; nan where it is not known.
     """
 
     checks: tuple[Check, ...]
     use: str
+    grade: float = float("nan")
 
     @property
     def state(self) -> State:
@@ -125,6 +128,7 @@ class Checklist(Result):
         return {
             "state": self.state,
             "answer": self.answer,
+            "grade": self.grade,
             "use": self.use,
             "doubt": self.doubt,
             "next": self.next,
@@ -145,6 +149,8 @@ def checklist_of(
     plausible: Sequence[Check] = (),
     homogeneity: Homogeneity | None = None,
     halves: bool = False,
+    expected: float = float("nan"),
+    single: bool = False,
 ) -> Checklist:
     """The checklist of an identification; rank alone where the record does not determine the
     parameters.
@@ -176,6 +182,11 @@ def checklist_of(
         what follows.
     homogeneity : Homogeneity, optional
         Whether several records agree.
+    expected : float, %
+        Expected error of predictions of other motions; nan where it is not known.
+    single : bool
+        Whether values are to be used one by one: deviations and correlations are doubts then, and
+        where `expected` is not known; else remarks.
     """
     rank = determined(estimate, fit)
     first, last = (
@@ -183,20 +194,45 @@ def checklist_of(
     )  # a bad condition is the least of several doubts
     checks = [*first, *plausible]
     if estimate.status != "rank-deficient":
+        of_values = (certain(fit, bootstrap), separate(fit), *last)
         differ = homogeneity is not None and homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE
         checks += [
             explained(fit),
             explained_by_joint(estimate, fit),
             predicted(fit, prediction_error, halves, differ=differ),
             None if homogeneity is None else agreeing(homogeneity),
+            expected_off(expected),
             signs(negative),
-            certain(fit, bootstrap),
-            separate(fit),
-            *last,
+            *(remark(check, single or np.isnan(expected)) for check in of_values),
             physical(fit if "standard" in fit.details else estimate, feasibility),
             resolved(advice),
         ]
-    return Checklist(tuple(check for check in checks if check is not None), use)
+    return Checklist(tuple(check for check in checks if check is not None), use, expected)
+
+
+def remark(check: Check, counts: bool) -> Check:
+    """The check, a remark where it does not count and has something to tell."""
+    if counts or check.state == "good":
+        return check
+    return replace(check, state="open", finding=f"Single values are not asked for. {check.finding}")
+
+
+@Question(
+    "How far off are predictions of other motions?",
+    f"{LIMIT.EXPECTED_ERROR[0]:g} % (usable to {LIMIT.EXPECTED_ERROR[1]:g} %)",
+    "record a motion over the range and the speeds that the model is for, longer, or with finer "
+    "positions (symgen excite; signals: {reader: counts})",
+)
+def expected_off(error: float) -> Answer | None:
+    """Expected error of predictions (`runtime.identification.expected_error`); None where it is not
+    known.
+    """
+    if np.isnan(error):
+        return None
+    return Answer(
+        _state(error, *LIMIT.EXPECTED_ERROR),
+        f"{error:.2g} % of the torques are expected to be off over the range of the robot",
+    )
 
 
 @Question(

@@ -20,6 +20,7 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
+from runtime.identification.expected_error import expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
 from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
@@ -33,6 +34,7 @@ from runtime.identification.validation import (
     record_errors,
 )
 from runtime.json_documents import json_text
+from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel
@@ -263,6 +265,20 @@ class Identification:
         return "standard" in self.model_estimate.details
 
     @cached_property
+    def expected_error(self) -> float:
+        """Expected error of predictions of other motions, %, of `model_estimate`; nan where it is
+        not known (`runtime.identification.expected_error`), LIMIT.LARGEST_EXPECTED where the
+        records do not determine the parameters.
+        """
+        if not self.determined:
+            return float(LIMIT.LARGEST_EXPECTED)
+        if not self.usable:
+            return float("nan")
+        return expected_error(
+            self.model, self.observation, self.study.estimate, self.model_estimate, self.prepared
+        )
+
+    @cached_property
     def checklist(self) -> Checklist:
         """Whether the values can be used, question by question."""
         drawn = self.uncertainty.bootstrap
@@ -278,6 +294,8 @@ class Identification:
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
             homogeneity=self.homogeneity,
+            expected=self.expected_error,
+            single=self.study.validate.values,
             advice=self.advice,
             plausible=self.plausibility.checks if self.plausibility is not None else (),
         )

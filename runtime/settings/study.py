@@ -234,10 +234,14 @@ class ValidateSettings(Settings):
         Windows: the first is fitted, the others are predicted.
     record : tuple of RecordSettings
         Further records, predicted with the parameters of the study.
+    values : bool
+        Whether parameters are to be used one by one: the verdict then asks for small deviations and
+        for parameters that can be told apart.
     """
 
     split: tuple[Interval, ...] = ()
     record: Records = ()
+    values: Flag = False
 
     def __post_init__(self) -> None:
         require(

@@ -37,30 +37,43 @@ def encoder_sentences(
 
     states : of the record, through the filters.   drives : motor side; None where there is none.
     """
-    motion = np.mean(states.qdd[:LOOKED_AT] ** 2, axis=0)
-    advice = _advice(record.q[:LOOKED_AT], record.rate, signals, motion, drives)
-    return (f"{record.name}: {advice}",) if advice else ()
+    found = _steps(record, states, signals, drives)
+    if found is None or (share := found[1].max()) < HELPS:
+        return ()
+    step, _, side = found
+    return (
+        f"{record.name}: positions change in steps of {_range(step)} ({side} side), which make "
+        f"{100 * share:.0f} % of the mean square of an acceleration; signals: {{reader: counts, "
+        f"side: {side}}} reads them as counts.",
+    )
 
 
-def _advice(q: Array, rate: float, signals: Signals, motion: Array, motors: Drives | None) -> str:
+def acceleration_error(
+    record: Record, states: States, signals: Signals, drives: Drives | None
+) -> float:
+    """Largest share of the mean square of a filtered acceleration that is an error of the steps, of
+    the joints; 0 where positions show no steps.
+    """
+    found = _steps(record, states, signals, drives)
+    return 0.0 if found is None else float(found[1].max())
+
+
+def _steps(
+    record: Record, states: States, signals: Signals, motors: Drives | None
+) -> tuple[Array, Array, str] | None:
+    """Steps of the positions, shares of the accelerations that they make, and their side."""
+    q, motion = record.q[:LOOKED_AT], np.mean(states.qdd[:LOOKED_AT] ** 2, axis=0)
     for side, drives in (("joint", None), ("motor", motors)):
         if side == "motor" and drives is None:
             continue
         try:
             found = lattice(encoder_position(q, drives))
-            share = _attenuation(rate, signals, motion, found, drives)
+            share = _attenuation(record.rate, signals, motion, found, drives)
         except (InputError, SettingsError):
             continue
         if not any("as if rounded" in text for text in found.findings):
-            if share.max() < HELPS:
-                return ""
-            return (
-                f"positions change in steps of {_range(found.step)} ({side} side), which make "
-                f"{100 * share.max():.0f} % of the "
-                f"mean square of an acceleration; signals: {{reader: counts, side: {side}}} reads "
-                "them as counts."
-            )
-    return ""
+            return found.step, share, side
+    return None
 
 
 def _range(steps: Array) -> str:

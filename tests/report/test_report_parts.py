@@ -171,7 +171,25 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
             and checklist.worst.finding in checklist.doubt
             and checklist.worst.remedy in checklist.next
         )
-    assert set(checklist.summary()) == {"state", "answer", "use", "doubt", "next", "checks"}
+    assert set(checklist.summary()) == {
+        "state", "answer", "grade", "use", "doubt", "next", "checks",
+    }  # fmt: skip
+
+
+def test_single_values_are_remarks_where_the_expected_error_is_known():
+    """Deviations, correlations and condition count where values are asked for one by one."""
+    for estimate in (fit(sigma=(0.2, 0.3)), fit(correlation=-0.95), fit(cond_unit=300.0)):
+        checklist = checked(estimate, expected=2.0)
+        assert checklist.state == "good" and checklist.grade == 2.0
+        assert "Single values are not asked for" in str([c.finding for c in checklist.checks])
+        assert checked(estimate, expected=2.0, single=True).state != "good"
+
+
+@pytest.mark.parametrize(("expected", "state"), [(4.9, "good"), (5.1, "doubtful"), (15.1, "no")])
+def test_expected_error_grades(expected, state):
+    checklist = checked(fit(), expected=expected)
+    assert checklist.state == state
+    assert state == "good" or "other motions" in checklist.worst.question
 
 
 def test_negative_friction_is_not_for_use():

@@ -1,0 +1,145 @@
+"""How far off are predictions of other motions likely to be? Deviations of the parameters, and what
+encoders do to them, carried over to motions of the robot's own range.
+
+    D       regressor in states of a reference motion: sines of every joint over a part of the range
+            and at a part of the speed of the robot file, or of the record where it has none
+    C       covariance of least squares, wider by the median of corrected over stated deviations
+    V       the same, knowing the values of the robot file to LIMIT.VALUES_KNOWN where the fit
+            does: (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; their
+            estimate is chi_V
+    a       share of the accelerations that is an error of the encoder's steps
+
+    expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2 + (a/(1 + a))^2
+
+The first part is what the record leaves open, the second how far the fit is from what record and
+values say together, the third how much too small the steps make inertias (the record's own lattice:
+`runtime.signals.encoder_advice`). What the model leaves out is not in it, but as far as it is in
+the residuals of C.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.linear import assemble
+from runtime.estimators.method import linear_companion, linear_system
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.records.stream import Stream
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import Prepared
+from runtime.settings.study import EstimateSettings
+from runtime.signals.encoder_advice import acceleration_error
+
+Array = np.ndarray
+
+
+def expected_error(
+    model: GeneratedModel,
+    observation: Observation,
+    settings: EstimateSettings,
+    fit: Estimate,
+    records: Sequence[Prepared | Stream],
+) -> float:
+    """Expected error of predictions, %, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
+    file nor records in memory tell a range, or a loop does not close in it.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    observation : Observation
+        Rows of the records.
+    settings : EstimateSettings
+        Method of the study; deviations are those of its linear companion.
+    fit : Estimate
+        The parameters that stand for the robot.
+    records : sequence of Prepared or Stream
+    """
+    states = reference_states(model, records)
+    if states is None:
+        return float("nan")
+    try:
+        D = np.asarray(model.regressor(*states))
+    except ValueError:  # a loop that does not close
+        return float("nan")
+    system = linear_system(observation, linear_companion(settings))
+    every = assemble(system, system.solve())
+    D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in every.names]]
+    X = np.array([dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in every.names])
+    wider = max(1.0, float(np.median(every.sigma_corrected / every.sigma))) ** 2
+    V, near = wider * every.covariance, every.X
+    if dict(fit.details.get("options", {})).get("prior", "none") != "none":
+        physical = physical_model(model)
+        K, rows = physical.rows(every.names), system.weighted
+        variance = wider * (1.0 if system.known_variance else every.sigma_rho**2)
+        near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
+        D, X = D @ K, np.linalg.lstsq(K, X, rcond=None)[0]
+    size = np.linalg.norm(D @ X)
+    spread = np.sqrt(max(np.einsum("kja,ab,kjb->", D, V, D, optimize=True), 0.0)) / size
+    steps = max(
+        (
+            acceleration_error(own.record, own.states, own.study.signals, own.drives)
+            for own in records
+            if isinstance(own, Prepared) and own.study.signals.reader == "lowpass"
+        ),
+        default=0.0,
+    )
+    parts = (spread, np.linalg.norm(D @ (X - near)) / size, steps / (1 + steps))
+    return min(100 * float(np.linalg.norm(parts)), LIMIT.LARGEST_EXPECTED)
+
+
+def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
+    """Standard parameters chi of rows R K chi = y with errors of variance 1 and of the values of
+    the robot file, and their covariance; those without a value are free.
+    """
+    known = np.array([physical.values.get(name, np.nan) for name in physical.standard])
+    deviation = np.abs(known)
+    for ten in map(physical.link, physical.links):
+        xx, _, _, yy, _, zz, *_, mass = known[ten]
+        size, weight = (xx + yy + zz) / 2, mass
+        deviation[ten] = [size] * 6 + [np.sqrt(size * weight)] * 3 + [weight]
+    chosen = [name.startswith((*INERTIAL, "Ia")) for name in physical.standard]
+    given = np.isfinite(deviation) & (deviation > 0) & chosen
+    known, precision = np.where(given, known, 0.0), np.zeros(len(known))
+    precision[given] = (LIMIT.VALUES_KNOWN * deviation[given]) ** -2.0
+    rows = R @ K
+    A, g = rows.T @ rows + np.diag(precision), rows.T @ (y - rows @ known)
+    d = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
+    V = np.linalg.pinv(A / np.outer(d, d), rcond=LIMIT.RANGE_ROUNDING, hermitian=True)
+    V = V / np.outer(d, d)
+    return known + V @ g, V
+
+
+def reference_states(
+    model: GeneratedModel, records: Sequence[Prepared | Stream]
+) -> tuple[Array, Array, Array] | None:
+    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None where no range is
+    known.
+    """
+    limits = dict(getattr(model, "LIMITS", {}) or {})
+    n, whole = len(model.JOINTS), [own for own in records if isinstance(own, Prepared)]
+    span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
+    if span.shape != (n, 2) or speed.shape != (n,) or not np.isfinite([*span.T, speed]).all():
+        if not whole:
+            return None
+        q, qd = (np.concatenate([getattr(own.states, key) for own in whole]) for key in ("q", "qd"))
+        half, speed = np.ptp(q, axis=0) / 2, np.abs(qd).max(axis=0)
+        alike = np.array(joint_units(model))[:, None] == np.array(joint_units(model))
+        half, speed = (
+            np.array([max(x[j], np.median(x[alike[j]])) for j in range(n)]) for x in (half, speed)
+        )  # a joint that hardly moves: as its neighbours
+        middle = (q.max(axis=0) + q.min(axis=0)) / 2
+        half, speed = half / LIMIT.REFERENCE_RANGE[1], speed / LIMIT.REFERENCE_SPEED[1]
+    else:
+        middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
+    rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
+    a = half * rng.uniform(*LIMIT.REFERENCE_RANGE, shape)
+    w = np.minimum(
+        speed * rng.uniform(*LIMIT.REFERENCE_SPEED, shape) / np.where(a > 0, a, np.inf), 2 * np.pi
+    )
+    phase = rng.uniform(0, 2 * np.pi, shape)
+    return middle + a * np.sin(phase), a * w * np.cos(phase), -a * w**2 * np.sin(phase)

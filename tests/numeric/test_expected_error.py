@@ -1,0 +1,72 @@
+"""The expected error of predictions: a motion of one joint alone is told by it, steps of encoders
+are, and a rich motion is left alone.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import runtime
+import symgen
+from runtime.identification.expected_error import expected_error, with_values
+from runtime.model.inertia import physical_model
+from runtime.settings.study import study_from_mapping
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return symgen.model("planar_2r")
+
+
+def record(model, size, step=0.0):
+    rng = np.random.default_rng(5)
+    t = np.arange(0, 10, 1e-3)
+    w, phase = 2 * np.pi * rng.uniform(0.1, 1.0, (2, 4)), rng.uniform(0, 2 * np.pi, (2, 4))
+    angle = w[:, :, None] * t + phase[:, :, None]
+    q, qd, qdd = (
+        np.einsum("jk,jkt->tj", 0.4 * np.array(size)[:, None] * w**n, f(angle))
+        for n, f in enumerate((np.sin, np.cos, lambda x: -np.sin(x)))
+    )
+    X = np.asarray(model.base_parameters(model.VALUES))
+    tau = model.inverse_dynamics(q, qd, qdd, X)
+    tau = tau + 0.02 * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    return runtime.Record(t, np.round(q / step) * step if step else q, tau)
+
+
+def test_rich_motion_still_joint_and_steps(arm):
+    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 50}}})
+    rich, still, steps = (
+        runtime.identify(arm, one, study)
+        for one in (
+            record(arm, (1, 1)),
+            record(arm, (1, 0.002)),
+            record(arm, (1, 1), 2 * np.pi / 500),
+        )
+    )
+    assert rich.expected_error < 2 and rich.checklist.grade == rich.expected_error
+    assert still.expected_error > 5 * rich.expected_error
+    assert steps.expected_error > 15 and steps.checklist.state == "no"
+
+
+def test_range_not_known_and_not_determined(arm):
+    result = runtime.identify(arm, record(arm, (1, 1)))
+    bare = type("Bare", (), {**{k: getattr(arm, k) for k in dir(arm) if k[0] != "_"}, "LIMITS": {}})
+    fit = result.model_estimate
+    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ()))
+    lost = replace(result, estimate=replace(result.estimate, status="rank-deficient"))
+    assert lost.expected_error == 999
+
+
+def test_values_hold_what_the_record_leaves_open(arm):
+    """Small deviations stay, and the parameters with them; without rows the values stand."""
+    physical = physical_model(arm)
+    K, values = physical.K, [physical.values.get(name, 0.0) for name in physical.standard]
+    X = 1.1 * (K @ np.array(values)) + 0.01
+    chi, _ = with_values(physical, K, 1e6 * np.eye(len(X)), 1e6 * X)
+    np.testing.assert_allclose(K @ chi, X, rtol=1e-6)
+    chi, V = with_values(physical, K, 1e-9 * np.eye(len(X)), 0 * X)
+    inertial = [k for j in physical.links for k in physical.link(j)]
+    np.testing.assert_allclose(chi[inertial], np.array(values)[inertial], atol=1e-6)
+    mass = physical.link(physical.links[-1])[-1]
+    assert V[mass, mass] == pytest.approx((0.3 * values[mass]) ** 2, rel=1e-6)
