@@ -323,13 +323,15 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
     """Largest relative error, %, on data that did not give the parameters; open where it is nan.
 
     halves : it is that of a half of the record, fitted from the other half. Half a record may lack
-    what the whole one shows: never a "no".
+    what the whole one shows: good up to the second limit, never a "no".
     differ : records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
     limits = [
         min(max(times * fit.relative_error, least), most)
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
+    if halves:
+        limits = [limits[1], np.inf]
     state: State = "open" if not np.isfinite(error) else _state(error, *limits)
     remedy = "a longer or richer record"
     if "standard" not in fit.details:
@@ -342,10 +344,10 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
             "motion that one of them does not excite"
         )
     return Answer(
-        "doubtful" if halves and state == "no" else state,
+        state,
         f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
         remedy,
-        f"{limits[0]:.1f} % (usable to {limits[1]:.1f} %)",
+        f"{limits[0]:.1f} %" + ("" if halves else f" (usable to {limits[1]:.1f} %)"),
     )
 
 

@@ -192,6 +192,14 @@ def test_expected_error_grades(expected, state):
     assert state == "good" or "other motions" in checklist.worst.question
 
 
+def test_half_a_record_is_good_up_to_the_second_limit():
+    """15 % in one half where 4 % were fitted: never a no; a validation record is judged harder."""
+    assert checked(fit(error=4.0), 9.0, halves=True).state == "good"
+    assert checked(fit(error=4.0), 9.0).state == "doubtful"
+    assert checked(fit(error=4.0), 15.0, halves=True).state == "doubtful"
+    assert checked(fit(error=4.0), 16.0).state == "no"
+
+
 def test_negative_friction_is_not_for_use():
     checklist = checked(fit(), negative=("Ia2", "FS2"))
     assert (
