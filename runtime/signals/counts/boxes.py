@@ -45,10 +45,8 @@ FAR = 6.0
 """Deviations from both of its bounds at which a sample says nothing; beyond its bound by which it
 contradicts the motion.
 """
-SUSPECTS, ENDS = 3, 10
-"""Windows of time in which a jump of the counts is looked for, and sites at either end that tell
-nothing of one.
-"""
+SUSPECTS = 3
+"""Windows of time in which a jump of the counts is looked for."""
 COUNT_ERRORS = (0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Errors of a count beside its rounding that are compared, steps (rms)."""
 CLOCK_ERRORS = (0.0, 0.05, 0.1, 0.2, 0.4)
@@ -172,22 +170,28 @@ class Boxes:
         near = outside < FAR * np.sqrt((np.maximum(v, 0) + e2)[self.measured])
         return read.settled and bool(near.all())
 
-    def jump(self, read: Posterior) -> tuple[int, float]:
-        """Sample from which counts are most likely off by the same number, and that number, among
-        the samples in the windows of time that others foretell worst, none near an end.
-
-        The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
-        its curvature sum tau - (B tau)' A^-1 (B tau).
+    def suspects(self, read: Posterior) -> Array:
+        """Middles of the SUSPECTS windows of time in which others foretell the counts worst,
+        samples.
         """
         x, v = self.basis.at_samples(read.c)[0], self.basis.variances(read.Z)[0]
         speed = self.basis.at_samples(read.c, 1)[0, self.sites] * self.basis.Ts
         cavity, m = self._without(x[self.sites], v[self.sites], read.tau, read.nu)
         off = m - (self.low + self.high) / 2
-        window = (self.sites * self.basis.Ts / WINDOW).astype(int)
-        surprise = np.bincount(window, off**2 / (cavity + read.errors.variance(speed) + 1 / 12) - 1)
-        inside = np.isin(window, np.argsort(surprise)[-SUSPECTS:])
-        inside[:ENDS] = inside[-ENDS:] = False
-        at = self.sites[inside]
+        length = max(1, round(WINDOW / self.basis.Ts))
+        variance = cavity + read.errors.variance(speed) + 1 / 12
+        surprise = np.bincount(self.sites // length, off**2 / variance - 1)
+        return np.asarray(np.argsort(surprise)[-SUSPECTS:] * length + length // 2)
+
+    def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
+        """Sample, at most a window from `near`, from which counts are most likely off by the same
+        number, that number, and by how many nats it raises the posterior.
+
+        The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
+        its curvature sum tau - (B tau)' A^-1 (B tau).
+        """
+        x, inside = self.basis.at_samples(read.c)[0], np.abs(self.sites - near) * self.basis.Ts
+        at = self.sites[inside < WINDOW]
         later = self.sites >= at[:, None]
         tau, pull = read.tau * later, np.zeros((len(at), len(x)))
         pull[:, self.sites] = tau
@@ -196,8 +200,9 @@ class Boxes:
         B = basis.gradient(pull, ones, np.zeros((len(at), basis.P)))
         curvature = tau.sum(axis=1) - np.einsum("ij,ij->i", B, read.factor.solve_each(B))
         g = (later * (read.nu - read.tau * x[self.sites])).sum(axis=1)
-        best = int(np.argmax(g**2 / np.maximum(curvature, 1e-9)))
-        return int(at[best]), float(g[best] / max(curvature[best], 1e-9))
+        gain = 0.5 * g**2 / np.maximum(curvature, 1e-9)
+        best = int(np.argmax(gain))
+        return int(at[best]), float(2 * gain[best] / g[best]), float(gain[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> Posterior:
         """The motion if there were so many counts more from a sample on."""

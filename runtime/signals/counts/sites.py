@@ -49,8 +49,12 @@ RESOLVED, FARTHEST = 0.1, 0.064
 """Distance of knots in units of the time r^(-1/5) in which white jerk of density r crosses an
 interval, and the largest one, s.
 """
+EXCERPT = 8192
+"""Samples of a long record that tell the errors of its counts."""
 WIDE = 0.12
 """Error of a count from which the comparison starts, steps."""
+BESIDE = 2048
+"""Samples on either side of a jump that tell it."""
 JUMPS, MOST_LOST, LIKELIER = 8, 30, 30.0
 """Most jumps of the counts of an encoder, the counts lost in one that is looked for, and the rise
 of the evidence, nats, that tells one.
@@ -129,7 +133,7 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     for leap in jumps:
         given = given.without(*leap)
     boxes, read = given.read(sizes)
-    while len(jumps) < JUMPS and (jump := _jump(boxes, read)):
+    while len(jumps) < JUMPS and (jump := _jump(given, boxes, read)):
         jumps.append(jump)
         given = given.without(*jump)
         boxes, read = given.read(sizes)
@@ -160,16 +164,19 @@ class Counts:
 
     def read(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
         """The motion between the bounds, with the errors of most evidence, or wider ones with which
-        it agrees with every count; a jittering clock is thought of where they are wide.
+        it agrees with every count. Errors of a long record are those of its liveliest part, or
+        wider ones that make the whole more likely.
         """
-        wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
-        boxes, read = self.first(Errors(wide))
-        if read.settled:
-            read = of_most_evidence(boxes, sizes, read)
-        if not read.settled or read.errors.count > wide:
-            others = [self.first(Errors(wide, CLOCK_ERRORS[-2])), self.first(Errors(sizes[-1]))]
-            found = [(b, of_most_evidence(b, sizes, r)) for b, r in others if r.settled]
-            boxes, read = max([(boxes, read), *found], key=lambda each: each[1].evidence)
+        if len(self.y) > 2 * EXCERPT:
+            boxes, read = self.first(self.liveliest().searched(sizes)[1].errors)
+            for wider in (x for x in sizes if x > read.errors.count):
+                wide = boxes.again(replace(read.errors, count=wider), read)
+                if wide.evidence < read.evidence:
+                    break
+                read = wide
+            if boxes.agrees(read):
+                return boxes, read
+        boxes, read = self.searched(sizes)
         for count in (x for x in sizes if x > read.errors.count):
             if boxes.agrees(read):
                 break
@@ -179,6 +186,33 @@ class Counts:
                 f"no motion goes with the counts, even if each were off by {sizes[-1]:g} steps; "
                 "read them by the low-pass (signals: reader: lowpass)"
             )
+        return boxes, read
+
+    def liveliest(self) -> Counts:
+        """EXCERPT samples with the most changes of the count."""
+        changed = np.zeros(len(self.y))
+        changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
+        total = np.cumsum(changed)
+        begin = int(np.argmax(total[EXCERPT:] - total[:-EXCERPT])) + 1
+        return self.part(begin, begin + EXCERPT)
+
+    def part(self, begin: int, end: int) -> Counts:
+        """The samples from `begin` up to `end`."""
+        inside = self.measured[(self.measured >= begin) & (self.measured < end)]
+        return Counts(self.y[begin:end], inside - begin, self.rest[begin:end], self.Ts)
+
+    def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
+        """The motion with the errors of most evidence; a jittering clock is thought of where errors
+        are wide.
+        """
+        wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
+        boxes, read = self.first(Errors(wide))
+        if read.settled:
+            read = of_most_evidence(boxes, sizes, read)
+        if not read.settled or read.errors.count > wide:
+            others = [self.first(Errors(wide, CLOCK_ERRORS[-2])), self.first(Errors(sizes[-1]))]
+            found = [(b, of_most_evidence(b, sizes, r)) for b, r in others if r.settled]
+            boxes, read = max([(boxes, read), *found], key=lambda each: each[1].evidence)
         return boxes, read
 
     def first(self, errors: Errors) -> tuple[Boxes, Posterior]:
@@ -220,18 +254,26 @@ def _leaps(y: Array, known: Array) -> list[tuple[int, int]]:
     return [(int(known[i]), int(jump[i])) for i in np.flatnonzero(leap)[:JUMPS]]
 
 
-def _jump(boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
-    """Sample at which counts jump, and by how many, if the record is more likely without by
-    LIKELIER nats; not asked where counts have the least errors.
+def _jump(given: Counts, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
+    """Sample at which counts jump, and by how many, if the record around it is more likely without
+    by LIKELIER nats; not asked where counts have the least errors.
     """
     if read.errors.count <= COUNT_ERRORS[0] or len(boxes.sites) < FEWEST:
         return None
-    at, most_likely = boxes.jump(read)
-    away = 1 if most_likely > 0 else -1
-    near = round(np.clip(most_likely, -MOST_LOST, MOST_LOST))
-    for jump in dict.fromkeys((near, near + away, near - away, away, 2 * away, 3 * away)):
-        if boxes.later(at, -jump, read).evidence > read.evidence + LIKELIER:
-            return at, jump
+    for middle in boxes.suspects(read):
+        begin = max(0, int(middle) - BESIDE)
+        part = given.part(begin, int(middle) + BESIDE)
+        if len(np.unique(part.y[part.measured])) < 2:
+            continue
+        there, alone = part.first(read.errors)
+        at, most_likely, gain = there.jump(int(middle) - begin, alone)
+        if not gain > LIKELIER / 6:
+            continue
+        away = 1 if most_likely > 0 else -1
+        near = round(np.clip(most_likely, -MOST_LOST, MOST_LOST))
+        for jump in dict.fromkeys((near, near + away, near - away, away, 2 * away, 3 * away)):
+            if there.later(at, -jump, alone).evidence > alone.evidence + LIKELIER:
+                return begin + at, jump
     return None
 
 
@@ -284,10 +326,12 @@ def _sites(y: Array, known: Array, density: float, Ts: float) -> Array:
     change = np.flatnonzero((np.diff(y[known]) != 0) | (np.diff(known) > 1))
     ends = np.concatenate([[0], np.repeat(change, 2), [len(known) - 1]]).reshape(-1, 2)
     ends[1:, 0] += 1
-    parts = (np.diff(ends)[:, 0] * Ts / (SPACING * density**-0.2)).astype(int)  # between changes
-    between = [np.linspace(a, b, k, endpoint=False) for (a, b), k in zip(ends, parts, strict=True)]
-    places = np.unique(np.concatenate([ends.ravel(), *between]).astype(int))
-    return np.asarray(known[places])
+    length = ends[:, 1] - ends[:, 0]
+    parts = (length * Ts / (SPACING * density**-0.2)).astype(int)  # between two changes
+    which = np.repeat(np.arange(len(ends)), parts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
+    between = ends[which, 0] + number * (length / np.maximum(parts, 1))[which]
+    return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
 
 
 def _first_density(y: Array) -> Array:
