@@ -184,14 +184,14 @@ class Boxes:
         return np.asarray(np.argsort(surprise)[-SUSPECTS:] * length + length // 2)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Sample, at most a window from `near`, from which counts are most likely off by the same
+        """Sample about `near` from which counts are most likely off by the same
         number, that number, and by how many nats it raises the posterior.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
         """
-        x, inside = self.basis.at_samples(read.c)[0], np.abs(self.sites - near) * self.basis.Ts
-        at = self.sites[inside < WINDOW]
+        x, away = self.basis.at_samples(read.c)[0], np.abs(self.sites - near)
+        at = self.sites[away * self.basis.Ts < max(WINDOW, away.min() * self.basis.Ts + WINDOW)]
         later = self.sites >= at[:, None]
         tau, pull = read.tau * later, np.zeros((len(at), len(x)))
         pull[:, self.sites] = tau
