@@ -49,7 +49,7 @@ RESOLVED, FARTHEST = 0.1, 0.064
 """Distance of knots in units of the time r^(-1/5) in which white jerk of density r crosses an
 interval, and the largest one, s.
 """
-EXCERPT = 8192
+LIVELIEST = 8192
 """Samples of a long record that tell the errors of its counts."""
 WIDE = 0.12
 """Error of a count from which the comparison starts, steps."""
@@ -167,7 +167,7 @@ class Counts:
         it agrees with every count. Errors of a long record are those of its liveliest part, or
         wider ones that make the whole more likely.
         """
-        if len(self.y) > 2 * EXCERPT:
+        if len(self.y) > 2 * LIVELIEST:
             boxes, read = self.first(self.liveliest().searched(sizes)[1].errors)
             for wider in (x for x in sizes if x > read.errors.count):
                 wide = boxes.again(replace(read.errors, count=wider), read)
@@ -189,12 +189,12 @@ class Counts:
         return boxes, read
 
     def liveliest(self) -> Counts:
-        """EXCERPT samples with the most changes of the count."""
+        """LIVELIEST samples with the most changes of the count."""
         changed = np.zeros(len(self.y))
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
-        begin = int(np.argmax(total[EXCERPT:] - total[:-EXCERPT])) + 1
-        return self.part(begin, begin + EXCERPT)
+        begin = int(np.argmax(total[LIVELIEST:] - total[:-LIVELIEST])) + 1
+        return self.part(begin, begin + LIVELIEST)
 
     def part(self, begin: int, end: int) -> Counts:
         """The samples from `begin` up to `end`."""
