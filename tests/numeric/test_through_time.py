@@ -57,7 +57,8 @@ def right() -> runtime.Record:
 
 
 def judged(record: runtime.Record) -> Plausibility:
-    return runtime.plausibility(MODEL, record)
+    study = runtime.Study(signals={"lowpass": {"cutoff": 50}})
+    return runtime.plausibility(MODEL, record, study)
 
 
 def test_a_right_record_and_one_of_coarse_counts_are_left_alone(right: runtime.Record) -> None:
