@@ -88,8 +88,8 @@ def expected_error(
         ),
         default=0.0,
     )
-    parts = (spread, np.linalg.norm(D @ (X - near)) / size, steps / (1 + steps))
-    return min(100 * float(np.linalg.norm(parts)), LIMIT.LARGEST_EXPECTED)
+    parts = np.array([spread, np.linalg.norm(D @ (X - near)) / size, steps / (1 + steps)])
+    return float(min(100 * np.linalg.norm(parts), LIMIT.LARGEST_EXPECTED))
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
@@ -137,9 +137,8 @@ def reference_states(
     else:
         middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
     rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
-    a = half * rng.uniform(*LIMIT.REFERENCE_RANGE, shape)
-    w = np.minimum(
-        speed * rng.uniform(*LIMIT.REFERENCE_SPEED, shape) / np.where(a > 0, a, np.inf), 2 * np.pi
-    )
+    (least, most), (slow, fast) = LIMIT.REFERENCE_RANGE, LIMIT.REFERENCE_SPEED
+    a = half * rng.uniform(least, most, shape)
+    w = np.minimum(speed * rng.uniform(slow, fast, shape) / np.where(a > 0, a, np.inf), 2 * np.pi)
     phase = rng.uniform(0, 2 * np.pi, shape)
     return middle + a * np.sin(phase), a * w * np.cos(phase), -a * w**2 * np.sin(phase)

@@ -225,7 +225,9 @@ def homogeneity(
         Disagreement(
             compared[k],
             names[i],
-            *(float(part[i]) for part in rows[k]),
+            float(rows[k][0][i]),
+            float(rows[k][1][i]),
+            float(rows[k][2][i]),
             float(z[k][i]),
             float(corrected[k, i]),
         )
@@ -264,7 +266,7 @@ def _fit(blocks: Sequence[Array]) -> tuple[Array, Array]:
     """X, and its covariance by the jackknife, of the rows [W Y] of some blocks."""
     A = np.vstack(blocks)
     size = np.linalg.norm(A[:, :-1], axis=0)
-    R = np.linalg.qr(np.column_stack([A[:, :-1] / size, A[:, -1]]), mode="r")
+    R = np.asarray(np.linalg.qr(np.column_stack([A[:, :-1] / size, A[:, -1]]), mode="r"))
     T = np.linalg.inv(R[:-1, :-1]) / size[:, None]
     X = T @ R[:-1, -1]
     return X, block_covariance(blocks, X, T)
