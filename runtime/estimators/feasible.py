@@ -332,7 +332,7 @@ def decided(
 
 def reach_text(options: FeasibleOptions) -> str:
     """Bounds that were guessed from the lengths of the robot, in words."""
-    if options.reach is None:
+    if options.reach is None or options.reach == "auto":
         return ""
     mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
     total = f", {mass:.3g} kg in all" if mass == LIMIT.ROBOT_DENSITY * options.reach**3 else ""
@@ -348,14 +348,15 @@ def contradicted(
     """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot
     be.
     """
-    K, errors = physical.rows(rows.names), []
+    K = physical.rows(rows.names)
+    errors: list[float] = []
     for options in (replace(asked, prior="none", reach=None), replace(bounded, prior="none")):
         try:
             chi = fitted(rows, physical, options, 0.0)
         except InputError:
             return bool(errors)
         errors.append(residual_norm(rows, K @ chi))
-    return errors[1] > LIMIT.WEIGHT_INCREASE * errors[0]
+    return bool(errors[1] > LIMIT.WEIGHT_INCREASE * errors[0])
 
 
 def mass_ranges(
