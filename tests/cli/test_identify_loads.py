@@ -119,7 +119,7 @@ def test_friction_and_physical_options(folder, tmp_path) -> None:
     result = run(folder, "", "-o", str(tmp_path / "out"), "--friction", "--physical")
     assert result.exit_code == 0, result.output
     assert (
-        "The parameters are physically feasible" in result.output
+        "Least squares (ols) is physically feasible" in result.output
         and "held-out error %" in result.output
     )
     found = json.loads((tmp_path / "out" / "estimate.json").read_text())
