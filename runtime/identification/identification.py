@@ -230,7 +230,7 @@ def identify(
             payload=None
             if study.payload is None
             else payload_study(model, whole, study, provenance=origin(records)),
-            feasibility=feasibility_of(result) if physical and not result.feasible else None,
+            feasibility=feasibility_of(result) if physical else None,
             friction=friction_curves(model, whole, study, fit) if friction else (),
             plausibility=judged() if judged else None,
         )
@@ -308,10 +308,9 @@ def assess(
             missing.append(f"{part}: {e}")
         return None
 
-    if not result.feasible:
-        result = replace(
-            result, feasibility=attempt("physical consistency", lambda: feasibility_of(result))
-        )
+    result = replace(
+        result, feasibility=attempt("physical consistency", lambda: feasibility_of(result))
+    )
     whole = [own for own in result.prepared if isinstance(own, Prepared)]
     if len(whole) < len(result.prepared):
         missing.append("friction and encoder resolution: they need whole records; set stream: off")

@@ -49,6 +49,10 @@ WAYS = (
         r"-beyond \?|-how == 1|S \+ start, 1\)",
         "how a store is written, through the caches or past them: the same numbers",
     ),
+    (
+        r"^scara\.c .*GAM, kept, 3, 4, gravity_rows",
+        "gravity of a SCARA is constant: the room of the call before may hold the same numbers",
+    ),
     (r"steps = -int", "the way of Newton: mode and closure are checked behind it"),
     (
         r"^haptic_casadi\S* .*VSP24 = VP23$",
