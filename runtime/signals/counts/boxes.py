@@ -184,14 +184,14 @@ class Boxes:
         return np.asarray(np.argsort(surprise)[-SUSPECTS:] * length + length // 2)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
-        """Sample about `near` from which counts are most likely off by the same
-        number, that number, and by how many nats it raises the posterior.
+        """Sample near `near` from which counts are most likely off by one number, that number, and
+        by how many nats it raises the posterior.
 
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
         """
         x, away = self.basis.at_samples(read.c)[0], np.abs(self.sites - near)
-        at = self.sites[away * self.basis.Ts < max(WINDOW, away.min() * self.basis.Ts + WINDOW)]
+        at = self.sites[(away - away.min()) * self.basis.Ts < WINDOW]
         later = self.sites >= at[:, None]
         tau, pull = read.tau * later, np.zeros((len(at), len(x)))
         pull[:, self.sites] = tau
@@ -200,9 +200,9 @@ class Boxes:
         B = basis.gradient(pull, ones, np.zeros((len(at), basis.P)))
         curvature = tau.sum(axis=1) - np.einsum("ij,ij->i", B, read.factor.solve_each(B))
         g = (later * (read.nu - read.tau * x[self.sites])).sum(axis=1)
-        gain = 0.5 * g**2 / np.maximum(curvature, 1e-9)
-        best = int(np.argmax(gain))
-        return int(at[best]), float(2 * gain[best] / g[best]), float(gain[best])
+        number = g / np.maximum(curvature, 1e-9)
+        best = int(np.argmax(g * number))
+        return int(at[best]), float(number[best]), float(0.5 * g[best] * number[best])
 
     def later(self, at: int, counts: int, read: Posterior) -> Posterior:
         """The motion if there were so many counts more from a sample on."""

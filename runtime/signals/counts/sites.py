@@ -3,20 +3,14 @@ one law for all speeds.
 
     lo_k <= x(t_k) <= hi_k,   lo_k = count_k - 1/2, hi_k = count_k + 1/2
                               in steps of the encoder; at every sample
-    tilted law of a sample    N(x; m, v) [Phi((hi - x)/e) - Phi((lo - x)/e)]
-                              m, v without this sample; e the error of a line
-    site
-        the normal law that gives the tilted law its mean and variance: precision tau, tau times
-        mean nu
 
 A change of the count is what two neighbouring intervals say together. Sites start from the changes
-(position (k + 1/2), error qd Ts/sqrt(12)) and
-are then updated all at once, damped. The jerk density is the fixed point of MacKay's rule, the sum
-of squared jerks over the number of jerks that
-the record determines, in windows of time with the whole record as prior.
+(position (k + 1/2), error qd Ts/sqrt(12)); `runtime.signals.counts.boxes` then updates them, and
+judges the errors that counts and time stamps have. The jerk density is the fixed point of MacKay's
+rule, the sum of squared jerks over the number of jerks that the record determines, in windows of
+time with the whole record as prior. Counts that were lost are found and taken out here.
 
-References: Minka (2001); Cunningham, Hennig and Lacoste-Julien (2011), boxes; MacKay (1992),
-evidence; docs/theory/counts.md.
+Reference: MacKay (1992), evidence; docs/theory/counts.md.
 """
 
 from __future__ import annotations
