@@ -1,7 +1,11 @@
 """SIGKILL at random moments of the commands that write: is every file old or new, is the set of one
 run, does a rerun end as if nothing had been?
 
-    python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]        generate convert identify cestac report simulate excite
+    python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]
+
+Every verb that writes over what stands there: generate, convert, identify, cestac, report,
+simulate, excite, compare, fleet, apply, show, check, demo (the others print, or, as `new`, never
+replace a file).
 
 Each command runs over a folder that holds the results of an earlier one (other robot constants,
 another record) and a file of the user. Half of the kills come
@@ -48,6 +52,12 @@ OFTEN = (
 ROBOT = "planar_2r"
 NOTE = "of the user"
 POLL = 1e-4  # s, between looks at a folder
+STUDY = """symgen: 1
+record: {files: [../FIRST.csv]}
+estimate: {method: feasible}
+validate: {record: {files: [../SECOND.csv]}}
+"""
+FLEET = "symgen: 1\njobs: [{name: arm, robot: planar_2r, record: ../FIRST.csv}]\n"
 LOOP = """symgen: 1
 signals: {lowpass: {cutoff: 100, on: [q]}}
 controller:
@@ -79,7 +89,7 @@ def write_record(
             (amplitude * x).sum(-1)
             for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle))
         )
-        X = 1.0 + np.arange(len(model.BASE_PARAMETERS)) / 4
+        X = model.base_parameters(model.VALUES)
         tau = model.inverse_dynamics(q, qd, qdd, X) + 0.05 * generator.standard_normal(q.shape)
     header = ",".join(["t", *(f"{name}{j + 1}" for name in ("q", "tau") for j in range(n))])
     np.savetxt(
@@ -127,6 +137,14 @@ class Job:
         return process.returncode
 
 
+def symgen(folder: Path, *arguments: str) -> None:
+    """A command that what is killed needs."""
+    command = [sys.executable, "-c", MAIN, *arguments]
+    ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if ended.returncode not in (0, 1):
+        raise RuntimeError(ended.stderr)
+
+
 def jobs(folder: Path) -> dict[str, Job]:
     """The commands, over files made in `folder`."""
     write_record(folder / "old.csv", seed=1)
@@ -137,6 +155,10 @@ def jobs(folder: Path) -> dict[str, Job]:
     for which, gravity in (("old", "9.81"), ("new", "9.80665")):
         (folder / which).mkdir()
         (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
+        first, second = (which, "new" if which == "old" else "old")
+        for name, text_of in (("study.yaml", STUDY), ("fleet.yaml", FLEET)):
+            settings = text_of.replace("FIRST", first).replace("SECOND", second)
+            (folder / which / name).write_text(settings, encoding="utf-8")
         (folder / which / "loop.yaml").write_text(
             LOOP.replace("KP", "140" if which == "old" else "160.18"), encoding="utf-8"
         )
@@ -157,6 +179,17 @@ def jobs(folder: Path) -> dict[str, Job]:
         for which, seed in (("old", "1"), ("new", "2"))
     }
     other = {which: [f"{which}/arm.yaml", "OUT/other.yaml", "--force"] for which in pairs}
+    symgen(folder, "convert", ROBOT, "arm.urdf")
+    for which in pairs:
+        symgen(folder, "identify", "arm.urdf", f"{which}/study.yaml", "-o", f"{which}-results")
+    changed = {
+        which: [f"{which}-results", "arm.urdf", "-o", "OUT/changed.urdf", "--force"]
+        for which in pairs
+    }
+    studies = {which: [ROBOT, f"{which}/study.yaml", *out] for which in pairs}
+    fleets = {which: [f"{which}/fleet.yaml", *out] for which in pairs}
+    pages = {which: [f"{which}/arm.yaml", "--html", "-o", "OUT/page.html"] for which in pairs}
+    claims = {which: [f"{which}/arm.yaml", "--certificate", "OUT/claim.json"] for which in pairs}
     return {
         "generate": Job(folder, "generate", **robots),
         "convert": Job(folder, "convert", **other),
@@ -165,6 +198,12 @@ def jobs(folder: Path) -> dict[str, Job]:
         "report": Job(folder, "report", **axis),
         "simulate": Job(folder, "simulate", **loops),
         "excite": Job(folder, "excite", **search),
+        "compare": Job(folder, "compare", **studies),
+        "fleet": Job(folder, "fleet", **fleets),
+        "apply": Job(folder, "apply", **changed),
+        "show": Job(folder, "show", **pages),
+        "check": Job(folder, "check", **claims),
+        "demo": Job(folder, "demo", old=[*out, "--quick"], new=out),
     }
 
 
@@ -178,36 +217,38 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def judged(folder: Path, old: dict[str, str], new: dict[str, str]) -> str:
-    """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything
-    else.
+    """What a killed run left: "old", "new", "to complete", or, of a fleet, whose jobs are sets of
+    their own, "old and new"; RuntimeError where it is anything else.
     """
     if (folder / "notes.txt").read_text() != NOTE:
         raise RuntimeError("the user's file changed")
     found = digests(folder)
-    shown = {name: digest for name, digest in found.items() if name in new}
-    waiting = {
-        name.partition("/")[2]: digest
-        for name, digest in found.items()
-        if name.startswith(f"{FINISHED}/")
-    }
-    others = [
-        name
-        for name in found
-        if name not in new
-        and name != "notes.txt"
-        and name.partition("/")[0] not in (LOCK, UNFINISHED, FINISHED, "runs")
-    ]
-    if others or set(shown) != set(new):
-        raise RuntimeError(f"files {others} are left, {sorted(set(new) - set(shown))} are missing")
-    half = [name for name, digest in shown.items() if digest not in (old[name], new[name])]
-    half += [name for name, digest in waiting.items() if digest != new[name]]
-    if half:
-        raise RuntimeError(f"{half} are neither old nor new")
-    if shown == old and not waiting:
-        return "old"
-    if all(digest == new[name] or waiting.get(name) == new[name] for name, digest in shown.items()):
-        return "to complete" if waiting else "new"
-    raise RuntimeError("files of two runs are mixed")
+    found.pop("notes.txt")
+    own = (LOCK, UNFINISHED, FINISHED, "runs")
+    sets: dict[str, list[str]] = {}
+    for name in new:
+        sets.setdefault(str(Path(name).parent), []).append(name)
+    shown = {name for name in found if not set(Path(name).parts) & set(own)}
+    if shown != set(new):
+        raise RuntimeError(f"files {shown - set(new)} are left, {set(new) - shown} are missing")
+    states = set()
+    for parent, names in sets.items():
+        waiting = {
+            name: found[at]
+            for name in names
+            if (at := str(Path(parent, FINISHED, Path(name).name))) in found
+        }
+        half = [name for name in names if found[name] not in (old[name], new[name])]
+        half += [name for name, digest in waiting.items() if digest != new[name]]
+        if half:
+            raise RuntimeError(f"{half} are neither old nor new")
+        if all(found[name] == old[name] for name in names) and not waiting:
+            states.add("old")
+        elif all(new[name] in (found[name], waiting.get(name)) for name in names):
+            states.add("to complete" if waiting else "new")
+        else:
+            raise RuntimeError("files of two runs are mixed")
+    return " and ".join(sorted(states, reverse=True))
 
 
 def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
@@ -218,11 +259,7 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
     code = job.run("new", fresh)
     duration = time.monotonic() - begin
     old, new = digests(base), digests(fresh)
-    if old.keys() != new.keys() or any(
-        old[name] == new[name]
-        for name in new
-        if name != "study.yaml" and not name.startswith("emps")
-    ):
+    if old.keys() != new.keys() or old == new:
         raise RuntimeError("the two runs write other files, or the same")
     writing = write_time(job, base)
     counts: Counter[str] = Counter()

@@ -16,13 +16,14 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "numeric")]
 
 import slips  # noqa: E402
+import slips_simulated  # noqa: E402
 
 
 def main(which: list[str]) -> None:
     folder = Path(os.environ["SYMGEN_DATA"])
     numbers = next((word for word in which if word[0].isdigit()), "1-99").split("-")
     names = [word for word in which if not word[0].isdigit()]
-    for name, case, listed in slips.campaigns(folder):
+    for name, case, listed in (*slips.campaigns(folder), *slips_simulated.campaigns()):
         if names and not any(word in name for word in names):
             continue
         result = case.judged()

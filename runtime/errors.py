@@ -73,6 +73,8 @@ class InputError(ValueError):
         Name of the column.
     row : str, optional
         Place in the file, such as "line 12" or "sample 40".
+    remedy : mapping, optional
+        Settings of the record that are likely to cure it (`runtime.records.suggested`).
     """
 
     def __init__(
@@ -82,8 +84,10 @@ class InputError(ValueError):
         file: str | None = None,
         column: str | None = None,
         row: str | None = None,
+        remedy: Mapping[str, Any] | None = None,
     ) -> None:
         self.message, self.file, self.column, self.row = message, file, column, row
+        self.remedy = remedy
         place = ", ".join(
             part for part in (file, None if column is None else f"column {column!r}", row) if part
         )

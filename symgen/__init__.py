@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from symgen.certify.variants import variants
     from symgen.description import Robot, load_robot, packaged_robots, parse_robot
     from symgen.emit.generate import generate_module
+    from symgen.regroup.reasons import Absorption, BaseDifference, absorptions, base_difference
     from symgen.regroup.regrouping import BaseParameter, Regrouping
     from symgen.regroup.regrouping import regroup as regrouping
     from symgen.symbols.symbolic import SymbolicRobot, symbolic
@@ -33,14 +34,18 @@ if TYPE_CHECKING:
     from symgen.update.apply import apply
 
 __all__ = [
+    "Absorption",
     "Applied",
+    "BaseDifference",
     "BaseParameter",
     "Certificate",
     "Regrouping",
     "Robot",
     "SymbolicRobot",
     "SymgenError",
+    "absorptions",
     "apply",
+    "base_difference",
     "certificate",
     "generate_module",
     "load_robot",
@@ -57,6 +62,9 @@ _HOME = {
         ("Robot", "load_robot", "packaged_robots", "parse_robot"), "symgen.description"
     ),
     **dict.fromkeys(("BaseParameter", "Regrouping", "regrouping"), "symgen.regroup.regrouping"),
+    **dict.fromkeys(
+        ("Absorption", "BaseDifference", "absorptions", "base_difference"), "symgen.regroup.reasons"
+    ),
     **dict.fromkeys(("certificate", "model"), "symgen.certify.modules"),
     **dict.fromkeys(("SymbolicRobot", "symbolic"), "symgen.symbols.symbolic"),
     "Certificate": "symgen.certify.certificate",

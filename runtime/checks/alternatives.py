@@ -1,7 +1,8 @@
 """What may be wrong with a study, a robot file or a log, one thing at a time, as maps of the
 samples and entries of the table of frames.
 
-    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,  tau' = T tau - known,  free_... = another value
+    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,  tau' = T tau - s known,
+    free_... = another value
 
 A robot of n joints has some 10 n^2 of them. Each is tried at the cost of the regressor
 (`runtime.checks.trials`).
@@ -19,7 +20,7 @@ import numpy as np
 from runtime.checks.samples import Samples
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, drives_of, joint_units
+from runtime.model.generated import GeneratedModel, drives_of, joint_labels, joint_units
 
 Array = np.ndarray
 
@@ -47,6 +48,8 @@ class Alternative:
         Map of the torques.
     rate : float
         Factor on the sampling rate.
+    known_factor : float or ndarray, shape (n,)
+        Factor s on the known torques.
     constants : mapping of str to float
         Entries of the table of frames, SI.
     of : str
@@ -60,6 +63,7 @@ class Alternative:
     p: Array
     T: Array
     rate: float = 1.0
+    known_factor: Array | float = 1.0
     constants: Mapping[str, float] = field(default_factory=dict)
     of: str = ""
 
@@ -78,7 +82,7 @@ class Alternative:
 
     def torque(self, samples: Samples) -> Array:
         """Torques left for the model, shape (K, n)."""
-        return np.asarray(samples.tau @ self.T.T - samples.tau_known)
+        return np.asarray(samples.tau @ self.T.T - self.known_factor * samples.tau_known)
 
     @property
     def on_data(self) -> bool:
@@ -98,6 +102,7 @@ def alternatives(
     model: GeneratedModel,
     variants: GeneratedModel | None = None,
     sides: Sequence[str] = ("joint", "joint"),
+    known: Sequence[int] = (),
 ) -> list[Alternative]:
     """All that can be tried on a robot.
 
@@ -109,6 +114,8 @@ def alternatives(
         constants of the model aside.
     sides : (str, str)
         Sides of positions and torques in the files: motor or joint.
+    known : sequence of int
+        Joints with known torques.
     """
     make = _Maker(model, sides)
     every = [
@@ -118,6 +125,7 @@ def alternatives(
         *rates(make),
         *couplings(make),
         *zeros(make),
+        *known_torques(make, known),
     ]
     if (drives := drives_of(model)) is not None:
         every += transmissions(make, drives, sides)
@@ -133,8 +141,8 @@ class _Maker:
 
     def __init__(self, model: GeneratedModel, sides: Sequence[str]) -> None:
         self.n = n = len(model.JOINTS)
-        self.joints, self.one = [str(j) for j in model.JOINTS], np.eye(n)
-        self.units = joint_units(model)
+        self.joints, self.one = joint_labels(model), np.eye(n)
+        self.units, self.links = joint_units(model), getattr(model, "LINKS", ())
         drives = drives_of(model)
         self.R, self.tau_of_motors, self.offset = self.one, self.one, np.zeros(n)
         if drives is not None and sides[0] == "motor":
@@ -162,15 +170,22 @@ def signs(make: _Maker) -> Iterator[Alternative]:
     for j, joint in enumerate(make.joints):
         S = np.diag(np.where(np.arange(make.n) == j, -1.0, 1.0))
         torque, position = make.torques(S), make.positions(S)
-        remedy = f"turn the sign of the torque of joint {joint}: ratio, torque constant or column"
-        yield make("sign", f"the torque of joint {joint} has the wrong sign", remedy, **torque)
-        remedy = f"turn the sign of the position of joint {joint}, or its axis in the robot file"
-        yield make("sign", f"the position of joint {joint} has the wrong sign", remedy, **position)
-        remedy = f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame"
+        yield make(
+            "sign",
+            f"the torque of joint {joint} has the wrong sign",
+            f"turn the sign of the torque of joint {joint}: ratio, torque constant or column",
+            **torque,
+        )
+        yield make(
+            "sign",
+            f"the position of joint {joint} has the wrong sign",
+            f"turn the sign of the position of joint {joint}, or its axis in the robot file",
+            **position,
+        )
         yield make(
             "sign",
             f"joint {joint} counts in the other sense, position and torque",
-            remedy,
+            f"turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
             **torque,
             **position,
         )
@@ -248,63 +263,53 @@ def rates(make: _Maker) -> Iterator[Alternative]:
     for factor in LIMIT.RATE_FACTORS:
         yield make(
             "rate",
-            f"the sampling rate is {times_of([factor])} the stated one",
+            f"the sampling rate is {times(factor)} the stated one",
             "correct record.rate, or the unit of the time column (record.units.t)",
             rate=factor,
             of="the sampling rate",
         )
 
 
-def times_of(factors: Sequence[float]) -> str:
-    """Factors, in rising order, in words."""
-    words = [f"{factor:g}" if factor > 1 else f"1/{1 / factor:g}" for factor in factors]
-    return (
-        f"{', '.join(words[:-1])}{' or ' if len(words) > 1 else ''}{words[-1]} "
-        f"{'times' if factors[-1] > 1 else 'of'}"
-    )
+def times(factor: float) -> str:
+    """A factor in words: 2 times, 1/4 of, 0.752 of."""
+    if factor > 1:
+        return f"{factor:.3g} times"
+    plain = np.isclose(2 / factor % 1, 0)
+    return f"1/{1 / factor:g} of" if plain else f"{factor:.3g} of"
 
 
 def couplings(make: _Maker) -> Iterator[Alternative]:
     """The motor of a joint also turns with the one before, in either sense: positions and torques,
     or one of them.
     """
-    for i, k in zip(range(make.n - 1), range(1, make.n), strict=True):
-        if make.units[i] != make.units[k]:
-            continue
-        a, b = make.joints[i], make.joints[k]
-        for s in (1.0, -1.0):
-            P, T = make.one.copy(), make.one.copy()
-            P[k, i], T[i, k] = s, -s  # tau' qd' = tau qd
-            sign = "plus" if s > 0 else "minus"
-            remedy = (
-                f"give the coupling of joints {a} and {b} as an off-diagonal element of "
-                "drives.ratio"
-            )
-            yield make(
-                "coupling",
-                (
-                    f"the coupling of joints {a} and {b} is missing: position {b} is to be taken "
-                    f"{sign} position {a}"
-                ),
-                remedy,
-                P=P,
-                T=T,
-            )
-            yield make(
-                "coupling",
-                f"the coupling of joints {a} and {b} is missing in the positions ({sign})",
-                remedy,
-                P=P,
-            )
-            yield make(
-                "coupling",
-                (
-                    f"the coupling of joints {a} and {b} is missing in the torques "
-                    f"({'minus' if s > 0 else 'plus'})"
-                ),
-                remedy,
-                T=T,
-            )
+    for i, k in neighbours(make.units):
+        for columns in ("positions and torques", "positions", "torques") if i < k else ():
+            for share in (1.0, -1.0):
+                yield make("coupling", **coupled(make.joints, i, k, columns, share))
+
+
+def neighbours(units: Sequence[str]) -> list[tuple[int, int]]:
+    """Joints next to each other, of one unit, in both orders."""
+    pairs = [pair for k in range(1, len(units)) for pair in ((k - 1, k), (k, k - 1))]
+    return [(i, k) for i, k in pairs if units[i] == units[k]]
+
+
+def coupled(joints: Sequence[str], i: int, k: int, columns: str, share: float) -> dict[str, Any]:
+    """Cause, remedy and maps of q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k, in some
+    columns.
+    """
+    P, T = np.eye(len(joints)), np.eye(len(joints))
+    P[k, i], T[i, k] = share, -share
+    of = f"the coupling of joints {joints[min(i, k)]} and {joints[max(i, k)]}"
+    signal, a, b, x = ("position", k, i, share) if "pos" in columns else ("torque", i, k, -share)
+    size = "" if abs(x) == 1 else f"{abs(x):.3g} times "
+    where = f"{signal} {joints[a]} is to be taken {'plus' if x > 0 else 'minus'} {size}"
+    return {
+        "cause": f"{of} is missing in the {columns}: {where}{signal} {joints[b]}",
+        "remedy": f"give {of} as an off-diagonal element of drives.ratio",
+        **({"P": P} if "positions" in columns else {}),
+        **({"T": T} if "torques" in columns else {}),
+    }
 
 
 def zeros(make: _Maker) -> Iterator[Alternative]:
@@ -316,16 +321,28 @@ def zeros(make: _Maker) -> Iterator[Alternative]:
             continue
         for text, angle in TURNS.items():
             p = np.where(np.arange(make.n) == j, angle, 0.0)
-            remedy = (
-                f"look at theta of the frame of joint {joint} and at its zero "
-                f"(drives.offset): {text} are missing"
-            )
             yield make(
                 "zero",
                 f"theta of joint {joint} is wrong by {text}",
-                remedy,
+                f"look at theta of the frame of joint {joint} and at its zero "
+                f"(drives.offset): {text} are missing",
                 p=p,
                 of=f"the zero of joint {joint}",
+            )
+
+
+def known_torques(make: _Maker, joints: Sequence[int]) -> Iterator[Alternative]:
+    """Known torques of one joint with the other sign, or in the measured ones no more."""
+    for j in joints:
+        for factor, text, remedy in (
+            (-1.0, "has the wrong sign", "turn the sign of"),
+            (0.0, "is not in the measured one", "do not subtract"),
+        ):
+            yield make(
+                "known",
+                f"the known torque of joint {make.joints[j]} {text}",
+                f"{remedy} the known torque of joint {make.joints[j]} (record.columns.tau_known)",
+                known_factor=np.where(np.arange(make.n) == j, factor, 1.0),
             )
 
 
@@ -418,19 +435,26 @@ def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterato
         f[i], f[k] = own[k] / own[i], own[i] / own[k]
         maps = {"T": np.diag(f)} if sides[1] == "motor" else {}
         maps |= {"P": np.diag(1 / f)} if sides[0] == "motor" else {}
-        text = f"the ratios of joints {make.joints[i]} and {make.joints[k]} are exchanged"
         yield make(
             "exchange",
-            text,
+            f"the ratios of joints {make.joints[i]} and {make.joints[k]} are exchanged",
             f"exchange drives.ratio of joints {make.joints[i]} and {make.joints[k]}",
             **maps,
         )
 
 
 def gravity(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
-    """Gravity along the other axes of frame 0, in either sense."""
-    given = np.array([free[f"free_g{axis}"] for axis in "xyz"])
+    """Gravity along the other axes of frame 0, in either sense; of its size on earth."""
+    free_g = ("free_gx", "free_gy", "free_gz")
+    given = np.array([free[key] for key in free_g])
     size = float(np.linalg.norm(given))
+    if size and abs(size / 9.81 - 1) > LIMIT.GRAVITY_VARIES:
+        yield make(
+            "gravity",
+            f"gravity is {size:.4g} m/s^2 rather than 9.81",
+            "give gravity in m/s^2",
+            constants=dict(zip(free_g, (9.81 / size * given).tolist(), strict=True)),
+        )
     for k, axis in enumerate("xyz"):
         for sign in (1.0, -1.0):
             g = np.where(np.arange(3) == k, sign * size, 0.0)
@@ -446,9 +470,7 @@ def gravity(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                     "gravity",
                     text + entry,
                     f"set gravity: [{listed}], or turn frame 0",
-                    constants=dict(
-                        zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True)
-                    ),
+                    constants=dict(zip(free_g, map(float, g), strict=True)),
                 )
 
 
@@ -501,10 +523,11 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                 f"exchange d and r of frame {j}",
                 constants={f"free_d{j}": r, f"free_r{j}": d},
             )
+    whole = {*make.links} <= {*frames}  # frames that constraints tie keep their entries
     lengths = [key for key in entry if key[5] in "drb" and entry[key]]
     for text, factor in FACTORS.items():
         longest = max((abs(entry[key]) for key in lengths), default=1.0)
-        if not 10 * LIMIT.MM_BELOW < longest < LIMIT.MM_ABOVE:
+        if whole and not 10 * LIMIT.MM_BELOW < longest < LIMIT.MM_ABOVE:
             yield make(
                 "length",
                 f"all lengths are to be taken {text} times: mm and m",
@@ -528,7 +551,7 @@ def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
             for j in frames
             for key in ("alpha", "d")
         }
-        if len(frames) > 1:
+        if len(frames) > 1 and whole:
             yield make("table", cause, remedy, constants=moved)
 
 

@@ -16,7 +16,7 @@ from runtime.checks.samples import Samples
 from runtime.checks.trials import Problem, problem_of
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
@@ -61,6 +61,11 @@ class Case:
         return [one.record for one in self.straight]
 
     @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What results call the joints."""
+        return joint_labels(self.model)
+
+    @cached_property
     def units(self) -> list[str]:
         """Units of the positions, by joint."""
         return list(joint_units(self.model))
@@ -82,12 +87,12 @@ class Case:
 
     def joints(self, chosen: Array) -> str:
         """Labels of the joints of a mask."""
-        return ", ".join(str(self.model.JOINTS[j]) for j in np.flatnonzero(chosen))
+        return ", ".join(self.labels[j] for j in np.flatnonzero(chosen))
 
     def reaching(self, values: Array, units: Sequence[str], chosen: Array) -> str:
         """They reach these values, with their units: the joints of a mask, or else the largest."""
         shown = np.flatnonzero(chosen)[:4] if chosen.any() else [int(np.argmax(values))]
-        each = (f"{values[j]:.3g} {units[j]} (joint {self.model.JOINTS[j]})" for j in shown)
+        each = (f"{values[j]:.3g} {units[j]} (joint {self.labels[j]})" for j in shown)
         return f"They reach {', '.join(each)}"
 
     @cached_property

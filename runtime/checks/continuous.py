@@ -28,11 +28,17 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from runtime.checks.alternatives import Alternative, unchanged
+from runtime.checks.alternatives import (
+    Alternative,
+    coupled,
+    neighbours,
+    times,
+    unchanged,
+)
 from runtime.checks.fits import Fit, Grams, quick_fit, solved
 from runtime.checks.trials import Problem, Trial
 from runtime.limits import LIMIT
-from runtime.model.generated import joint_units
+from runtime.model.generated import joint_labels, joint_units
 
 Array = np.ndarray
 
@@ -52,7 +58,7 @@ class Quantity:
     Attributes
     ----------
     kind : str
-        factor, zero, length, angle.
+        factor, zero, rate, coupling, length, angle.
     of : str
         What it is, in words.
     span : float
@@ -87,43 +93,40 @@ class Step:
 
 
 def quantities(problem: Problem) -> list[Quantity]:
-    """Factors of all joints, zeros of those that turn; lengths and angles of the table where it is
-    free.
+    """Factors of all joints, zeros of those that turn, the sampling rate, couplings of neighbours;
+    lengths and angles of the table where it is free.
     """
-    plain, model = unchanged(problem.samples.n), problem.model
-    number, several = np.arange(problem.samples.n), problem.samples.n > 1
-    free = {} if problem.variants is None else problem.variants.CONSTANTS
-    entries = [
-        (key, match[1], match[2], x)
-        for key, x in free.items()
-        if (match := ENTRY.fullmatch(key)) and (x or match[1] == "alpha")
-    ]
-    factors = [
-        Quantity(
+    plain = unchanged(problem.samples.n)
+    joints, units = list(joint_labels(problem.model)), joint_units(problem.model)
+    number = np.arange(len(joints))
+    which: list[tuple[str, str, float, Callable[[float], dict[str, Any]]]] = [
+        ("rate", "the sampling rate", 1.0, _rate),
+        (
             "factor",
             "a common factor of all torques",
             2.6,
             partial(_factor, problem, number >= 0, ""),
-            plain,
-        )
+        ),
     ]
-    for j, joint in enumerate(map(str, model.JOINTS if several else ())):
-        of = f"a factor of the torque of joint {joint}"
-        fields = partial(_factor, problem, number == j, joint)
-        factors.append(Quantity("factor", of, 2.6, fields, plain))
-    zeros = [
-        Quantity(
-            "zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint), plain
-        )
-        for j, joint in enumerate(model.JOINTS)
-        if joint_units(model)[j] == "rad"
-    ]
-    lengths = []
-    for key, name, frame, x in entries:
-        kind, span, entry = ("angle", 1.2, _angle) if name == "alpha" else ("length", 1.0, _length)
-        fields = partial(entry, key, name, frame, x)
-        lengths.append(Quantity(kind, f"{name} of frame {frame}", span, fields, plain))
-    return [*factors, *zeros, *lengths]
+    for j, joint in enumerate(joints):
+        if len(joints) > 1:
+            fields = partial(_factor, problem, number == j, joint)
+            which.append(("factor", f"a factor of the torque of joint {joint}", 2.6, fields))
+        if units[j] == "rad":
+            which.append(
+                ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
+            )
+    for i, k in neighbours(units):
+        of = f"the coupling of joints {joints[min(i, k)]} and {joints[max(i, k)]}"
+        for columns in ("positions and torques", "torques"):
+            which.append(("coupling", of, 1.2, partial(coupled, joints, i, k, columns)))
+    for key, x in ({} if problem.variants is None else problem.variants.CONSTANTS).items():
+        if (match := ENTRY.fullmatch(key)) and (x or match[1] == "alpha"):
+            angle = match[1] == "alpha"
+            kind, span, entry = ("angle", 1.2, _angle) if angle else ("length", 1.0, _length)
+            of = f"{match[1]} of frame {match[2]}"
+            which.append((kind, of, span, partial(entry, key, match[1], match[2], x)))
+    return [Quantity(*one, plain) for one in which]
 
 
 def _factor(problem: Problem, chosen: Array, joint: str, xi: float) -> dict[str, Any]:
@@ -143,12 +146,21 @@ def _factor(problem: Problem, chosen: Array, joint: str, xi: float) -> dict[str,
     }
 
 
-def _zero(chosen: Array, joint: int, xi: float) -> dict[str, Any]:
+def _zero(chosen: Array, joint: str, xi: float) -> dict[str, Any]:
     return {
         "cause": f"the zero of joint {joint} is off by {np.degrees(xi):.3g} degrees",
         "remedy": f"look at theta of the frame of joint {joint}, at drives.offset and at the "
         "calibration of its encoder",
         "p": np.where(chosen, xi, 0.0),
+    }
+
+
+def _rate(xi: float) -> dict[str, Any]:
+    factor = float(np.exp(xi))
+    return {
+        "cause": f"the sampling rate is {times(factor)} the stated one",
+        "remedy": "correct record.rate, or the unit of the time column (record.units.t)",
+        "rate": factor,
     }
 
 

@@ -27,7 +27,7 @@ from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
@@ -134,7 +134,7 @@ def delay(
     known = share & (np.abs(shift) < longest)
     shift, sigma = np.where(known, shift, np.nan), np.where(known, sigma, np.nan)
     common, sigma_common = _mean(shift[known], sigma[known])
-    labels = tuple(str(j) for j in model.JOINTS)
+    labels = joint_labels(model)
     before, after = problem.errors(np.zeros(record.n)), problem.errors(np.where(known, shift, 0.0))
     return Delay(labels, shift, sigma, common, sigma_common, before, after)
 

@@ -138,11 +138,11 @@ def known_values(problem: Problem) -> KnownValues | None:
         shown = size > LIMIT.SMALL_PART * np.linalg.norm(y)
         if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
             ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
-    joints = tuple(str(j) for j in problem.model.JOINTS)
+    joints = joint_labels(problem.model)
     return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))
 
 
-def torque_unit_doubt(model: GeneratedModel, observation: Observation) -> str:
+def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:
     """The question to the user, a sentence; "" where nothing speaks against the unit, or the file
     has no values.
     """
@@ -171,9 +171,13 @@ def torque_unit_doubt(model: GeneratedModel, observation: Observation) -> str:
             slopes[label] = both / size
     if not slopes:
         return ""
+    cause = (
+        "are the gains of controller.law in N m/deg (gain: 180/pi), or those of the motor side?"
+        if by_law
+        else "are they currents, or of the motor side? Say record.units.tau: A with "
+        "record.torque_constant, or record.torque_side: motor"
+    )
     return (
         f"the torques of joint {', '.join(slopes)} run like those of the values in the robot file "
-        f"at {', '.join(f'{x:.2g}' for x in slopes.values())} of their size: "
-        "are they currents, or of the motor side? Say record.units.tau: A with "
-        "record.torque_constant, or record.torque_side: motor"
+        f"at {', '.join(f'{x:.2g}' for x in slopes.values())} of their size: {cause}"
     )

@@ -28,6 +28,7 @@ from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
 from runtime.rows.selection import per_joint
 from runtime.settings.study import EstimateSettings, Signals, Study
+from runtime.signals.recorded_speed import agreement
 
 Array = np.ndarray
 
@@ -41,7 +42,7 @@ def rest(case: Case) -> Answer:
     model, study = case.model, case.study
     share = standing_share(case.samples, study)
     worst = int(np.argmax(share))
-    text = f"Joint {model.JOINTS[worst]} stands in {100 * share[worst]:.0f} % of its rows"
+    text = f"Joint {case.labels[worst]} stands in {100 * share[worst]:.0f} % of its rows"
     proposed = low_speed_of_rest(case.samples, study)
     if proposed is None:
         return Answer("good", text)
@@ -132,8 +133,9 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
     """share_i, %, by name of the parameter; LinAlgError where W has no full rank."""
     s = np.array(
         [
-            LIMIT.TORQUE_NOISE * float(np.sqrt(np.mean(observation.Y[observation.joint(j)] ** 2)))
-            for j in range(observation.n)
+            LIMIT.TORQUE_NOISE
+            * float(np.linalg.norm(observation.Y[observation.joint(j)]) / np.sqrt(max(rows, 1)))
+            for j, rows in enumerate(observation.rows)
         ]
     )
     if not s.all():
@@ -148,3 +150,24 @@ def unexcited_shares(observation: Observation, signals: Signals, rate: float) ->
         raise np.linalg.LinAlgError("no full rank")
     sigma = weights.relative_sigma(observation, kept_correlation(signals, rate))
     return dict(zip(observation.names, map(float, sigma), strict=True))
+
+
+@Question(
+    "Do recorded velocities agree with the positions?",
+    f"gain and lag take at most {100 * LIMIT.SPEED_DISAGREES:g} %",
+    "look at unit, side and sense of record.columns.qd, and at the filter of the drive; those "
+    "joints take differences of the positions",
+)
+def recorded_speeds(case: Case) -> Answer | None:
+    """Gain and lag of recorded velocities; None where none are recorded."""
+    own = max(case.straight, key=lambda one: len(one.record))
+    record, signals = own.record, own.study.signals
+    if "qd" not in record.channels or signals.velocity == "differences":
+        return None
+    found = agreement(record.q, record.channels["qd"], record.rate, signals)
+    worst = int(np.argmax(found.share))
+    text = (
+        f"The velocity of joint {case.labels[worst]} is {found.gain[worst]:.3f} of that of "
+        f"its positions and {1e3 * found.lag[worst]:.1f} ms late"
+    )
+    return Answer("good" if found.agrees.all() else "doubtful", text)

@@ -10,8 +10,11 @@ import numpy as np
 
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State
+from runtime.checks.delay import Delay
 from runtime.checks.trials import Trial, reach
 from runtime.limits import LIMIT
+
+Array = np.ndarray
 
 
 @Question("Does physics agree?")
@@ -42,7 +45,7 @@ def physics(case: Case) -> Answer | None:
     return Answer(
         "doubtful" if worse else "good",
         f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint "
-        f"{case.model.JOINTS[j]}, free parameters {free.errors[j]:.1f} %",
+        f"{case.labels[j]}, free parameters {free.errors[j]:.1f} %",
     )
 
 
@@ -91,34 +94,61 @@ def values(case: Case) -> Answer | None:
 
 @Question(
     "Do positions and torques belong to the same instants?",
-    f"shift below {1e3 * LIMIT.LATE:g} ms",
+    f"shift below {1e3 * LIMIT.LATE:g} ms, or not beyond what the record tells",
 )
-def delayed(case: Case) -> Answer | None:
-    """Time shift between positions and torques; None where the record does not tell."""
+def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
+    """Time shift between positions and torques; None where the record does not tell. What an
+    alternative explains better is no delay.
+    """
     late = None if case.problem is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
-    gain = late.before - late.after
-    visible = late.before > LIMIT.DELAY_VISIBLE * late.after
-    j = int(np.nanargmax(gain))
-    all_of_them = (
-        abs(late.common) > max(LIMIT.CERTAIN_DELAY * late.sigma_common, LIMIT.LATE) and visible[j]
+    own, gain = late_joints(late), late.before - late.after
+    which, shift, sigma = "Torques are", np.array([late.common]), late.sigma_common
+    if own.any() and not own.all():
+        which = f"Torques of joint {case.joints(own)} are"
+        shift, sigma = late.shift[own], float(late.sigma[own].max())
+    first = not named or late_gain(case) >= named[0].gain
+    state: State = "good" if not own.any() else "doubtful" if first else "open"
+    j = int(np.nanargmax(np.where(own | ~own.any(), gain, -np.inf)))
+    sense, each = (
+        "late" if shift[0] > 0 else "early",
+        ", ".join(f"{1e3 * abs(x):.1f}" for x in shift),
     )
-    which, shift, sigma = "Torques are", late.common, late.sigma_common
-    certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
-    own = visible & (np.abs(late.shift) > certain)
-    if own.any() and not all_of_them:
-        j = int(np.argmax(np.where(own, gain, -np.inf)))
-        which = f"The torque of joint {late.joints[j]} is"
-        shift, sigma = late.shift[j], late.sigma[j]
+    certain = own.any() or np.abs(shift).max() <= LIMIT.LATE
+    beyond = "" if certain else ", more than the record tells for certain"
     return Answer(
-        "doubtful" if all_of_them or own.any() else "good",
-        f"{which} {'late' if shift > 0 else 'early'} by {1e3 * abs(shift):.1f} ms, deviation "
-        f"{1e3 * sigma:.1f} ms; correcting the delays changes the error of joint {late.joints[j]} "
-        f"from {late.before[j]:.1f} to {late.after[j]:.1f} %",
-        f"shift the torques by {-1e3 * shift:+.1f} ms against the positions before "
-        "reading the record, or mend the logger",
+        state,
+        f"{which} {sense} by {each} ms, deviation {1e3 * sigma:.1f} ms{beyond}; correcting the "
+        f"delays changes the error of joint {late.joints[j]} from {late.before[j]:.1f} to "
+        f"{late.after[j]:.1f} %",
+        f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
+        "positions before reading the record, or mend the logger",
     )
+
+
+def late_joints(late: Delay) -> Array:
+    """Joints whose delay is certain, bool (n,): all of them where one delay serves all, else those
+    of one sign.
+    """
+    visible = late.before > LIMIT.DELAY_VISIBLE * late.after
+    certain = np.fmax(LIMIT.CERTAIN_JOINT_DELAY * late.sigma, LIMIT.LATE_JOINT)
+    apart = visible & (np.abs(late.shift - late.common) > certain)
+    gain = late.before - late.after
+    common = max(LIMIT.CERTAIN_JOINT_DELAY * late.sigma_common, LIMIT.LATE)
+    if visible[int(np.nanargmax(gain))] and abs(late.common) > common and not apart.any():
+        return np.ones(len(gain), dtype=bool)
+    own = visible & (np.abs(late.shift) > certain)
+    strongest = late.shift[int(np.argmax(np.where(own, gain, -np.inf)))]
+    return np.asarray(own & (late.shift * strongest > 0))
+
+
+def late_gain(case: Case) -> float:
+    """What certain delays gain, nats; 0 where there are none."""
+    late, problem = case.late, case.problem
+    if late is None or problem is None or not late_joints(late).any():
+        return 0.0
+    return problem.N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 @Question(
@@ -157,7 +187,10 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     j = int(np.argmax(before / np.maximum(after, 0.3)))
     cause, *others = (t.alternative.cause for t in named)
     text = f"No: {cause}" + (f" (or: {'; '.join(others)})" if others else "")
+    errors = [f"{error[j]:.1f}" for error in (before, after)]
     text += (
-        f"; the error of joint {case.model.JOINTS[j]} goes from {before[j]:.1f} to {after[j]:.1f} %"
+        f"; the error of joint {case.labels[j]} goes from {' to '.join(errors)} %"
+        if errors[0] != errors[1]
+        else "; the errors stay, the parameters come nearer to the values of the robot file"
     )
     return Answer("no", text, named[0].alternative.remedy)

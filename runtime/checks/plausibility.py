@@ -17,14 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from runtime.checks.alternatives import times_of
 from runtime.checks.case import Case
 from runtime.checks.check import WORST, Check, worst_of
 from runtime.checks.continuous import Gravity, searched
 from runtime.checks.delay import Delay
 from runtime.checks.known import KnownValues
-from runtime.checks.motion import motion_excites, rest
-from runtime.checks.physics import better, delayed, direction, not_asked, physics, size, values
+from runtime.checks.motion import motion_excites, recorded_speeds, rest
+from runtime.checks.physics import (
+    better,
+    delayed,
+    direction,
+    late_gain,
+    not_asked,
+    physics,
+    size,
+    values,
+)
 from runtime.checks.samples import excerpts, samples_of
 from runtime.checks.sizes import (
     accelerations,
@@ -57,16 +65,20 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     lengths,
     inertias,
     rest,
+    recorded_speeds,
     motion_excites,
     not_asked,
     cut_torques,
     change,
     physics,
     size,
-    delayed,
     values,
 )
-EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (direction, better)
+EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (
+    delayed,
+    direction,
+    better,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,13 +186,16 @@ def plausibility(
     case = _case(model, several, study, variants)
     if isinstance(case, Check):
         return Plausibility((first, case))
-    checks = [first, *(found for check in CHECKS if (found := check(case)) is not None)]
+    answers = {check: check(case) for check in CHECKS}
+    checks = [first, *(found for found in answers.values() if found is not None)]
     if case.problem is None:
         return Plausibility(tuple(checks))
-    if checks[1].state == "no":  # what explains a record with jumps better is no cause
-        question = "Is the study the best explanation of the record?"
-        checks.append(Check(question, "open", "Not asked: the positions jump"))
-        return Plausibility(tuple(checks))
+    question = "Is the study the best explanation of the record?"
+    for check, text in ((jumps, "the positions jump"), (cut_torques, "torques are cut off")):
+        # what explains a broken record better is no cause
+        if (broken := answers[check]) is not None and broken.state == "no":
+            checks.append(Check(question, "open", f"Not asked: {text}"))
+            return Plausibility(tuple(checks))
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
@@ -189,8 +204,10 @@ def plausibility(
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = decisive(trials, case.problem)
-    asked = EXPLAINED if trials else EXPLAINED[:1]
+    named = [t for t in decisive(trials, case.problem) if t.gain > late_gain(case)]
+    if named and (moved := answers[change]) is not None:  # what a wrong study does to both parts
+        checks[checks.index(moved)] = replace(moved, state="open")
+    asked = EXPLAINED if trials else EXPLAINED[:-1]
     checks += [found for check in asked if (found := check(case, named)) is not None]
     hidden = dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent)
     return Plausibility(
@@ -241,25 +258,14 @@ def _case(
 
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
-    """The best first; sampling rates as one, which has to gain LIMIT.RATE_GAIN more: a slower
-    motion gives the parameters more room.
+    """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
+    gives the parameters more room, and so has a coupling.
     """
-    rates = [
-        replace(t, gain=t.gain - LIMIT.RATE_GAIN)
+    priced = [
+        replace(t, gain=t.gain - LIMIT.RATE_GAIN * (t.alternative.kind in ("rate", "coupling")))
         for t in trials
-        if t.alternative.kind == "rate" and t.fit is not None
     ]
-    kept = [t for t in trials if t.alternative.kind != "rate" or t.equivalent]
-    if rates:
-        best = max(rates, key=lambda t: t.gain)
-        alike = sorted(
-            t.alternative.rate
-            for t in rates
-            if t.gain >= best.gain - LIMIT.GAIN_ALIKE * abs(best.gain)
-        )
-        cause = f"the sampling rate is {times_of(alike)} the stated one"
-        kept.append(replace(best, alternative=replace(best.alternative, cause=cause)))
-    return sorted(kept, key=lambda trial: -trial.gain)
+    return sorted(priced, key=lambda trial: -trial.gain)
 
 
 __all__ = ["Plausibility", "plausibility"]

@@ -101,9 +101,10 @@ def excerpts(stream: Stream, study: Study) -> list[Record]:
     begins = map(int, np.linspace(start, stop - length, number))
     parts = []
     for begin in begins:
-        t, q, tau, gaps = reader.read(begin, begin + length)
+        t, q, tau, gaps, channels = reader.read(begin, begin + length)
         missing = Missing(gaps, stream.follows) if gaps.any() else None
-        parts.append(Record(t, q, tau, name=stream.name, origin=stream.origin, missing=missing))
+        given = Record(t, q, tau, name=stream.name, missing=missing, channels=channels)
+        parts.append(replace(given, origin=stream.origin))
     return parts
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State
+from runtime.checks.trials import reach
 from runtime.estimators.physical import frame_origins
 from runtime.limits import LIMIT
-from runtime.model.inertia import PhysicalModel
+from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 
@@ -181,10 +182,32 @@ def inertias(case: Case) -> Answer | None:
     """
     if case.physical is None or not case.physical.values:
         return None
+    if far := list(_far_bodies(case.physical, reach(case.model, case.samples.q))):
+        return Answer("doubtful", "; ".join(far), "give values in kg, kg m, kg m^2, not g and mm")
     wrong = list(_wrong_links(case.physical))
     if not wrong:
         return Answer("good", "Every link with ten values can exist", "")
     return Answer("doubtful", f"No body has those of link {', '.join(wrong)}")
+
+
+def _far_bodies(physical: PhysicalModel, length: float) -> Iterator[str]:
+    """Links whose given values, fewer than ten perhaps, put their mass beyond LIMIT.LINK_EXTENT
+    times the reach of the robot, m, from their frame.
+    """
+    for j in physical.links:
+        given = {family: physical.values.get(f"{family}{j}", 0.0) for family in INERTIAL}
+        mass = abs(given["M"])
+        if not mass:
+            continue
+        centre = max(abs(given[family]) for family in ("MX", "MY", "MZ")) / mass
+        gyration = np.sqrt(max(abs(given[family]) for family in ("XX", "YY", "ZZ")) / mass)
+        if (distance := max(centre, gyration)) > LIMIT.LINK_EXTENT * max(
+            length, LIMIT.LEAST_EXTENT
+        ):
+            yield (
+                f"The values of link {j} put its mass {distance:.3g} m from its frame, the robot "
+                f"reaches {length:.2g} m"
+            )
 
 
 def _wrong_links(physical: PhysicalModel) -> Iterator[str]:

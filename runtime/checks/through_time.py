@@ -6,17 +6,21 @@ jumps      a step of q between two samples that is LIMIT.JUMP times the usual on
 cut        the largest or the smallest torque holds for many samples, and the fit is better without
            them: a clipped signal. A torque that saturates
            the drive and is recorded as it acted leaves the fit as it is
-change     Y = W X fitted apart before and after an instant t leaves less than 1/LIMIT.CHANGE of
-           what one X leaves
+change     Y = W X + [t > t0] W K x, K all parameters or those of one link and its joint, leaves
+           less than 1/LIMIT.CHANGE of what Y = W X leaves, of unseen rows too
 """
 
 from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question
-from runtime.checks.fits import least_squares
+from runtime.checks.fits import Grams, least_squares
 from runtime.errors import instant
 from runtime.limits import LIMIT
 from runtime.signals.filters import median_filtered
@@ -34,22 +38,23 @@ def jumps(case: Case) -> Answer:
     fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in units])
     fastest = fastest if limits is None else 4 * limits
     for record in case.records:
-        steps = np.abs(np.diff(median_filtered(record.q, median), axis=0))
+        q = median_filtered(record.q, median)
+        steps = np.abs(np.diff(q, axis=0))
         usual = np.array([np.quantile(s[s > 0], 0.9) if s.any() else np.inf for s in steps.T])
         high = steps > np.maximum(LIMIT.JUMP * usual, fastest / record.rate)
         if not high.any():
             continue
-        instants = np.flatnonzero(high.any(axis=1))
-        k = int(instants[0])
+        first, _ = _runs(high.any(axis=1), median)
+        k = int(first[0])
         joints = np.flatnonzero(high[k])
         by = ", ".join(f"{steps[k, j]:.3g} {units[j]}" for j in joints)
         who = f"Joints {case.joints(high[k])} jump"
         if len(joints) == 1:
             who = f"Joint {case.joints(high[k])} jumps"
         text = f"{who} by {by} at {instant(record.t[k])} s"
-        if more := np.count_nonzero(np.diff(instants) > median):
+        if more := len(first) - 1:
             text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
-        if _wrap(steps, high, usual):
+        if _wrap(q, high, usual, median):
             remedy = "it wraps: unwrap it, or record counts and let signals: {reader: counts} do so"
         elif len(joints) == len(units):
             remedy = (
@@ -65,17 +70,27 @@ def jumps(case: Case) -> Answer:
     return Answer("good", "No joint jumps between two samples")
 
 
-def _wrap(steps: Array, high: Array, usual: Array) -> bool:
+def _runs(high: Array, median: int) -> tuple[Array, Array]:
+    """First and last steps of the jumps: a jump between two stamps that is resampled takes several
+    steps.
+    """
+    instants = np.flatnonzero(high)
+    apart = np.diff(instants) > max(median, LIMIT.JUMP_STEPS)
+    return instants[np.append(True, apart)], instants[np.append(apart, True)]
+
+
+def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
     """Whether all jumps of every joint have one size, more than once, as those of a count or an
     angle that starts anew.
     """
-    sizes = [s[h] for s, h in zip(steps.T, high.T, strict=True)]
-    again = [
-        len(x) > 1 and np.ptp(x) <= LIMIT.JUMP * u
-        for x, u in zip(sizes, usual, strict=True)
-        if len(x)
-    ]
-    return bool(again) and all(again)
+    around, again = LIMIT.JUMP_STEPS, []
+    for own, jump, step in zip(q.T, high.T, usual, strict=True):
+        if jump.any():
+            first, last = _runs(jump, median)
+            before = own[np.maximum(first - around, 0)]
+            sizes = np.abs(own[np.minimum(last + around, len(own) - 1)] - before)
+            again.append(len(sizes) > 1 and np.ptp(sizes) <= 2 * LIMIT.JUMP * step)
+    return all(again)
 
 
 @Question(
@@ -93,31 +108,42 @@ def cut_torques(case: Case) -> Answer | None:
         return None
     samples, moving = case.samples, case.samples.moving()
     at_bounds, shares = np.zeros_like(moving), np.zeros(samples.n)
-    for number, record in enumerate(case.records):
+    for number, one in enumerate(case.straight):
+        record, drives, own = one.record, one.drives, samples.record == number
         held = np.stack([_held(tau) for tau in record.tau.T], axis=1)
-        own = samples.record == number
+        if drives is not None:  # a motor that is clipped shows in every joint that it moves
+            motors = np.stack([_held(u) for u in drives.motor_command(record.tau).T], axis=1)
+            held |= motors @ (drives.ratio != 0)
         reach = max(1, round(0.5 * record.rate / samples.cutoff))
         near = np.searchsorted(record.t, samples.t[own])[:, None] + np.arange(-reach, reach + 1)
         at_bounds[own] = held[near.clip(0, len(record) - 1)].any(axis=1)
         shares = np.maximum(shares, held.mean(axis=0))
     if not at_bounds.any():
         return None
+    asked = at_bounds.any(axis=0) & (shares < LIMIT.TWO_BOUNDS)
     apart = moving & ~at_bounds
     with_them, without = (least_squares(case.grams(mask), 1.0).errors for mask in (moving, apart))
-    # a drive that knows its two bounds alone is no clipped signal
-    enough = apart.sum(axis=0) >= 0.5 * moving.sum(axis=0)
-    better = with_them / np.maximum(without, 0.3)
-    j = int(np.argmax(np.where(at_bounds.any(axis=0) & enough, better, 0.0)))
-    clipped = (
-        enough[j]
-        and with_them[j] > LIMIT.CHANGE * without[j]
-        and with_them[j] - without[j] > LIMIT.LEAST_CHANGE
+    columns = (case.D != 0).any(axis=0).sum(axis=1)
+    few = asked & (apart.sum(axis=0) < 2 * np.maximum(LIMIT.PART_ROWS, columns))
+    clear = with_them - without > LIMIT.LEAST_CHANGE
+    better = np.where(asked & ~few, with_them / np.maximum(without, 0.3), 0.0)
+    clipped = clear & (better > LIMIT.CHANGE)
+    j = int(np.argmax(better if clipped.any() else shares * (few if few.any() else 1)))
+    motor = " or of a motor that moves it" if case.straight[0].drives is not None else ""
+    text = (
+        f"The torque of joint {case.labels[j]}{motor} is at its largest or "
+        f"smallest value in {100 * shares[j]:.0f} % of the samples"
     )
+    if not asked.any():
+        return Answer(
+            "good", f"{text}: the drive knows these two alone, which is no clipped signal"
+        )
+    if few[j]:
+        return Answer("doubtful", f"{text}: too few others are left to tell what that changes")
     return Answer(
-        "no" if clipped else "good",
-        f"The torque of joint {case.model.JOINTS[j]} is at its largest or smallest value in "
-        f"{100 * shares[j]:.0f} % of the samples; without them the fit leaves {without[j]:.1f} % "
-        f"of it in place of {with_them[j]:.1f} %",
+        "no" if clipped[j] else "good",
+        f"{text}; without them the fit leaves {without[j]:.1f} % of it in place of "
+        f"{with_them[j]:.1f} %",
     )
 
 
@@ -127,7 +153,8 @@ def _held(tau: Array) -> Array:
     span = float(np.ptp(tau))
     for side in (1.0, -1.0):
         x = side * tau
-        levels, counts = np.unique(x[x >= x.max() - 0.2 * span], return_counts=True)
+        x = np.round(x / (1e-9 * span or 1.0))  # rounding of a conversion is no level
+        levels, counts = np.unique(x[x >= x.max() - 2e8], return_counts=True)
         if (
             span > 0
             and counts[-1] >= LIMIT.CUT * len(tau)
@@ -139,41 +166,68 @@ def _held(tau: Array) -> Array:
 
 @Question(
     "Is the robot the same from beginning to end?",
-    f"two fits in time leave more than 1/{LIMIT.CHANGE:g} of what one leaves",
+    f"other parameters from some instant on leave more than 1/{LIMIT.CHANGE:g} of what one fit "
+    "leaves, of unseen rows too",
     "a load, a gain or friction changed there, or two records are joined: use one part "
     "(rows.window), or name them as records of their own",
 )
 def change(case: Case) -> Answer | None:
-    """The instant at which two fits, before and after it, leave least, beside one fit."""
-    if case.silent:
+    """The instant from which other parameters, all of them or those of one link and its joint,
+    leave least, beside one fit, of the rows that gave them and of others.
+    """
+    if case.silent or case.physical is None:
         return None
-    samples, b, moving = case.samples, case.D.shape[2], case.samples.moving()
-    best, text = 1.0, "One fit serves all of it"
+    samples, moving = case.samples, case.samples.moving()
+    of_links = [
+        [k for k, name in enumerate(case.physical.standard) if re.search(rf"\D{link}$", name)]
+        for link in case.physical.links
+    ]
+    groups = [np.eye(case.D.shape[2]), *(case.physical.K[:, own] for own in of_links)]
+    turns = np.arange(len(samples)) * LIMIT.TURNS // len(samples) % 2
+    best, text = 0.0, "One fit serves all of it"
     for number in np.unique(samples.record):
         own = samples.record == number
         t = samples.t[own]
-        whole = case.grams(moving & own[:, None])
-        together = least_squares(whole, 1.0).errors
         for split in t[np.linspace(0, len(t) - 1, LIMIT.SPLITS + 2).astype(int)[1:-1]]:
-            parts = [
-                case.grams(moving & (own & side)[:, None])
-                for side in (samples.t < split, samples.t >= split)
-            ]
-            if any(
-                part.rows.sum() < LIMIT.PART_ROWS * b or part.rows.min() < 2 * LIMIT.PART_ROWS
-                for part in parts
-            ):
-                continue
-            left = sum(part.squares(least_squares(part, 1.0).X) for part in parts)
-            apart = 100 * np.sqrt(left / np.where(whole.measured > 0, whole.measured, 1.0))
-            clear = together - apart > LIMIT.LEAST_CHANGE
-            ratio = np.where(clear, together / np.maximum(apart, 0.3), 0.0)
-            j = int(np.argmax(ratio))
-            if ratio[j] > best:
-                best = float(ratio[j])
-                text = (
-                    f"Before and after {instant(round(float(split), 1))} s, fitted apart, "
-                    f"{apart[j]:.1f} % of the torque of joint {case.model.JOINTS[j]} stay "
-                    f"unexplained, fitted together {together[j]:.1f} %"
-                )
+            masks = [moving & (own & (turns == k))[:, None] for k in (0, 1)]
+            since = (samples.t >= split)[:, None]
+            parts = [(case.grams(mask), case.grams(mask & since)) for mask in masks]
+            rows = sum(np.minimum(whole.rows - later.rows, later.rows) for whole, later in parts)
+            together = _left(parts, groups[0][:, :0])
+            for K in groups:
+                few = rows.sum() < LIMIT.PART_ROWS * np.linalg.matrix_rank(K)
+                if few or rows.min() < 2 * LIMIT.PART_ROWS:
+                    continue
+                best, apart = max(best, 1.0), _left(parts, K)
+                clear = together - apart > LIMIT.LEAST_CHANGE
+                ratio = np.where(clear, together / np.maximum(apart, 0.3), 0.0).min(axis=0)
+                j = int(np.argmax(ratio))
+                if ratio[j] > best:
+                    best = float(ratio[j])
+                    text = (
+                        f"Before and after {instant(round(float(split), 1))} s, fitted apart, "
+                        f"{apart[0, j]:.1f} % of the torque of joint {case.labels[j]} stay "
+                        f"unexplained, fitted together {together[0, j]:.1f} %"
+                    )
+    if not best:
+        few = f"fewer than {LIMIT.PART_ROWS:g} rows a parameter before or after every instant"
+        return Answer("open", f"Not judged: {few}", "a longer record")
     return Answer("doubtful" if best > LIMIT.CHANGE else "good", text)
+
+
+def _left(parts: Sequence[tuple[Grams, Grams]], K: Array) -> Array:
+    """Errors of each joint, %, of Y = [D, D K since an instant] X, shape (2, n): of all rows, and
+    of each of two parts by the parameters of the other. parts : normal equations of all their rows,
+    and of the later ones.
+    """
+    M = np.vstack([K, np.zeros((1, K.shape[1]))])
+    both = []
+    for whole, later in parts:
+        beside = later.of_joints @ M
+        rows = [[M.T @ beside, beside.transpose(0, 2, 1)], [beside, whole.of_joints]]
+        both.append(replace(whole, of_joints=np.block(rows)))
+    one, two = both
+    joined = Grams(one.of_joints + two.of_joints, one.rows + two.rows, one.measured + two.measured)
+    X, X_one, X_two = (least_squares(grams, 1.0).X for grams in (joined, *both))
+    left = np.array([joined.squares(X), one.squares(X_two) + two.squares(X_one)])
+    return np.asarray(100 * np.sqrt(left / np.maximum(joined.measured, 1e-300)))

@@ -122,7 +122,8 @@ class Problem:
         back = self.F @ np.linalg.inv(alternative.T)
         still = ~moving(alternative.states(self.samples)[1])
         mask = still @ (np.abs(back) > 1e-12).T == 0
-        return back @ D, self.tau - self.samples.tau_known @ back.T, mask
+        known = alternative.known_factor * self.samples.tau_known
+        return back @ D, self.tau - known @ back.T, mask
 
     @property
     def tau(self) -> Array:
@@ -276,7 +277,8 @@ def tried(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[T
     """
     given, rows = problem.given, problem.samples.moving().sum(axis=0)
     bounds: list[tuple[float, Alternative, Grams]] = []
-    for alternative in alternatives(problem.model, problem.variants, sides):
+    known = np.flatnonzero(problem.samples.tau_known.any(axis=0)).tolist()
+    for alternative in alternatives(problem.model, problem.variants, sides, known):
         grams = problem.grams(alternative)
         if grams is not None and (grams.rows >= rows // 2).all():
             bounds.append((least_squares(grams, problem.N).score, alternative, grams))

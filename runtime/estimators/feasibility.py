@@ -13,9 +13,10 @@ Without limits on masses chi is not unique: different chi of one X give the same
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.semidefinite import (
@@ -24,6 +25,7 @@ from runtime.estimators.semidefinite import (
     Optimum,
     Prior,
     closest,
+    everything,
     margin,
     solutions,
 )
@@ -92,7 +94,7 @@ class Feasibility:
     margin : float, SI
         t*: kg m^2 or kg of a pseudo-inertia, unit of a friction parameter.
     feasible : bool
-        Whether t* >= 0.
+        Whether t* >= 0, or may be for all that the record tells (`within_noise`).
     physical : bool
         Whether some robot has them, whatever the limits that were given or guessed.
     blocking : tuple of (str, float)
@@ -113,6 +115,9 @@ class Feasibility:
         if self.physical and not self.feasible:
             named = ", ".join(name for name, _ in self.blocking)
             return f"physically feasible, but not within the bounds of masses and centres: {named}"
+        if self.feasible and self.blocking:
+            named = ", ".join(name for name, _ in self.blocking)
+            return f"physically feasible within the deviations of the record; at a bound: {named}"
         if self.feasible:
             least = "at least " if self.margin > 0.999 * LIMIT.LARGEST_MARGIN else ""
             return (
@@ -152,6 +157,35 @@ def feasibility(
             break
         released = margin(conditions, rows, space)
     return Feasibility(first.margin, not blocking, tuple(blocking), first.chi, not blocking)
+
+
+def within_noise(
+    judged: Feasibility, physical: PhysicalModel, names: Sequence[str], X: Array, covariance: Array
+) -> Feasibility:
+    """The same, feasible where a robot lies as near as noise takes an estimate from it: with C the
+    covariance of X, shape (b, b),
+
+        min ||X - K chi||^2_C^-1 <= the 99 % point of chi-square,
+
+    as many degrees of freedom as the conditions in the way have rows.
+    """
+    L = np.linalg.cholesky(covariance)
+    R, z = np.linalg.solve(L, physical.rows(names)), np.linalg.solve(L, X)
+    size = np.linalg.norm(z)
+    nearest = closest(
+        R / size,
+        z / size,
+        physical.conditions,
+        limit_rows(physical, None),
+        everything(scales(physical)),
+        least=LIMIT.MARGIN_ROUNDING,
+    )
+    blocked = dict(judged.blocking)
+    freedom = sum(c.B.shape[1] for c in physical.conditions if c.name in blocked)
+    far = float(np.sum((R @ nearest.chi - z) ** 2)) if nearest.solved else np.inf
+    if far > chi2.ppf(LIMIT.NOISE_LEVEL, freedom):
+        return judged
+    return replace(judged, feasible=True, physical=True, margin=0.0, chi=nearest.chi)
 
 
 def standard_parameters(

@@ -189,16 +189,16 @@ def fit(start: Beginning) -> Fitted:
     }
     violated = min(smallest.values()) < 0
     parts = (
+        "The solver left a condition violated: try another margin, a prior, or bounds on the "
+        "masses."
+        if violated
+        else "",
         f"Least squares ({method}) is {unconstrained.text}. With the conditions the relative error "
         f"is {given:.3f} % instead of {without:.3f} %; at their limit: "
         f"{', '.join(active) or 'none'}.",
         prior_text(physical, options, weight),
         guess,
         masses_text(masses, options),
-        "The solver left a condition violated: try another margin, a prior, or bounds on the "
-        "masses."
-        if violated
-        else "",
     )
     return Fitted(
         system,
@@ -350,7 +350,8 @@ def contradicted(
     """
     K = physical.rows(rows.names)
     errors: list[float] = []
-    for options in (replace(asked, prior="none", reach=None), replace(bounded, prior="none")):
+    for one in (replace(asked, reach=None), bounded):
+        options = replace(one, prior="none", weight="auto")  # a weight is of a prior
         try:
             chi = fitted(rows, physical, options, 0.0)
         except InputError:

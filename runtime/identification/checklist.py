@@ -76,11 +76,7 @@ class Checklist(Result):
         if self.worst is not None:
             return f"{self.worst.question} {self.worst.finding}."
         unanswered = [check.question for check in self.checks if check.state == "open"]
-        return (
-            f"none among the checks below. Not judged: {' '.join(unanswered)}"
-            if unanswered
-            else "none among the checks below."
-        )
+        return f"none. Not judged: {' '.join(unanswered)}" if unanswered else "none."
 
     @property
     def next(self) -> str:
@@ -198,8 +194,8 @@ def checklist_of(
         differ = homogeneity is not None and homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE
         checks += [
             explained(fit),
-            explained_by_joint(estimate, fit),
-            predicted(fit, prediction_error, halves, differ=differ),
+            explained_by_joint(estimate, fit, expected),
+            predicted(fit, prediction_error, halves, differ=differ, expected=expected),
             None if homogeneity is None else agreeing(homogeneity),
             expected_off(expected),
             signs(negative),
@@ -274,13 +270,18 @@ def explained(fit: Estimate) -> Answer:
 
 
 @Question("On every joint?", f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)")
-def explained_by_joint(estimate: Estimate, fit: Estimate) -> Answer | None:
-    """Error of the worst joint, which a total hides; no check of a single joint."""
+def explained_by_joint(
+    estimate: Estimate, fit: Estimate, expected: float = float("nan")
+) -> Answer | None:
+    """Error of the worst joint, which a total hides; no check of a single joint. Where predictions
+    are expected to be good (`expected`, %), a joint is no reason for a "no".
+    """
     if len(fit.per_joint) < 2:
         return None
     worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+    state = _state(worst.relative_error, *LIMIT.JOINT_ERROR)
     return Answer(
-        _state(worst.relative_error, *LIMIT.JOINT_ERROR),
+        "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR[0] else state,
         f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained",
         lost_joints(estimate, fit)
         or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
@@ -319,11 +320,19 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
 
 
 @Question("Does it predict data it has not seen?")
-def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool = False) -> Answer:
+def predicted(
+    fit: Estimate,
+    error: float,
+    halves: bool = False,
+    *,
+    differ: bool = False,
+    expected: float = float("nan"),
+) -> Answer:
     """Largest relative error, %, on data that did not give the parameters; open where it is nan.
 
     halves : it is that of a half of the record, fitted from the other half. Half a record may lack
-    what the whole one shows: good up to the second limit, never a "no".
+    what the whole one shows: good up to the second limit, or up to the last one where predictions
+    of the whole are expected to be good (`expected`, %); never a "no".
     differ : records disagree by more than LIMIT.RELEVANT_DIFFERENCE.
     """
     limits = [
@@ -331,7 +340,8 @@ def predicted(fit: Estimate, error: float, halves: bool = False, *, differ: bool
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
     if halves:
-        limits = [limits[1], np.inf]
+        sure = expected <= LIMIT.EXPECTED_ERROR[0]
+        limits = [LIMIT.PREDICTION_MOST[1] if sure else limits[1], np.inf]
     state: State = "open" if not np.isfinite(error) else _state(error, *limits)
     remedy = "a longer or richer record"
     if "standard" not in fit.details:

@@ -1,8 +1,9 @@
 """Which of several treatments of the same records predicts best? One call for "with all rows or
 without rest, with the counterbalance known or not".
 
-Every candidate is identified on its own terms; the set of parameters that is printed first stands
-for it (`runtime.identification.parameter_sets`). All of them are then judged on the
+Every candidate is identified on its own terms; of its sets of parameters
+(`runtime.identification.parameter_sets`) the one that predicts the validation records best stands
+for it, the essential one too. All of them are then judged on the
 same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out
 what it cannot explain,
 
@@ -29,11 +30,14 @@ from runtime.checks.motion import low_speed_of_rest
 from runtime.checks.plausibility import plausibility
 from runtime.checks.samples import samples_of
 from runtime.errors import InputError
+from runtime.estimators.estimate import Estimate
 from runtime.identification.identification import identify
-from runtime.identification.parameter_sets import ORDER
+from runtime.identification.parameter_sets import ORDER, SetName, best_set
 from runtime.identification.result import Identification
+from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.progress import at
+from runtime.records.law import require_found
 from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.rows.observe import observe
@@ -57,12 +61,15 @@ class Ranking:
         By name of the candidate, the best first.
     errors : mapping of str to mapping of str to float, %
         e_ck, by candidate, then by the treatment that it is judged in.
+    standing : mapping of str to (str, Estimate)
+        The set of parameters that stands for each candidate, and its name.
     missing : tuple of str
         Candidates that could not be identified, each with its reason.
     """
 
     results: Mapping[str, Identification]
     errors: Mapping[str, Mapping[str, float]]
+    standing: Mapping[str, tuple[SetName, Estimate]]
     missing: tuple[str, ...] = ()
 
     @property
@@ -82,7 +89,7 @@ class Ranking:
     def verdict(self) -> str:
         """The order, in one sentence."""
         first, *others = [
-            f"{name} ({columns_text(self.results[name])}) {error:.1f} %"
+            f"{name} ({columns_text(*self.standing[name])}) {error:.1f} %"
             for name, error in self.mean_errors.items()
         ]
         then = f"; then {', '.join(others)}" if others else ""
@@ -101,8 +108,8 @@ class Ranking:
         rows = [
             (
                 name,
-                columns_text(result),
-                f"{result.model_estimate.relative_error:.2f}",
+                columns_text(*self.standing[name]),
+                f"{self.standing[name][1].relative_error:.2f}",
                 f"{self.mean_errors[name]:.2f}",
                 *(
                     f"{result.set_errors[own]:.2f}" if own in result.set_errors else "-"
@@ -125,9 +132,9 @@ class Ranking:
             {
                 "name": name,
                 "status": result.estimate.status,
-                "columns": result.model_columns,
-                "count": len(result.model_estimate.names),
-                "fit": result.model_estimate.relative_error,
+                "columns": self.standing[name][0],
+                "count": len(self.standing[name][1].names),
+                "fit": self.standing[name][1].relative_error,
                 "unseen": self.mean_errors[name],
                 "unseen_by_rows": self.errors[name],
                 "unseen_by_set": result.set_errors,
@@ -191,13 +198,12 @@ def compare(
             else "no treatment; expected one or more to compare"
         )
     unseen = {name: opened[name][2] for name in results}
+    standing = {name: standing_set(result) for name, result in results.items()}
     errors = {
-        name: {
-            other: _error(model, result, unseen[name], results[other].study) for other in results
-        }
-        for name, result in results.items()
+        name: {other: _error(model, fit, unseen[name], results[other].study) for other in results}
+        for name, (_, fit) in standing.items()
     }
-    means = Ranking(results, errors).mean_errors
+    means = Ranking(results, errors, standing).mean_errors
     order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
     if variants is not None:
         study, records, _ = opened[order[0]]
@@ -206,6 +212,7 @@ def compare(
     return Ranking(
         {name: results[name] for name in order},
         {name: errors[name] for name in order},
+        standing,
         tuple(missing),
     )
 
@@ -229,9 +236,21 @@ def treatments(model: GeneratedModel, candidate: Candidate) -> dict[str, Candida
     return found
 
 
-def columns_text(result: Identification) -> str:
-    """The set of parameters that stands for the robot, and their number."""
-    return f"{result.model_columns} parameters, {len(result.model_estimate.names)}"
+def standing_set(result: Identification) -> tuple[SetName, Estimate]:
+    """The set of parameters that predicts data it has not seen best (`best_set`, the essential one
+    among them), and its name.
+    """
+    name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
+    fit = result.sets.get(name, result.estimate)
+    if name == "essential" and not result.sets:  # of a method that is not linear
+        own = replace(result.study.estimate, columns=result.essential.names)
+        fit = estimate_of(result.observation, own, model=result.model)
+    return name, fit
+
+
+def columns_text(name: SetName, fit: Estimate) -> str:
+    """A set of parameters, and their number."""
+    return f"{name} parameters, {len(fit.names)}"
 
 
 def _opened(
@@ -242,6 +261,7 @@ def _opened(
             read_records(x, model, missing=candidate.signals.admits_missing)
             for x in (candidate.record, candidate.validate.record)
         )
+        require_found(candidate.record, (record.measured for record in (*own, *unseen)))
         return candidate, own, unseen
     study, records, further = candidate
     own, unseen = ([x] if isinstance(x, Record) else list(x) for x in (records, further))
@@ -270,13 +290,10 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
         )
 
 
-def _error(
-    model: GeneratedModel, result: Identification, unseen: Sequence[Record], study: Study
-) -> float:
-    """Residual of a result on validation records treated as by `study`, % of the measured
+def _error(model: GeneratedModel, fit: Estimate, unseen: Sequence[Record], study: Study) -> float:
+    """Residual of an estimate on validation records treated as by `study`, % of the measured
     torque.
     """
-    fit = result.model_estimate
     residual, _ = observe(model, unseen, study).norms(fit.names, fit.X)
     _, total = observe(model, [replace(record, tau_known=None) for record in unseen], study).norms(
         (), np.zeros(0)

@@ -135,4 +135,4 @@ def recoupled(record: Record | Stream, used: Drives, wanted: Drives) -> Record |
     if not isinstance(record, Record):
         return ChangedStream.of(record, change, wanted)
     q, tau = change(record.q, record.tau)
-    return replace(record, q=q, tau=tau, origin=replace(record.origin, drives=wanted))
+    return record.moved(q, tau=tau, origin=replace(record.origin, drives=wanted))

@@ -12,7 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
 
 from runtime.blas import single_threaded
 from runtime.checks.plausibility import plausibility
@@ -21,11 +23,15 @@ from runtime.estimators.essential import essential_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR, linear_companion
 from runtime.identification.coupling import coupling_fits
+from runtime.identification.cutoff_errors import cutoff_errors, cutoff_text
+from runtime.identification.elastic import elasticity
 from runtime.identification.friction import friction_curves
 from runtime.identification.homogeneity import homogeneity
+from runtime.identification.laws import fit_laws
 from runtime.identification.parameter_sets import SetName, best_set, parameter_sets
 from runtime.identification.payload_study import payload_study
 from runtime.identification.result import Identification
+from runtime.identification.torque_law import completed, gain_doubt
 from runtime.identification.uncertainty import uncertainty
 from runtime.identification.validation import (
     CrossValidation,
@@ -37,7 +43,8 @@ from runtime.identification.validation import (
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of, simulator_of
 from runtime.loop.methods import observed as method_observation
-from runtime.model.generated import GeneratedModel
+from runtime.model.bound import BoundModel
+from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import physical_model
 from runtime.parallel import Workers, started
 from runtime.progress import at
@@ -49,6 +56,7 @@ from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import halves
 from runtime.rows.prepared import Prepared, prepared, resolved
+from runtime.settings.record import behind_gears
 from runtime.settings.study import Study
 
 if TYPE_CHECKING:
@@ -58,6 +66,9 @@ if TYPE_CHECKING:
 __all__ = ["Identification", "assess", "feasibility_of", "identify", "whole_records"]
 
 T = TypeVar("T")
+SIMULATING = ("iv", "didim", "cloe")
+OF_DRIVES = ("inertia", "viscous", "coulomb")
+"""Kinds of elements in which sensors behind the gears have no part."""
 
 
 @single_threaded
@@ -118,12 +129,25 @@ def identify(
         A record, setting or extra that does not suit what is asked for.
     """
     records = tuple(records) if isinstance(records, Sequence) else (records,)
-    asked_study = study or Study()
+    asked_study = of_links(model, study or Study())
     study, lowpass = resolved(asked_study, records)
     own = tuple(
         record if isinstance(record, Stream) else prepared(model, record, study)
         for record in records
     )
+    laws = None
+    if hasattr(model, "FIT"):
+        if study.estimate.method in SIMULATING:
+            raise InputError(
+                f"scalars of laws are not fitted by {study.estimate.method}, which simulates the "
+                "loop with those of the file; fit them by ols, then fix them: fit: {vs: 0.08}"
+            )
+        at("scalars of laws")
+        asked_columns = study.estimate.columns
+        columns = model.BASE_PARAMETERS if asked_columns == "all" else tuple(asked_columns)
+        weights = study.estimate.weights != "none"
+        laws = fit_laws(model, whole_records(own), columns, weights=weights)
+        model = cast(GeneratedModel, BoundModel(model, laws.constants))
     chosen = {"lowpass": lowpass} if lowpass else {}
     provenance = {**origin(records), **chosen, **(provenance or {})}
     simulator = simulator or simulator_of(model, study)
@@ -132,6 +156,9 @@ def identify(
             study.validate.record, model, study.stream, missing=study.signals.admits_missing
         )
     asked = variants is not None if plausible is None else plausible
+    own, further, law = completed(model, study, own, further)
+    if law is not None:
+        provenance["law"] = law.summary()
     with started(workers) as processes:
         judged = (
             processes.meanwhile(partial(plausibility, model, own, asked_study, variants=variants))
@@ -140,6 +167,17 @@ def identify(
         )
         observed = partial(method_observation, model, study=study, workers=processes)
         observation = observed(own, simulator=simulator)
+        if law is not None:
+            findings = (*observation.findings, law.text)
+            observation = replace(observation, findings=findings)
+        memory = [one for one in own if isinstance(one, Prepared)]
+        short = sum(len(one.record) for one in memory) <= LIMIT.CUTOFF_SAMPLES
+        low = asked_study.signals.lowpass
+        if asked and lowpass and low and low.cutoff == "auto" and len(memory) == len(own) and short:
+            at("other cut-offs")
+            by_cutoff = cutoff_errors(model, memory, study)
+            hertz = study.signals.lowpass.hertz if study.signals.lowpass else 0.0
+            provenance["lowpass"] = lowpass + cutoff_text(by_cutoff, hertz)
         at("least squares, essential parameters")
         reduced = essential_of(
             observation,
@@ -160,6 +198,8 @@ def identify(
                 "all": study.estimate,
                 "essential": replace(study.estimate, columns=reduced.names),
             }
+        if doubt := gain_doubt(model, study, own, fit.relative_error):
+            observation = replace(observation, findings=(*observation.findings, doubt))
         windows = study.validate.split or halves(*observation.span)
         names = record_names([*records, *further])
         fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
@@ -202,6 +242,7 @@ def identify(
             agreement = homogeneity(parts, columns, study.estimate, model=model)
             if not agreement.untested:  # else fewer columns, that each record determines
                 break
+        held = [one for one in own if isinstance(one, Prepared)]
         result = Identification(
             model=model,
             study=study,
@@ -219,11 +260,17 @@ def identify(
                 model, own, study, observation, fit, partial(observed, windows=())
             ),
             uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
+            laws=laws,
         )
         if physical and not result.determined:
             groups = "; ".join(", ".join(group) for group in fit.groups)
             text = f"physical consistency: the record does not tell apart {groups}"
             result, physical = replace(result, missing=(*result.missing, text)), False
+        gears = elasticity(model, held, fit.names, fit.X) if result.determined else None
+        if gears is not None:
+            told = (*observation.findings, *gears.sentences)
+            fit = replace(fit, provenance={**fit.provenance, "elastic": gears.summary()})
+            result = replace(result, observation=replace(observation, findings=told), estimate=fit)
         whole = whole_records(own) if friction or study.payload is not None else []
         return replace(
             result,
@@ -236,18 +283,37 @@ def identify(
         )
 
 
-def feasibility_of(result: Identification) -> Feasibility:
-    """Whether a physical robot can have the parameters of an identification."""
-    from runtime.estimators.feasibility import feasibility
+def of_links(model: GeneratedModel, study: Study) -> Study:
+    """The study, where torques were measured behind the gears without the columns of the drives."""
+    settings = [*study.record, *study.validate.record]
+    if study.estimate.columns != "all" or not behind_gears(settings):
+        return study
+    kinds = {name: element[0] for name, element in elements_of(model).items()}
+    own = tuple(name for name in model.BASE_PARAMETERS if kinds.get(name) not in OF_DRIVES)
+    return replace(study, estimate=replace(study.estimate, columns=own))
 
-    return feasibility(physical_model(result.model), result.estimate.names, result.estimate.X)
+
+def feasibility_of(result: Identification) -> Feasibility:
+    """Whether a physical robot can have the parameters of an identification, or others that the
+    record does not tell from them.
+    """
+    from runtime.estimators.feasibility import feasibility, within_noise
+
+    physical, fit = physical_model(result.model), result.estimate
+    judged = feasibility(physical, fit.names, fit.X)
+    if judged.feasible or fit.covariance is None or not np.isfinite(fit.covariance).all():
+        return judged
+    wider = max(1.0, float(np.median(fit.sigma_corrected / fit.sigma)))
+    return within_noise(judged, physical, fit.names, fit.X, wider**2 * fit.covariance)
 
 
 def whole_records(records: Sequence[Prepared | Stream]) -> list[Prepared]:
     """The records, all of them in memory; InputError where one is read by blocks."""
     whole = [record for record in records if isinstance(record, Prepared)]
     if len(whole) < len(records):
-        raise InputError("a load and friction curves need whole records; set stream: off")
+        raise InputError(
+            "a load, friction curves and scalars of laws need whole records; set stream: off"
+        )
     return whole
 
 

@@ -73,6 +73,8 @@ def parameter_sets(
         fit = estimate_of(observation, own, model=model)
     except InputError as e:
         return sets, how, f"physical parameters: {e}"
+    if fit.status != "ok":
+        return sets, how, f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
     sets["feasible"] = fit
     prior = fit.details["options"]["prior"] != "none"
     how["feasible"] = (

@@ -20,9 +20,11 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
+from runtime.identification.cutoff_errors import BETTER
 from runtime.identification.expected_error import expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
+from runtime.identification.laws import FittedLaws
 from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
 from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.uncertainty import Uncertainty
@@ -105,6 +107,8 @@ class Identification:
         empty where the method of the study is not linear.
     homogeneity : Homogeneity or None
         Whether several records, further ones included, agree; None for one record.
+    laws : FittedLaws or None
+        Scalars of the laws of the model; None where it has none.
     missing : tuple of str
         Parts that were asked for and could not be done, each with its reason.
     """
@@ -128,6 +132,7 @@ class Identification:
     plausibility: Plausibility | None = None
     sets: Mapping[SetName, Estimate] = field(default_factory=dict)
     homogeneity: Homogeneity | None = None
+    laws: FittedLaws | None = None
     missing: tuple[str, ...] = ()
 
     @property
@@ -323,8 +328,9 @@ class Identification:
             if self.observation.n > 1
             else ""
         )
+        most = "at most " if ", " in self.unseen else ""  # the largest of several records
         unseen = (
-            f", and {self.prediction_error:.1f} % of {self.unseen}"
+            f", and {most}{self.prediction_error:.1f} % of {self.unseen}"
             if np.isfinite(self.prediction_error)
             else ""
         )
@@ -336,16 +342,23 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to look at before the values are used, in sentences: joints without rows, signs that
-        no drive has, torques that may be currents, lost joints, parameters that trade.
+        """What to look at before the values are used, in sentences: `own_warnings`, then parameters
+        that trade.
         """
+        return (*self.own_warnings, *self.correlations.warnings)
+
+    @property
+    def own_warnings(self) -> tuple[str, ...]:
+        """Joints without rows, signs that no drive has, doubtful units of torque, lost joints."""
+        by_law = any(one.by_law for one in self.study.record)
         signs = (
-            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: a "
+            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
+            f"{'kd of the law is larger than that of the drive, or ' * by_law}a "
             "sign of the joint is wrong (ratio, torque constant or "
             "column), or its coupling, unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
-        unit = torque_unit_doubt(self.model, self.observation)
+        unit = torque_unit_doubt(self.model, self.observation, by_law)
         unused = unused_joints(self.observation.rows, self.observation.dropped, self.model.JOINTS)
         sentences = (
             unused,
@@ -353,10 +366,51 @@ class Identification:
             f"{unit}." if unit else "",
             f"{lost}." if lost else "",
         )
-        return (*(sentence for sentence in sentences if sentence), *self.correlations.warnings)
+        return tuple(sentence for sentence in sentences if sentence)
 
     def __str__(self) -> str:
-        return self.to_text()
+        return self.brief()
+
+    def brief(self) -> str:
+        """Values with their 95 % intervals, errors by joint, what to look at, what was asked for
+        besides; the verdict with its largest doubt and the next step last.
+        """
+        fit = self.model_estimate
+        values = [
+            f"{name} {value:.4g} +- {1.96 * sigma:.2g}"
+            for name, value, sigma in zip(fit.names, fit.X, fit.sigma_corrected, strict=True)
+        ]
+        columns = 4
+        shown = values[: columns * LIMIT.LINES_OF_VALUES]
+        width = max(map(len, shown), default=0) + 2
+        rows = [shown[k : k + columns] for k in range(0, len(shown), columns)]
+        more = len(values) - len(shown)
+        head = (
+            f"{len(values)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
+            f"{fit.method}, SI units, +- 95 %"
+        )
+        by_joint = ", ".join(f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint)
+        cutoff = self.estimate.provenance.get("lowpass", "")
+        notes = [*self.observation.findings, *self.own_warnings, *self.missing]
+        notes += [cutoff] if BETTER in cutoff else []
+        asked = (self.payload, *self.friction)
+        parts = [
+            "\n".join(
+                [
+                    head + (f"; {more} more by --verbose" if more else ""),
+                    *("".join(value.ljust(width) for value in row).rstrip() for row in rows),
+                    f"Unexplained by joint: {by_joint}",
+                ]
+            )
+            if self.determined and self.usable
+            else "",
+            "\n".join(f"note: {note}" for note in notes),
+            self.laws.line if self.laws else "",
+            *(table.to_table() for table in asked if table is not None),
+            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
+            self.checklist.to_text(),
+        ]
+        return "\n\n".join(part for part in parts if part)
 
     def _repr_html_(self) -> str:
         parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()
@@ -364,7 +418,7 @@ class Identification:
 
     def to_text(self) -> str:
         """Parameters, trail, validation, parameters that trade, uncertainty, coupling, what was
-        asked for besides, then the verdict.
+        asked for besides, then the verdict: all that `brief` leaves out.
         """
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
@@ -386,7 +440,7 @@ class Identification:
             for key, own in self.coupling.items()
         ]
         tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
-        last: tuple[Any, ...] = (self.payload, *self.friction)
+        last: tuple[Any, ...] = (self.laws, self.payload, *self.friction)
         parts = [
             *(table.to_table() for table in tables),
             "\n".join([*records, *self.time_stamps]),
@@ -404,7 +458,7 @@ class Identification:
             self.resolution.to_table() if self.resolution else "",
             *self.missing,
             self.plausibility.line if self.plausibility else "",
-            self.verdict,
+            self.checklist.to_text(),
         ]
         return "\n\n".join(part for part in parts if part)
 
@@ -488,6 +542,7 @@ class Identification:
             },
             **({"by_record": self.record_errors} if self.record_errors else {}),
             "verdict": self.verdict,
+            "checklist": self.checklist,
             "sets": [
                 {
                     "name": name,
@@ -519,6 +574,7 @@ class Identification:
             summary["plausibility"] = self.plausibility
         return {
             **summary,
+            **({"laws": self.laws.summary()} if self.laws else {}),
             **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {}),
         }
 

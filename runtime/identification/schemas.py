@@ -101,6 +101,8 @@ class IdentificationDocument(Estimate):
         Of several records, the error of each, with the parameters that stand for the robot.
     verdict : str
         One sentence.
+    checklist : mapping
+        Question by question whether the values can be used; the answer in a word.
     feasibility : mapping
         Whether a physical robot can have the parameters.
     payload : mapping
@@ -109,6 +111,8 @@ class IdentificationDocument(Estimate):
         Torque constants of the drives, from the load.
     friction : tuple of mapping
         Friction against velocity, one curve per joint.
+    laws : mapping
+        Scalars of the laws of columns, and what these are worth on unseen data.
     plausibility : mapping
         Whether record, study and robot file suit each other.
     """
@@ -121,10 +125,12 @@ class IdentificationDocument(Estimate):
     coupling: dict[Coupling, CouplingDocument]
     by_record: tuple[RecordError, ...]
     verdict: str
+    checklist: dict[str, Any]
     feasibility: dict[str, Any]
     payload: dict[str, Any]
     drive_gains: dict[str, Any] | None
     friction: tuple[dict[str, Any], ...]
+    laws: dict[str, Any]
     plausibility: dict[str, Any]
 
 

@@ -323,7 +323,7 @@ def _reference(
     if all(getattr(given, name) is None for name in ("file", "motion", "points", "record")):
         raise SettingsError(
             f"what the controller followed in {record.file} is not known; give columns qr1 ... "
-            "(record.columns.qr) or controller.reference, or say "
+            "(record.columns.q_ref) or controller.reference, or say "
             "estimate.options.reference: measured",
             path=("controller", "reference"),
         )

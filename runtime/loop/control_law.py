@@ -11,7 +11,6 @@ g_j = J_j(X)/J_j(reference) a simulation with other parameters keeps the bandwid
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -125,22 +124,16 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
             )
         return np.broadcast_to(x, (n,)).copy()
 
-    gain, kp, kd, kv, ki, cv, ca = (
-        each(f"law.{key}", getattr(law, key))
-        for key in ("gain", "kp", "kd", "kv", "ki", "cv", "ca")
-    )
-    if not kp.all():
+    if "fit" in (law.kd, law.delay):
         raise SettingsError(
-            f"{law.kp}; expected a gain for every joint: nothing else holds its position",
-            path=("controller", "law", "kp"),
+            "fit; a loop is simulated with numbers, found by identify", path=("controller", "law")
         )
+    gains = law.gains(n)
     one, zero = np.ones(n), np.zeros(n)
     if law.kind == "pid":
-        gains = {"P": kp, "Vr": kd, "Vm": kd, "K": ki}
         integral = {"Ie": one, "Ir": zero, "Im": zero}
     else:
-        gains = {"P": kv * kp, "Vr": kv * cv, "Vm": kv, "K": ki}
-        integral = {"Ie": kp, "Ir": cv, "Im": one}
+        integral = {"Ie": each("law.kp", law.kp), "Ir": each("law.cv", law.cv), "Im": one}
     drives = (
         drives_of(model) if controller.encoder.side == "motor" else Drives(np.eye(n), zero, one)
     )
@@ -150,25 +143,18 @@ def control_law(controller: Controller, model: GeneratedModel) -> ControlLaw:
         )
     weights = (0.0, 0.5) if controller.velocity == "averaged" else (1.0, 0.0)
     return ControlLaw(
-        **{key: gain * x for key, x in gains.items()},
+        **gains,
         **integral,
         antiwindup=each("law.antiwindup", law.antiwindup, np.inf),
-        saturation=each("torque.saturation", _saturation(controller, model.LIMITS), np.inf),
+        saturation=each("torque.saturation", controller.torque.largest(model.LIMITS), np.inf),
         torque_step=each("torque.step", controller.torque.step),
         encoder_step=each("encoder.step", controller.encoder.step),
         encoder_noise=each("encoder.noise", controller.encoder.noise),
-        ca=gain * ca,
+        ca=each("law.gain", law.gain) * each("law.ca", law.ca),
         flags=np.array([1 / controller.rate, controller.delay, *weights]),
         R=drives.ratio,
         offset=drives.offset,
     )
-
-
-def _saturation(controller: Controller, limits: Mapping[str, Any]) -> PerJoint[float] | None:
-    given = controller.torque.saturation
-    if given != "limits":
-        return given
-    return tuple(limits["tau"]) if "tau" in limits else None
 
 
 def parameters_of(model: GeneratedModel, controller: Controller | None = None) -> Array:

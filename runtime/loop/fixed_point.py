@@ -29,6 +29,7 @@ from runtime.limits import LIMIT
 from runtime.loop.closed_loop import ClosedLoop, LoopOptions
 from runtime.loop.control_law import parameters_of
 from runtime.loop.result import Simulation
+from runtime.model.generated import joint_labels
 from runtime.progress import at
 from runtime.settings.schema import Count, Positive, Real
 
@@ -138,9 +139,11 @@ def iterate(
     if J is not None and not np.all(J > 0):
         raise InputError(
             f"gains: {options.gains}: these parameters have no positive inertia about joint "
-            f"{int(np.argmin(J)) + 1}; refer the gains to others: "
-            "estimate.options.gains: values, start, or one"
+            f"{joint_labels(loop.model)[int(np.argmin(J))]}; {_physical_start(loop, start)}"
         )
+    remedy = _physical_start(loop, start)
+    if options.start not in ("ols", "unit") and np.all(loop.inertia(full(names, X, every)) > 0):
+        remedy = "look at the controller of the study: law, gains, rate, delay, reference"
     trail: list[dict[str, Any]] = []
     step: Step | None = None
     converged = False
@@ -152,7 +155,13 @@ def iterate(
                 + (f", largest change {trail[-1]['change']:.2g} deviations" if trail else "")
             )
             X, g, runs, message = _simulated(
-                loop, names, every, X, trail[-1]["X"] if trail else None, J if rescaled else None
+                loop,
+                names,
+                every,
+                X,
+                trail[-1]["X"] if trail else None,
+                J if rescaled else None,
+                remedy,
             )
             if step is not None and message:
                 return Fixed(step, tuple(trail), False, _contraction(trail), message)
@@ -175,6 +184,24 @@ def iterate(
     return Fixed(step, tuple(trail), converged, _contraction(trail))
 
 
+def _physical_start(loop: ClosedLoop, start: Beginning) -> str:
+    """What to start from where parameters are not those of a physical robot: values of the robot
+    file if these have an inertia about every joint, else those of method feasible.
+    """
+    try:
+        X = full(
+            start.observation.names, initial(loop, start, "values"), loop.model.BASE_PARAMETERS
+        )
+        if np.all(loop.inertia(X) > 0):
+            return "set estimate.options: {start: values, gains: values}, those of the robot file"
+    except InputError:
+        pass
+    return (
+        "identify with estimate: {method: feasible} first, and give its parameters by name as "
+        "estimate.options.start, with gains: start"
+    )
+
+
 def _simulated(
     loop: ClosedLoop,
     names: Sequence[str],
@@ -182,9 +209,10 @@ def _simulated(
     X: Array,
     before: Array | None,
     J: Array | None,
+    remedy: str,
 ) -> tuple[Array, Array, Sequence[Simulation], str]:
     """X that can be simulated, on the way from the last one that could; g, the runs, and why none
-    could be made.
+    could be made. remedy : what the error of the first one says.
     """
     reason = ""
     for _ in range(LIMIT.HALVINGS + 1):
@@ -201,9 +229,8 @@ def _simulated(
             reason = str(e)
             if before is None:
                 raise InputError(
-                    f"the loop cannot be simulated with the parameters it starts from: {reason}. "
-                    "Those of least squares need not be physical: "
-                    "give estimate.options.start: values (robot file), unit, or parameters by name"
+                    f"the loop cannot be simulated with the parameters it starts from: {reason}; "
+                    f"{remedy}"
                 ) from None
             X = (X + before) / 2
     return (

@@ -185,7 +185,8 @@ def of_record(record: Record, controller: Controller) -> Reference:
     where, every = ("controller", "reference", "record"), controller.record_every
     if record.q_r is None:
         raise SettingsError(
-            f"{record.file} holds no reference; name its columns in record.columns.qr", path=where
+            f"{record.file} holds no reference; name its columns in record.columns.q_ref",
+            path=where,
         )
     require_rate(record, controller)
     return Reference.sampled(record.q_r, controller.rate / every).at_rate(every)

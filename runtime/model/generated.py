@@ -309,15 +309,18 @@ def _check_names(model: GeneratedModel, label: str) -> None:
 
 
 def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
-    """Two samples at rest through `store` and `observation_matrix`."""
+    """Two samples at rest through `store` and `observation_matrix`, general loops at their
+    start.
+    """
     N = 2
     rest = np.zeros((N, n))
+    q = rest + getattr(model, "_START", rest[0])[:n]
     try:
         shape = np.shape(model.store(N))
         with np.errstate(all="ignore"):
             shapes = (
-                np.shape(model.regressor(rest, rest, rest)),
-                np.shape(model.observation_matrix(rest, rest, rest)),
+                np.shape(model.regressor(q, rest, rest)),
+                np.shape(model.observation_matrix(q, rest, rest)),
             )
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(

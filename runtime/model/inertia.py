@@ -35,7 +35,12 @@ from runtime.model.generated import GeneratedModel, elements_of, require
 Array = np.ndarray
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-SIGNED = ("inertia", "viscous", "coulomb")  # kinds of elements whose parameter is not negative
+SIGNED = (
+    "inertia",
+    "viscous",
+    "coulomb",
+    "dissipative",
+)  # kinds of elements whose parameter is not negative
 FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefinite
 
 

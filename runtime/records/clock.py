@@ -7,6 +7,7 @@ that rate.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ import numpy as np
 from runtime.errors import InputError, instant
 from runtime.records.remedies import remedies
 from runtime.records.time_stamps import time_stamps
+from runtime.settings.yaml import yaml_values
 
 Array = np.ndarray
 
@@ -120,11 +122,13 @@ def rate_of(stamps: Stamps, t: Array) -> float:
             if regularity.regular and regularity.jitter <= stamps.jitter
             else f". {remedies(t, regularity, arrays=stamps.column is None)}"
         )
+        setting = re.search(r"record\.resample: (\{[^}]*\})", cure)
         raise InputError(
             f"{e.message.removesuffix(HINT)}. In all: {regularity.to_text(stamps.row)}{cure}",
             file=e.file,
             column=e.column,
             row=e.row,
+            remedy={"resample": yaml_values(setting[1], file="remedy")[0]} if setting else None,
         ) from None
 
 

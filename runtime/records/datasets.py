@@ -78,7 +78,7 @@ TX40 = Dataset(
 _EMPS_RECORD: dict[str, Any] = {
     "dataset": "emps",
     "files": ["DATA_EMPS.mat"],
-    "columns": {"t": "t", "q": ["qm"], "tau": ["vir"], "qr": ["qg"]},
+    "columns": {"t": "t", "q": ["qm"], "tau": ["vir"], "q_ref": ["qg"]},
     "scale": {"tau": "gtau"},  # force = gtau*vir, N/V
     "side": "joint",
     "rate": 1000,

@@ -17,10 +17,11 @@ from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.records.formats.columns import Array, Table
 from runtime.records.formats.joint_states import joint_columns, named_columns
+from runtime.records.likely_columns import likely_columns
 from runtime.settings.record import BY_NAME, NONE, Columns, RecordSettings
 from runtime.settings.units import COMMANDS, position_unit, torque_unit
 
-QUANTITIES = ("t", "q", "q_r", "tau", "tau_ff", "tau_known")
+IN_FIRST = ("t", "q", "q_r", "qd", "qd_ref", "q_link")  # in the file of the positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,8 @@ class Conversion:
         Drives behind which each was measured; None: joint side.
     drives : Drives or None
         Those of the robot, coupled as the record says.
+    constant : ndarray, shape (n,), N m/A or N m/V, or None
+        Torque constants, of commands that are currents or voltages.
     """
 
     positions: Array
@@ -42,6 +45,7 @@ class Conversion:
     of_positions: Drives | None
     of_torques: Drives | None
     drives: Drives | None
+    constant: Array | None = None
 
     def position(self, q: Array) -> Array:
         """Joint positions, rad or m; q, shape (N, n), as in the file."""
@@ -58,6 +62,10 @@ class Conversion:
         root = np.linalg.inv(self.of_positions.motion)
         return np.asarray(np.abs(root) > 1e-12 * np.abs(root).max(axis=1, keepdims=True))
 
+    def velocity(self, qd: Array) -> Array:
+        """Joint velocities, rad/s or m/s; qd, shape (N, n), as in the file."""
+        return np.asarray(self.position(qd) - self.position(np.zeros_like(qd[:1])))
+
     def torque(self, tau: Array) -> Array:
         """Joint torques, N m or N; tau, shape (N, n), as in the file."""
         tau = tau * self.commands
@@ -71,12 +79,11 @@ def conversion(
     of the torques.
     """
     positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
-    scale, constant = (
-        _scale(settings.scale.tau, last, n, "scale.tau"),
-        _torque_constant(settings, drives, n),
-    )
+    scale = _scale(settings.scale.tau, last, n, "scale.tau")
+    units, own = _torque_constant(settings, drives, n)
+    constant = units if own is None else units * own
     if "motor" not in settings.sides:
-        return Conversion(positions, scale * constant, None, None, drives)
+        return Conversion(positions, scale * constant, None, None, drives, own)
     if drives is None:
         raise InputError(
             (
@@ -90,7 +97,7 @@ def conversion(
     of_positions, of_torques = (used if side == "motor" else None for side in settings.sides)
     commands = scale * constant if of_torques is None else scale
     coupled = drives.decoupled(settings.coupling)
-    return Conversion(positions, commands, of_positions, of_torques, coupled)
+    return Conversion(positions, commands, of_positions, of_torques, coupled, own)
 
 
 def column_names(
@@ -108,9 +115,9 @@ def column_names(
         if given.t is not None or settings.rate is not None or "t" not in first.names
         else "t"
     )
-    qr = (
-        _meant(first, "qr", "", given.qr, joints)
-        if given.qr
+    q_ref = (
+        _meant(first, "qr", "", given.q_ref, joints)
+        if given.q_ref
         else _numbered("qr", first)
         if "qr1" in first.names
         else ()
@@ -121,13 +128,16 @@ def column_names(
             file=first.file,
         )
     of_q = _meant(first, "q", "position", given.q, joints)
-    of_tau = _meant(
-        last,
-        "tau",
-        "effort",
-        given.tau or (given.q if last.joints is not None or given.q == BY_NAME else ()),
-        joints,
-    )
+    of_tau: tuple[str, ...] = ()
+    if not settings.by_law:
+        named = last.joints is not None or given.q == BY_NAME
+        of_tau = _meant(last, "tau", "effort", given.tau or (given.q if named else ()), joints)
+    elif settings.controller is None:
+        raise InputError(
+            "record.columns name q_ref and no tau: set controller: {kp: ..., kd: ...}, whose law "
+            "then is the torque, or record.columns.tau",
+            file=last.file,
+        )
     if given.q == BY_NAME and first is last and set(of_q) & set(of_tau):
         raise InputError(
             (
@@ -142,7 +152,7 @@ def column_names(
             f"{first.file} holds the torques and {last.file} the positions; `files` are the "
             "positions, then the torques"
         )
-    return Columns(t, of_q, of_tau, qr, given.tau_ff, given.tau_known)
+    return replace(given, t=t, q=of_q, tau=of_tau, q_ref=q_ref)
 
 
 def _meant(
@@ -210,6 +220,7 @@ def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
                 f"a study file, record.columns.{quantity}"
             ),
             file=table.file,
+            remedy=likely_columns(table.names),
         )
     return tuple(name for _, name in found)
 
@@ -253,14 +264,17 @@ def _position_units(settings: RecordSettings, n: int) -> Array:
     )
 
 
-def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) -> Array:
-    """Factors from the unit of tau to N m or N, shape (n,): that of the unit, times a torque
-    constant for current and voltage.
+def _torque_constant(
+    settings: RecordSettings, drives: Drives | None, n: int
+) -> tuple[Array, Array | None]:
+    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 where the unit is one
+    of torques; None where all are.
     """
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
+    factors = np.array([factor for _, factor in units])
     if not any(kind in COMMANDS for kind, _ in units):
-        return np.array([factor for _, factor in units])
+        return factors, None
     if settings.torque_constant is not None:
         constant = _per_joint(settings.torque_constant, n, "torque_constant")
     elif drives is not None and settings.sides[1] == "motor":
@@ -270,33 +284,25 @@ def _torque_constant(settings: RecordSettings, drives: Drives | None, n: int) ->
             f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for "
             "currents of the motors set record.torque_side: motor, "
             "then gears and torque constants are those of the robot's drives; else set "
-            "record.torque_constant (N*m/A) with the gears in it"
+            "record.torque_constant (N*m/A) with the gears in it",
+            remedy={"torque_constant": 1.0} if drives is None else {"torque_side": "motor"},
         )
-    return np.array(
-        [
-            constant[j] * factor if kind in COMMANDS else factor
-            for j, (kind, factor) in enumerate(units)
-        ]
-    )
+    return factors, np.where([kind in COMMANDS for kind, _ in units], constant, 1.0)
 
 
 def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
     """Columns by quantity; none of a quantity that is not asked for."""
-    known = tuple(name for name in names.tau_known if name != NONE)
-    return dict(
-        zip(
-            QUANTITIES,
-            (
-                () if names.t is None else (names.t,),
-                names.q,
-                names.qr,
-                names.tau,
-                names.tau_ff,
-                known,
-            ),
-            strict=True,
-        )
-    )
+    return {
+        "t": () if names.t is None else (names.t,),
+        "q": names.q,
+        "q_r": names.q_ref,
+        "qd": names.qd,
+        "qd_ref": names.qd_ref,
+        "q_link": tuple(name for name in names.q_link if name != NONE),
+        "tau": names.tau,
+        "tau_ff": names.tau_ff,
+        "tau_known": tuple(name for name in names.tau_known if name != NONE),
+    }
 
 
 def groups_of(
@@ -304,7 +310,7 @@ def groups_of(
 ) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
     """Each file once, with the columns that it is asked for, by quantity."""
     first, last, other = tables
-    place = dict(zip(QUANTITIES, (first, first, first, last, last, other), strict=True))
+    place = {**dict.fromkeys(IN_FIRST, first), "tau": last, "tau_ff": last, "tau_known": other}
     asked = {key: columns for key, columns in asked_columns(names).items() if columns}
     groups = {
         table: {key: columns for key, columns in asked.items() if place[key] is table}

@@ -5,7 +5,7 @@ become joint side, SI.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from runtime.errors import InputError, ModelError
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, drives_of
+from runtime.model.generated import GeneratedModel, drives_of, joint_labels
 from runtime.records.clock import Stamps
 from runtime.records.datasets import fetch
 from runtime.records.formats.columns import Array, Table
@@ -28,44 +28,12 @@ from runtime.records.joint_side import (
     require_alike,
 )
 from runtime.records.labels import Label, labels
+from runtime.records.law import TorqueLaw, torque_law
+from runtime.records.measured import Samples
 from runtime.records.missing import COUNTS, bridged
-from runtime.records.record import require_finite
+from runtime.records.record import JOINT_CHANNELS, Origin, require_finite
 from runtime.settings.record import NONE, Columns, RecordSettings, each_record
 from runtime.settings.units import time_unit
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of a record, joint side, SI; None: the files hold no such columns.
-
-    Attributes
-    ----------
-    t : ndarray, shape (N,), s, or None
-    q : ndarray, shape (N, n), rad or m
-    tau : ndarray, shape (N, n), N m or N
-        As measured, known torques included.
-    q_r : ndarray, shape (N, n), rad or m, or None
-        Reference.
-    tau_ff, tau_known : ndarray, shape (N, n), N m or N, or None
-        Feed-forward torques of the controller, and torques that do not come from the model.
-    missing : ndarray of bool, shape (N, n), or (N, 0) where none may be missing
-        Columns of positions that hold none.
-    """
-
-    t: Array | None
-    q: Array
-    tau: Array
-    missing: Array
-    q_r: Array | None = None
-    tau_ff: Array | None = None
-    tau_known: Array | None = None
-
-    @property
-    def signals(self) -> dict[str, Array]:
-        """What is resampled together, by name."""
-        given = {key: getattr(self, key) for key in ("q", "tau", "q_r", "tau_ff", "tau_known")}
-        given |= {"missing": self.missing} if self.missing.any() else {}
-        return {key: x for key, x in given.items() if x is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +62,10 @@ class RecordFiles:
         From the columns to joint side, SI.
     missing : bool
         Whether positions may be missing.
+    law : TorqueLaw or None
+        Whose torque stands for the measured one.
+    joints : tuple of str
+        What results call the joints; none where no model is given.
     """
 
     settings: RecordSettings
@@ -105,6 +77,13 @@ class RecordFiles:
     n: int
     side: Conversion
     missing: bool
+    law: TorqueLaw | None
+    joints: tuple[str, ...] = ()
+
+    def origin(self, time: str = "") -> Origin:
+        """How the record was read; time : what its stamps were like."""
+        side, jitter = self.side, self.settings.jitter
+        return Origin(self.hashes, time, jitter, side.drives, side.constant, self.joints)
 
     @property
     def first(self) -> Table:
@@ -199,24 +178,31 @@ class RecordFiles:
         )
         if missing.any():
             parts["q"] = bridged(parts["q"], missing, before)
-        sides = {"q": self.side.position, "tau": self.side.torque, "tau_known": self._on_joints}
-        sides |= {"q_r": self.side.position, "tau_ff": self.side.torque, "t": self._time}
-        converted: dict[str, Any] = {"t": None, "missing": missing}
+        sides = {"tau": self.side.torque, "tau_known": self._on_joints, "t": self._time}
+        sides |= dict.fromkeys(("q", "q_r"), self.side.position)
+        sides |= dict.fromkeys(("qd", "qd_ref"), self.side.velocity)
+        sides |= {"tau_ff": self.side.torque, "q_link": self._behind_gears}
+        x: dict[str, Array] = {}
         for table, groups in groups_of(self.columns, self.tables):
             for key, names in groups.items():
                 hint = COUNTS if key == "q" and not self.missing else ""
-                x = require_finite(parts[key], names, table.file, table.row, start, hint)
-                converted[key] = sides[key](x)
-        return Samples(**converted), parts["q"][-1]
+                values = require_finite(parts[key], names, table.file, table.row, start, hint)
+                x[key] = y = sides[key](values)
+                if key != "t":
+                    most = LIMIT.LARGEST_NUMBER
+                    y = y[:, ~np.isnan(y).all(axis=0)] if key == "q_link" else y
+                    require_finite(y, names, table.file, table.row, start, largest=most)
+        channels = {key: x[key] for key in JOINT_CHANNELS if key in x}
+        samples = Samples(x.get("t"), x["q"], x.get("tau"), missing, x.get("tau_known"), channels)
+        return samples, parts["q"][-1]
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""
-        own = [name != NONE for name in self.columns.tau_known]
-        if all(own):
-            return known
-        spread = np.zeros((len(known), len(own)))
-        spread[:, own] = known
-        return spread
+        return _spread(known, self.columns.tau_known, 0.0)
+
+    def _behind_gears(self, q: Array) -> Array:
+        """Positions behind the gears, rad or m; nan where a joint has no encoder there."""
+        return np.asarray(_spread(q, self.columns.q_link, np.nan) * self.side.positions)
 
     def _time(self, t: Array) -> Array:
         return np.asarray(t[:, 0] * time_unit(self.settings.units.t))
@@ -247,14 +233,21 @@ def open_records(
     for one, label in zip(settings, labels(settings), strict=True):
         joints = names_of(model)
         opened = open_record(
-            one, label, drives, Path(folder or ""), joints, by_blocks=by_blocks, missing=missing
+            one,
+            label,
+            drives,
+            Path(folder or ""),
+            joints,
+            by_blocks=by_blocks,
+            missing=missing,
+            limits=dict(getattr(model, "LIMITS", {})),
         )
         if model is not None and opened.n != len(model.JOINTS):
             raise InputError(
                 f"{opened.n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}",
                 file=", ".join(opened.hashes),
             )
-        yield opened
+        yield opened if model is None else replace(opened, joints=joint_labels(model))
 
 
 def open_record(
@@ -266,6 +259,7 @@ def open_record(
     *,
     by_blocks: bool,
     missing: bool,
+    limits: Mapping[str, Any],
 ) -> RecordFiles:
     """The files of a record, opened.
 
@@ -281,6 +275,8 @@ def open_record(
         Names of the joints of the robot, where it has them.
     by_blocks, missing : bool
         As for `open_records`.
+    limits : mapping
+        LIMITS of the robot.
     """
     opened = [
         open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks)
@@ -302,15 +298,20 @@ def open_record(
                 file=table.file,
             )
     samples, n = counts[first], widths["q"]
-    require_alike(names, first, last, (samples, n), (counts[last], widths["tau"]))
+    torques = (counts.get(last, samples), widths.get("tau", n))
+    require_alike(names, first, last, (samples, n), torques)
     if drives is not None and drives.n != n:
         raise InputError(
             f"{n} positions and torques {names.q}; the robot has {drives.n} joints", file=first.file
         )
     if "tau_known" in widths:
         widths["tau_known"] += names.tau_known.count(NONE)
+    widths["q_link"] = widths.get("q_link", n) + names.q_link.count(NONE)
     for key, title in (
         ("q_r", "reference positions"),
+        ("qd", "velocities"),
+        ("qd_ref", "reference velocities"),
+        ("q_link", "positions behind the gears"),
         ("tau_ff", "feed-forward torques"),
         ("tau_known", "known torques"),
     ):
@@ -339,7 +340,18 @@ def open_record(
         n,
         conversion(settings, drives, first, last, n),
         missing,
+        torque_law(settings.controller, n, limits) if settings.by_law else None,
     )
+
+
+def _spread(x: Array, names: Sequence[str], absent: float) -> Array:
+    """Columns x of the joints that have one, `absent` for the others, shape (N, n)."""
+    own = [name != NONE for name in names]
+    if all(own):
+        return x
+    spread = np.full((len(x), len(own)), absent)
+    spread[:, own] = x
+    return spread
 
 
 def places(settings: RecordSettings, opened: Sequence[Table]) -> tuple[Table, Table, Table]:

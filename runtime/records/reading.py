@@ -18,10 +18,11 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import rate_of
+from runtime.records.measured import Samples
 from runtime.records.missing import Missing
 from runtime.records.named import study_of
-from runtime.records.opening import RecordFiles, Samples, open_records
-from runtime.records.record import Origin, Record
+from runtime.records.opening import RecordFiles, open_records
+from runtime.records.record import Record
 from runtime.records.resampling import Stretch, resampled
 from runtime.records.time_stamps import time_stamps
 from runtime.settings.record import RecordSettings
@@ -108,18 +109,22 @@ def read_pieces(opened: RecordFiles) -> list[Record]:
         opened.close()
     K = len(stretches)
     signals = [dict(zip(samples.signals, stretch.signals, strict=True)) for stretch in stretches]
+    if opened.law is not None:
+        signals = [
+            opened.law.signals(stretch.t, own, rate)
+            for stretch, own in zip(stretches, signals, strict=True)
+        ]
     return [
         Record(
             stretch.t,
             own["q"],
             own["tau"],
-            q_r=own.get("q_r"),
-            tau_ff=own.get("tau_ff"),
             tau_known=own.get("tau_known"),
+            channels={key: own[key] for key in (*samples.channels, "law_v") if key in own},
             rate=rate,
             name=opened.name if K == 1 else f"{opened.name} ({k} of {K})",
             missing=Missing(own["missing"], opened.side.follows) if "missing" in own else None,
-            origin=Origin(opened.hashes, text, opened.settings.jitter, opened.side.drives),
+            origin=opened.origin(text),
         )
         for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]

@@ -17,16 +17,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel
 from runtime.records.clock import clock
 from runtime.records.formats.columns import BLOCK, Array
 from runtime.records.formats.table import is_read_by_blocks
+from runtime.records.joint_side import asked_columns
 from runtime.records.opening import RecordFiles, open_records, record_files
 from runtime.records.reading import read_records
-from runtime.records.record import Origin, Record
-from runtime.records.stream import Stream
+from runtime.records.record import JOINT_CHANNELS, Record
+from runtime.records.stream import Part, Stream
 from runtime.settings.record import RecordSettings, each_record
 
 KEPT = 2**23  # samples whose time is kept, 64 MB; read again and again in longer records
@@ -77,21 +78,26 @@ class FileStream(Stream):
         """Other processes read what they need."""
         return {key: value for key, value in vars(self).items() if key != "_clock"}
 
-    def blocks(
-        self, start: int = 0, stop: int | None = None
-    ) -> Iterator[tuple[Array, Array, Array, Array]]:
-        """t (B,), q (B, n), tau (B, n), joint side, SI, and the columns without a position, of the
-        samples [start, stop).
+    def parts(self, start: int = 0, stop: int | None = None) -> Iterator[Part]:
+        """t (B,), q (B, n), tau (B, n), joint side, SI, the columns without a position, and the
+        channels, of the samples [start, stop).
         """
+        law, before = self.opened.law, None
+        if law is not None and start:
+            (last,) = self.opened.blocks(1, start - 1, start)
+            before = last.q[0]
         for x in self.opened.blocks(self.block, start, stop):
-            known = 0.0 if x.tau_known is None else x.tau_known
+            tau, known = x.tau, 0.0 if x.tau_known is None else x.tau_known
+            if law is not None:
+                tau = law.torque(x.q, x.channels, self.rate, before)
             yield (
                 self._counted(start, len(x.q)) if x.t is None else x.t,
                 x.q,
-                x.tau - known,
+                np.asarray(tau) - known,
                 x.missing,
+                x.channels,
             )
-            start += len(x.q)
+            start, before = start + len(x.q), x.q[-1]
 
 
 def open_stream(
@@ -124,6 +130,10 @@ def open_streams(
             raise InputError(
                 "record.resample needs the whole record; set stream: off", file=", ".join(one.files)
             )
+        law = None if one.controller is None else one.controller.law
+        if law is not None and (law.kd == "fit" or law.delay):
+            message = "fit, or a delay, needs the whole record; set stream: off"
+            raise SettingsError(message, path=("controller", "law"))
     opened = open_records(settings, model, folder, by_blocks=True, missing=missing)
     return [_stream(files, block) for files in opened]
 
@@ -134,11 +144,12 @@ def _stream(opened: RecordFiles, block: int) -> FileStream:
         name=opened.name,
         n=opened.n,
         rate=clock(opened.stamps, lambda: opened.times(block)) if timed else opened.stated_rate,
-        origin=Origin(opened.hashes, jitter=opened.settings.jitter, drives=opened.side.drives),
+        origin=opened.origin(),
         samples=opened.samples,
         block=block,
         follows=opened.side.follows,
         largest_known=opened.largest_known(block),
+        measured=frozenset(key for key in JOINT_CHANNELS if asked_columns(opened.columns)[key]),
         opened=opened,
     )
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -21,8 +21,13 @@ from runtime.records.missing import COUNTS, Missing, bridged
 
 Array = np.ndarray
 
+JOINT_CHANNELS = ("q_r", "qd", "qd_ref", "q_link", "tau_ff")
+"""Channels with one column per joint."""
+
 UNNAMED = "record"
 """Name of a record that was given none."""
+FINITE = float(np.finfo(float).max)
+"""The largest finite number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +46,19 @@ class Origin:
     drives : Drives or None
         Drives of the robot with the coupling by which the record was read; None: those of the
         model.
+    torque_constant : ndarray, shape (n,), N m/A or N m/V, or None
+        By which currents or voltages became torques; None: torques were measured, or the constants
+        are those of the robot file.
+    joints : tuple of str
+        What results call the joints; none: by their place, from 1.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
     time: str = ""
     jitter: float = JITTER
     drives: Drives | None = None
+    torque_constant: Array | None = None
+    joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -65,10 +77,6 @@ class Record:
         Checked against t. Default: (N - 1)/(t[-1] - t[0]).
     name : str
         How results call the record.
-    q_r : array_like, shape (N, n), rad or m, optional
-        What the controller followed.
-    tau_ff : array_like, shape (N, n), N m or N, optional
-        Feed-forward torques that the controller added.
     tau_known : array_like, shape (N, n), N m or N, optional
         Torques of the drives that do not come from the model, such as that of a counterbalance:
         `torque` is tau without them.
@@ -76,8 +84,15 @@ class Record:
         Samples of q that hold no position, where `signals.reader` is counts: np.isnan(q). There q
         becomes a straight line between its neighbours, for
         what looks at positions as they are; the reader takes no notice of it.
+    channels : mapping of str to array_like, optional
+        What else was measured, shape (N, k) by name. An array that cannot be written is taken as it
+        is, others are copied.
     origin : Origin
         Files, clock and drives by which the record was read.
+    **named : array_like or None, shape (N, n)
+        Channels of the joints: q_r, what the controller followed, rad or m; tau_ff, feed-forward
+        torques that it added, N m or N; qd and qd_ref, velocities and their reference; q_link,
+        positions behind the gears, nan on joints without an encoder there. None: without it.
 
     Raises
     ------
@@ -91,10 +106,9 @@ class Record:
     tau: Array
     rate: float
     name: str
-    q_r: Array | None
-    tau_ff: Array | None
     tau_known: Array | None
     missing: Missing | None
+    channels: Mapping[str, Array]
     origin: Origin
 
     def __init__(
@@ -105,15 +119,17 @@ class Record:
         *,
         rate: float | None = None,
         name: str = UNNAMED,
-        q_r: ArrayLike | None = None,
-        tau_ff: ArrayLike | None = None,
         tau_known: ArrayLike | None = None,
         missing: ArrayLike | Missing | None = None,
+        channels: Mapping[str, ArrayLike] | None = None,
         origin: Origin | None = None,
+        **named: ArrayLike | None,
     ) -> None:
+        if unknown := sorted(named.keys() - {*JOINT_CHANNELS}):
+            raise TypeError(f"{unknown[0]}; a record is given {', '.join(JOINT_CHANNELS)} by name")
         origin = origin or Origin()
         file = ", ".join(origin.files) or name
-        signals = {"t": t, "q": q, "tau": tau, "q_r": q_r, "tau_ff": tau_ff, "tau_known": tau_known}
+        signals = {"t": t, "q": q, "tau": tau, "tau_known": tau_known}
         given = {label: np.array(x, dtype=float) for label, x in signals.items() if x is not None}
         shapes = {label: x.shape for label, x in given.items()}
         given |= {label: x[:, None] for label, x in given.items() if label != "t" and x.ndim == 1}
@@ -131,6 +147,12 @@ class Record:
                     f"{label} {shapes[label]}, q {given['q'].shape}; expected the same",
                     file=file,
                 )
+        others = {**(channels or {}), **named}
+        own = {
+            label: _channel(label, x, given["q"].shape, file)
+            for label, x in others.items()
+            if x is not None
+        }
         missing = _missing(missing, given["q"].shape, file)
         if missing is not None:
             given["q"] = bridged(given["q"], missing.at_joints() & np.isnan(given["q"]))
@@ -141,24 +163,48 @@ class Record:
                 [column] if x.ndim == 1 else [f"{column}{j + 1}" for j in range(x.shape[1])],
                 file,
                 hint=f"{COUNTS} (here: missing=np.isnan(q))" if label == "q" else "",
+                largest=FINITE if label == "t" else LIMIT.LARGEST_NUMBER,
             )
             x.setflags(write=False)
         if rate is not None and not (np.isfinite(rate) and rate > 0):
             raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
         rate = rate_of(Stamps(file, rate=rate, jitter=origin.jitter), given["t"])
-        others = {"rate": rate, "name": name, "missing": missing, "origin": origin}
-        for label, value in (dict.fromkeys(signals) | given | others).items():
+        rest = {"rate": rate, "name": name, "missing": missing, "channels": own, "origin": origin}
+        for label, value in (dict.fromkeys(signals) | given | rest).items():
             object.__setattr__(self, label, value)
+
+    @property
+    def measured(self) -> frozenset[str]:
+        """Names of the channels."""
+        return frozenset(self.channels)
+
+    @property
+    def q_r(self) -> Array | None:
+        """What the controller followed, shape (N, n), rad or m; None where it is not recorded."""
+        return self.channels.get("q_r")
+
+    @property
+    def tau_ff(self) -> Array | None:
+        """Feed-forward torques that the controller added, shape (N, n), N m or N, or None."""
+        return self.channels.get("tau_ff")
 
     @cached_property
     def torque(self) -> Array:
         """What the model has to explain of tau, shape (N, n), N m or N: without known torques."""
         return self.tau if self.tau_known is None else self.tau - self.tau_known
 
+    def moved(self, q: Array, **changes: Any) -> Record:
+        """The record with other positions, hence without recorded velocities; changes : of other
+        fields.
+        """
+        others = {key: x for key, x in self.channels.items() if key != "qd"}
+        return replace(self, q=q, channels=others, **changes)
+
     @property
     def subtracted(self) -> str:
         """What known torques take from tau, a sentence; "" where there are none."""
-        return known_text(None if self.tau_known is None else np.abs(self.tau_known).max(axis=0))
+        known = self.tau_known
+        return known_text(None if known is None else np.abs(known).max(axis=0), self.origin.joints)
 
     @property
     def files(self) -> Mapping[str, str]:
@@ -183,6 +229,20 @@ class Record:
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
 
 
+def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
+    """A channel of a record of positions of that shape, read-only."""
+    array = np.asarray(x, dtype=float)
+    array = array.copy() if array.flags.writeable else array
+    array = array[:, None] if array.ndim == 1 else array
+    expected = shape if label in JOINT_CHANNELS else (shape[0], *array.shape[1:2])
+    if array.shape != expected:
+        raise InputError(f"{label} {array.shape}, q {shape}; expected {expected}", file=file)
+    held = array[:, ~np.isnan(array).all(axis=0)] if label == "q_link" else array
+    require_finite(held, [f"{label}{k + 1}" for k in range(held.shape[1])], file)
+    array.setflags(write=False)
+    return array
+
+
 def _missing(
     missing: ArrayLike | Missing | None, shape: tuple[int, ...], file: str
 ) -> Missing | None:
@@ -200,15 +260,14 @@ def _missing(
     return missing if missing.samples.any() else None
 
 
-def known_text(largest: Array | None) -> str:
+def known_text(largest: Array | None, joints: Sequence[str]) -> str:
     """What known torques of that size, shape (n,), take from a record, a sentence; "" for None."""
     if largest is None:
         return ""
-    return (
-        "known torques subtracted: "
-        + ", ".join(f"up to {x:.4g} of joint {j}" for j, x in enumerate(largest, 1) if x)
-        + " (N m or N)"
-    )
+    names = joints or range(1, len(largest) + 1)
+    sizes = zip(names, largest, strict=True)
+    listed = ", ".join(f"up to {x:.4g} of joint {joint}" for joint, x in sizes if x)
+    return f"known torques subtracted: {listed} (N m or N)"
 
 
 def require_finite(
@@ -218,16 +277,19 @@ def require_finite(
     row: Callable[[int], str] = sample,
     first: int = 0,
     hint: str = "",
+    largest: float = FINITE,
 ) -> Array:
-    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity
-    among them; row : place of a sample in words; hint : what else may be done about nan.
+    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity nor
+    a number above `largest` among them; row : place of a sample in words; hint : what else may be
+    done about nan.
     """
-    if not np.isfinite(x).all():
-        bad = np.argwhere(~np.isfinite(x))
+    if not (np.abs(x) <= largest).all():
+        bad = np.argwhere(~(np.abs(x) <= largest))
         i, j = bad[0]
+        numbers = f"numbers up to {largest:g} (SI)" if np.isfinite(x[i, j]) else "finite numbers"
         column = names[j] if len(names) == x.shape[1] else f"{', '.join(names)} ({j + 1})"
         raise InputError(
-            f"{x[i, j]} ({len(bad)} such values in all); expected finite numbers, repair or cut "
+            f"{x[i, j]} ({len(bad)} such values in all); expected {numbers}, repair or cut "
             f"the record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=file,
             column=column,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -13,10 +12,11 @@ from runtime.records.record import Origin, Record, known_text
 
 Array = np.ndarray
 Block = tuple[Array, Array, Array, Array]
+Part = tuple[Array, Array, Array, Array, Mapping[str, Array]]  # a block and its channels
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Stream(ABC):
+class Stream:
     """A record that is read by blocks, joint side, SI, as often as asked.
 
     Attributes
@@ -37,6 +37,8 @@ class Stream(ABC):
         Joint j follows from column i of the positions, as in `runtime.records.missing`.
     largest_known : ndarray, shape (n,), or None
         Size of the known torques that are subtracted; None where there are none.
+    measured : frozenset of str
+        Names of the channels.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Stream(ABC):
     block: int
     follows: Array | None = None
     largest_known: Array | None = None
+    measured: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return self.samples
@@ -59,17 +62,21 @@ class Stream(ABC):
     @property
     def subtracted(self) -> str:
         """What known torques take from the record, a sentence; "" where there are none."""
-        return known_text(self.largest_known)
+        return known_text(self.largest_known, self.origin.joints)
 
     def times(self) -> Iterator[Array]:
         """Time of the samples, s, by blocks."""
         return (t for t, *_ in self.blocks())
 
-    @abstractmethod
     def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
         """t (B,), q (B, n), tau (B, n), columns without a position, bool (B, n), or (B, 0) where
         none may be missing, of the samples [start, stop);
-        default: all."""
+        default: all. A stream has this method or `parts` of its own."""
+        return (part[:4] for part in self.parts(start, stop))
+
+    def parts(self, start: int = 0, stop: int | None = None) -> Iterator[Part]:
+        """The same with the channels (B, k) by name."""
+        return ((*block, {}) for block in self.blocks(start, stop))
 
     @property
     def in_any_order(self) -> bool:
@@ -95,10 +102,11 @@ class RecordStream(Stream):
             block=block,
             follows=follows,
             largest_known=known,
+            measured=record.measured,
         )
         object.__setattr__(self, "record", record)
 
-    def blocks(self, start: int = 0, stop: int | None = None) -> Iterator[Block]:
+    def parts(self, start: int = 0, stop: int | None = None) -> Iterator[Part]:
         missing = (
             np.empty((len(self), 0), dtype=bool)
             if self.record.missing is None
@@ -112,6 +120,7 @@ class RecordStream(Stream):
                 self.record.q[samples],
                 self.record.torque[samples],
                 missing[samples],
+                {key: x[samples] for key, x in self.record.channels.items()},
             )
 
 
@@ -131,9 +140,9 @@ class ChangedStream(Stream):
         change: Callable[[Array, Array], tuple[Array, Array]],
         drives: Drives,
     ) -> ChangedStream:
-        """The changed stream, as if it were read by `drives`."""
+        """The changed stream, as if it were read by `drives`, without channels."""
         same = {f.name: getattr(stream, f.name) for f in fields(Stream)}
-        same["origin"] = replace(stream.origin, drives=drives)
+        same |= {"origin": replace(stream.origin, drives=drives), "measured": frozenset()}
         return cls(stream=stream, change=change, **same)
 
     def times(self) -> Iterator[Array]:
@@ -157,29 +166,33 @@ class PieceReader:
 
     def __init__(self, stream: Stream) -> None:
         self.stream = stream
-        self.blocks: Iterator[Block] = iter(())
-        self.held: list[Block] = []
+        self.parts: Iterator[Part] = iter(())
+        self.held: list[Part] = []
         self.first = self.next = len(stream)  # samples that `held` and the next block begin with
 
-    def read(self, begin: int, end: int) -> Block:
-        """t, q, tau and missing samples of [begin, end)."""
-        in_any_order = self.stream.in_any_order
-        if in_any_order or begin < self.first:
-            self.blocks = self.stream.blocks(*((begin, end) if in_any_order else ()))
-            self.held, self.first = [], begin if in_any_order else 0
-            self.next = self.first
+    def read(self, begin: int, end: int) -> Part:
+        """t, q, tau, missing samples and channels of [begin, end)."""
+        if self.stream.in_any_order:  # all that was asked for is read: a process that reads stays
+            return _joined(list(self.stream.parts(begin, end)), slice(None))
+        if begin < self.first:
+            self.parts, self.held, self.first, self.next = self.stream.parts(), [], 0, 0
         while self.next < end:
-            self.held.append(next(self.blocks))
+            self.held.append(next(self.parts))
             self.next += len(self.held[-1][0])
             self._forget(begin)
         self._forget(begin)
         own = slice(begin - self.first, end - self.first)
-        t, q, tau, missing = (np.concatenate(x)[own] for x in zip(*self.held, strict=True))
-        if in_any_order:
-            self.held = []
-        return t, q, tau, missing
+        return _joined(self.held, own)
 
     def _forget(self, begin: int) -> None:
         """Hold no block that ends before sample `begin`."""
         while self.held and self.first + len(self.held[0][0]) <= begin:
             self.first += len(self.held.pop(0)[0])
+
+
+def _joined(parts: Sequence[Part], own: slice) -> Part:
+    """Parts that follow each other as one, of which the samples `own`."""
+    *columns, named = zip(*parts, strict=True)
+    t, q, tau, missing = (np.concatenate(x)[own] for x in columns)
+    channels = {key: np.concatenate([x[key] for x in named])[own] for key in named[0]}
+    return t, q, tau, missing, channels

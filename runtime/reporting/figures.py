@@ -128,7 +128,8 @@ def residual_histogram(comparison: Sequence[JointComparison], unit: str = "N m")
         title = f"joint {joint.joint}, deviation {deviation:.3g} {unit}"
         ax.set(title=title, xlabel="residual / deviation", yticks=[])
 
-    return panels(comparison, draw, 3, cell=(3.2, 2.1), least=5.4)
+    with_rows = [joint for joint in comparison if len(joint.t)]
+    return panels(with_rows, draw, 3, cell=(3.2, 2.1), least=5.4)
 
 
 def spectra_figure(

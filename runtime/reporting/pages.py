@@ -86,6 +86,9 @@ def supplementary_sections(result: Identification) -> list[Section]:
         )
     sections += [] if result.payload is None else [payload_section(result.payload)]
     sections += [friction_section(result.friction, result.torque_unit)] if result.friction else []
+    if result.laws is not None:
+        text = ("Scalars inside the laws of columns, by variable projection.",)
+        sections.append(Section("Laws of columns", text, [], result.laws.tables()))
     sections += [] if result.advice is None else [advice_section(result.advice)]
     sections += (
         []

@@ -38,6 +38,7 @@ from runtime.model.compiled import target_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
+from runtime.records.law import require_found
 from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.c.workspace import usable
@@ -55,7 +56,7 @@ from runtime.resolution.perturbed import (
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
-from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
+from runtime.rows.prepared import Prepared, common_drives, prepared, record_of, resolved
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
 if TYPE_CHECKING:
@@ -126,6 +127,7 @@ def cestac(
     """
     several = records if isinstance(records, Sequence) else (records,)
     study = resolved(study or Study(), several)[0]
+    require_found(study.record, (record_of(one).measured for one in several))
     settings, model = study.cestac, usable(model)
     as_measured = [prepared(model, record, study) for record in several]
     drives = drives or common_drives(model, as_measured)

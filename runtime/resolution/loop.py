@@ -109,10 +109,7 @@ class Loop:
         attached.
         """
         parts = [
-            replace(
-                part,
-                prepared=replace(part.prepared, record=replace(part.record, q=np.asarray(q))),
-            )
+            replace(part, prepared=replace(part.prepared, record=part.record.moved(np.asarray(q))))
             for part, q in zip(self.closed.parts, positions, strict=True)
         ]
         return replace(

@@ -98,16 +98,18 @@ class BlockTask:
 
     def read(
         self, number: int, begin: int, end: int
-    ) -> tuple[Array, Array, Array, Missing | None, Drives | None]:
-        """Time, positions, torques, missing positions and drives of samples of a record."""
+    ) -> tuple[Array, Array, Array, Missing | None, Drives | None, Mapping[str, Array]]:
+        """Time, positions, torques, missing positions, drives and channels of samples of a
+        record.
+        """
         stream = self.streams[number]
-        t, q, tau, gaps = self.readers[number].read(begin, end)
+        t, q, tau, gaps, channels = self.readers[number].read(begin, end)
         missing = Missing(gaps, stream.follows) if gaps.any() else None
-        return t, q, tau, missing, stream.origin.drives or drives_of(self.model)
+        return t, q, tau, missing, stream.origin.drives or drives_of(self.model), channels
 
     def encoder_positions(self, number: int, begin: int, end: int) -> Array:
         """Positions at the encoders, shape (B, n), nan where they are missing."""
-        _, q, _, missing, motors = self.read(number, begin, end)
+        _, q, _, missing, motors, _ = self.read(number, begin, end)
         drives = encoder_drives(self.study.signals.side, motors)
         return encoder_position(q, drives, missing)
 
@@ -116,15 +118,21 @@ class BlockTask:
         counts, where the study asks for it.
         """
         signals, stream = self.study.signals, self.streams[piece.record]
-        t, q, tau, missing, motors = self.read(piece.record, piece.begin, piece.end)
+        t, q, tau, missing, motors, channels = self.read(piece.record, piece.begin, piece.end)
         counts = None
         if signals.reader == "counts":
             whole = self.skimmed.get(piece.record)
             start = None if whole is None else whole.starts[piece.begin]
             counts = CountStage(piece.stretches, stream.rate, signals, stream.name, start)
-        name = stream.name
         states = observed_states(
-            q, stream.rate, signals, motors, missing=missing, name=name, counts=counts
+            q,
+            stream.rate,
+            signals,
+            motors,
+            missing=missing,
+            name=stream.name,
+            counts=counts,
+            v=channels.get("qd"),
         )
         return t, states, tau, counts
 

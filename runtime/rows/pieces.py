@@ -17,7 +17,7 @@ import numpy as np
 
 from runtime.records.stream import Stream
 from runtime.rows.selection import Instants
-from runtime.settings.study import Signals
+from runtime.settings.study import Lowpass, Signals
 from runtime.signals.counts.reading import STRETCH, stretches
 from runtime.signals.decimation import operator
 from runtime.signals.filters import butterworth
@@ -94,6 +94,10 @@ def reach(rate: float, signals: Signals, factor: int) -> int:
     """Samples before and behind a kept one that it depends on."""
     low = signals.lowpass
     lowpass = 0 if low is None else len(set(low.on)) * memory(butterworth(rate, low)[0])
+    if not isinstance(signals.velocity, str):
+        slowest = min(np.ravel(signals.velocity).tolist())
+        if slowest < rate / 2:
+            lowpass += memory(butterworth(rate, Lowpass(cutoff=slowest, order=1))[0])
     return signals.median + lowpass + 2 * DIFFERENCE + decimation_reach(factor)
 
 

@@ -39,6 +39,7 @@ from runtime.settings.study import Rows, Signals, Study, to_mapping
 from runtime.signals.cutoff import EXCERPT, cutoff
 from runtime.signals.decimation import decimate
 from runtime.signals.filters import States, filtered_states, median_filtered
+from runtime.signals.recorded_speed import crossings
 from runtime.signals.states import observed_states
 
 Array = np.ndarray
@@ -68,7 +69,8 @@ class Prepared:
     @cached_property
     def filtered(self) -> States:
         """q, qd, qdd of the positions as they are, shape (N, n) each; straight lines over gaps."""
-        return filtered_states(self.record.q, self.record.rate, self.study.signals)
+        record, v = self.record, self.record.channels.get("qd")
+        return filtered_states(record.q, record.rate, self.study.signals, v)
 
     @cached_property
     def states(self) -> States:
@@ -148,15 +150,19 @@ def prepared(model: GeneratedModel, record: Record | Prepared, study: Study) -> 
 
 
 def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
-    """The study with a number for signals.lowpass.cutoff: auto, one for all records, and what it
-    became and why, in words; empty where the study gives a number.
+    """The study with numbers for signals.lowpass.cutoff: auto and, where velocities were recorded,
+    signals.velocity: auto, one for all records, and what they became and why, in words; empty where
+    the study gives them.
 
     The first EXCERPT samples in the window of the study are looked at, of every record.
     """
-    low = study.signals.lowpass
-    if low is None or low.cutoff != "auto":
+    signals, low = study.signals, study.signals.lowpass
+    automatic = low is not None and low.cutoff == "auto"
+    recorded = signals.velocity == "auto" and signals.reader == "lowpass"
+    recorded = recorded and all("qd" in record_of(record).measured for record in records)
+    if not automatic and not (recorded and records):
         return study, ""
-    positions = []
+    parts = []
     for record in map(record_of, records):
         times = record.times() if isinstance(record, Stream) else [record.t]
         start, stop = 0, len(record)
@@ -164,13 +170,24 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
             start, stop = window_of(times, study.rows.window, record.name)
         part = start, min(stop, start + EXCERPT)
         if isinstance(record, Stream):
-            q = PieceReader(record).read(*part)[1]
+            _, q, _, _, channels = PieceReader(record).read(*part)
         else:
             q = record.q[slice(*part)]
-        positions.append((q, record.rate))
-    hertz, why = cutoff(positions, study.signals)
-    signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))
-    return replace(study, signals=signals), f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}."
+            channels = {key: x[slice(*part)] for key, x in record.channels.items()}
+        parts.append((q, channels, record.rate))
+    positions, texts = [(q, rate) for q, _, rate in parts], []
+    if recorded and records:
+        first = cutoff(positions, signals)[0] if automatic else 0.0
+        known = replace(signals, lowpass=replace(low, cutoff=first)) if low and first else signals
+        crossing, why = crossings(parts, known)
+        signals = replace(signals, velocity=crossing)
+        texts.append(why)
+    if low is not None and automatic:
+        given = np.inf if isinstance(signals.velocity, str) else signals.velocity
+        hertz, why = cutoff(positions, signals, given)
+        signals = replace(signals, lowpass=replace(low, cutoff=hertz))
+        texts.insert(0, f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}.")
+    return replace(study, signals=signals), " ".join(texts)
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:

@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from runtime.errors import SettingsError
 from runtime.settings.schema import (
     Count,
     Many,
@@ -54,8 +55,9 @@ class Law(Settings):
         pid or cascade.
     kp : float or tuple of float
         Gain of the position; of a cascade in 1/s.
-    kd : float or tuple of float
-        Gain of the velocity of a pid.
+    kd : float or tuple of float or str
+        Gain of the velocity of a pid; fit: found with the parameters, from a record whose torque is
+        that of the law.
     kv : float or tuple of float
         Gain of the velocity of a cascade.
     ki : float or tuple of float
@@ -66,24 +68,49 @@ class Law(Settings):
         Gain of the reference acceleration that a cascade feeds forward.
     gain : float or tuple of float, N m or N
         Torque for one unit of u.
+    delay : float or str, s
+        From the logged signals to the torque, of a law that stands for a measured torque; fit:
+        found with the parameters. For a simulated loop: controller.delay.
     antiwindup : float or tuple of float or None
         Largest |I|; null: none.
     """
 
     kind: Literal["pid", "cascade"] = "pid"
     kp: PerJoint[Real] = 0.0
-    kd: PerJoint[Real] = 0.0
+    kd: PerJoint[Real] | Literal["fit"] = 0.0
     kv: PerJoint[Real] = 0.0
     ki: PerJoint[Real] = 0.0
     cv: PerJoint[Real] = 0.0
     ca: PerJoint[Real] = 0.0
     gain: PerJoint[Real] = 1.0
+    delay: Real | Literal["fit"] = 0.0
     antiwindup: PerJoint[Positive] | None = None
 
     def __post_init__(self) -> None:
         for key in ("kv", "cv", "ca") if self.kind == "pid" else ("kd",):
             value = getattr(self, key)
-            require(not np.any(value), f"{value}; a {self.kind} law has no such gain", key)
+            none = value != "fit" and not np.any(value)
+            require(none, f"{value}; a {self.kind} law has no such gain", key)
+
+    def gains(self, n: int) -> dict[str, np.ndarray]:
+        """P, Vr, Vm, K of u = P e + Vr qd_r - Vm qd_m + K I for n joints, each of shape (n,), N m
+        or N by unit of e, its rate and I; kd: fit counts as 0.
+        """
+
+        def each(key: str) -> np.ndarray:
+            value = getattr(self, key)
+            x = np.atleast_1d(np.asarray(0.0 if value == "fit" else value, dtype=float))
+            message = f"{len(x)} values; expected one or {n}, one per joint of the robot"
+            require(len(x) in (1, n), message, "controller", "law", key)
+            return np.broadcast_to(x, (n,)).copy()
+
+        gain, kp, kd, kv, ki, cv = map(each, ("gain", "kp", "kd", "kv", "ki", "cv"))
+        if not kp.all():
+            text = "expected a gain for every joint: nothing else holds its position"
+            raise SettingsError(f"{self.kp}; {text}", path=("controller", "law", "kp"))
+        if self.kind == "pid":
+            return {"P": gain * kp, "Vr": gain * kd, "Vm": gain * kd, "K": gain * ki}
+        return {"P": gain * (kv * kp), "Vr": gain * (kv * cv), "Vm": gain * kv, "K": gain * ki}
 
 
 class Encoder(Settings):
@@ -127,6 +154,12 @@ class Torque(Settings):
     noise: PerJoint[NotNegative] = 0.0
     disturbance: PerJoint[NotNegative] = 0.0
     bandwidth: Positive = 50.0
+
+    def largest(self, limits: Mapping[str, Any]) -> PerJoint[float] | None:
+        """The saturation, N m or N, by the LIMITS of a model; None: none."""
+        if self.saturation != "limits":
+            return self.saturation
+        return tuple(limits["tau"]) if "tau" in limits else None
 
 
 class Points(Settings):
@@ -185,7 +218,9 @@ class Controller(Settings):
     Attributes
     ----------
     law : Law
-        Control law.
+        Control law. Where records name q_ref and no tau, its torque stands for theirs.
+    kp, kd : float or tuple of float or str or None
+        Short for law: {kp: ..., kd: ...}.
     rate : float, Hz
         Rate of the controller; torque is held between its ticks.
     delay : int
@@ -218,6 +253,8 @@ class Controller(Settings):
     """
 
     law: Law = field(default_factory=Law)
+    kp: PerJoint[Real] | None = None
+    kd: PerJoint[Real] | Literal["fit"] | None = None
     rate: Positive = 1000.0
     delay: Literal[0, 1] = 0
     velocity: Literal["difference", "averaged"] = "difference"
@@ -232,3 +269,12 @@ class Controller(Settings):
     start: Many[Real] | None = None
     values: Mapping[Text, Real] = field(default_factory=dict)
     seed: Seed = 1
+
+    def __post_init__(self) -> None:
+        given = {key: x for key in ("kp", "kd") if (x := getattr(self, key)) is not None}
+        message = "given beside law; they are short for law: {kp: ..., kd: ...}"
+        require(not given or self.law == Law(), message, *list(given)[:1])
+        if given:
+            object.__setattr__(self, "law", Law(**given))
+        object.__setattr__(self, "kp", None)
+        object.__setattr__(self, "kd", None)

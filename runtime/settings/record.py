@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from runtime.settings.controller import Controller
 from runtime.settings.schema import (
     Many,
     NotNegative,
@@ -72,12 +73,22 @@ class Columns(Settings):
         Positions.
     tau : tuple of str
         Torques.
-    qr : tuple of str
+    q_ref : tuple of str
         Reference positions, where the file of the positions holds them; unit and side are those of
         q.
+    qr : tuple of str
+        Earlier name of q_ref.
+    qd : tuple of str
+        Velocities that were recorded beside the positions, in the same file; unit and side of q,
+        per s. They give the velocity of the rows where they say more than differences of q do.
+    qd_ref : tuple of str
+        Reference velocities, in the same file, units as qd; for the law of a controller.
+    q_link : tuple of str
+        Positions by encoders behind the gears, in the same file, joint side, unit of q; 0 in place
+        of a name: none on this joint.
     tau_ff : tuple of str
         Feed-forward torques that the controller added, in the file of the torques; unit and side
-        are those of tau. For methods that simulate it.
+        are those of tau. For methods that simulate it, and for the torque of a law.
     tau_known : tuple of str
         Torques of the drives that do not come from the model (a counterbalance, a cable), computed
         elsewhere; N m or N, joint side. They are
@@ -87,9 +98,20 @@ class Columns(Settings):
     t: Text | None = None
     q: Names = ()
     tau: Names = ()
+    q_ref: Names = ()
     qr: Names = ()
+    qd: Names = ()
+    qd_ref: Names = ()
+    q_link: SomeNames = ()
     tau_ff: Names = ()
     tau_known: SomeNames = ()
+
+    def __post_init__(self) -> None:
+        require(
+            not (self.qr and self.q_ref), "given beside q_ref; it is the same, leave it out", "qr"
+        )
+        object.__setattr__(self, "q_ref", self.q_ref or self.qr)
+        object.__setattr__(self, "qr", ())
 
 
 class Units(Settings):
@@ -168,7 +190,10 @@ class RecordSettings(Settings):
     columns : Columns
         Names of the columns.
     side : str
-        motor (qm = R (q - offset), tau = R' u, by the drives of the robot) or joint.
+        motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
+        torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
+        dry friction of drives (Ia, FV, FS) are left out of the columns, and a base parameter that
+        holds Ia holds none.
     torque_side : str or None
         The same for tau alone: motor for joint angles recorded with motor currents. Default: side.
     rate : float or None, Hz
@@ -197,6 +222,8 @@ class RecordSettings(Settings):
         blanks).
     resample : Resample or None
         How a time column that is not uniform is made so; null: it is refused.
+    controller : Controller or None
+        Whose law is the torque, where q_ref is named and tau is not; default: that of the study.
     also : tuple of tuple of str
         Files of further records with the same settings, each a record of its own: [b.csv, c.csv],
         or pairs of files.
@@ -204,8 +231,8 @@ class RecordSettings(Settings):
 
     files: Many[Text] = ()
     columns: Columns = field(default_factory=Columns)
-    side: Literal["motor", "joint"] = "joint"
-    torque_side: Literal["motor", "joint"] | None = None
+    side: Literal["motor", "joint", "link"] = "joint"
+    torque_side: Literal["motor", "joint", "link"] | None = None
     rate: Positive | None = None
     units: Units = field(default_factory=Units)
     scale: Scale = field(default_factory=Scale)
@@ -218,9 +245,12 @@ class RecordSettings(Settings):
     topic: Text | None = None
     decimal: Literal[".", ","] = "."
     resample: Resample | None = None
+    controller: Controller | None = None
     also: Many[Many[Text]] = ()
 
     def __post_init__(self) -> None:
+        no_law = self.controller is not None and not self.by_law
+        require(not no_law, "given, but no law is needed: name q_ref, and no tau", "controller")
         most = 3 if self.columns.tau_known else 2
         message = f"{len(self.files)} files; expected one, or two (positions, then torques)"
         require(
@@ -251,9 +281,34 @@ class RecordSettings(Settings):
             require(getattr(self, key) is None or used, message, key)
 
     @property
+    def by_law(self) -> bool:
+        """Whether the torque is that of a controller's law."""
+        return bool(self.columns.q_ref) and not self.columns.tau
+
+    @property
     def sides(self) -> tuple[str, str]:
-        """Sides of the positions and of the torques: motor or joint."""
+        """Sides of the positions and of the torques: motor, joint or link."""
         return self.side, self.torque_side or self.side
+
+
+def behind_gears(records: Sequence[RecordSettings]) -> bool:
+    """Whether the torques are those of sensors behind the gears; SettingsError where those of one
+    record are and those of another are not.
+    """
+    sides = {record.sides[1] == "link" for record in records}
+    message = "link in one record and not in another; fit them in studies of their own"
+    require(len(sides) < 2, message, "record", 0, "torque_side")
+    return True in sides
+
+
+def with_law(
+    records: Sequence[RecordSettings], controller: Controller | None
+) -> tuple[RecordSettings, ...]:
+    """The records, that controller where a law is the torque and none is named."""
+    return tuple(
+        replace(record, controller=record.controller or controller) if record.by_law else record
+        for record in records
+    )
 
 
 def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...]:

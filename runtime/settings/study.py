@@ -14,7 +14,7 @@ Units: SI, rad, Hz. Values are checked where they are made, so a Study that exis
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from math import pi
 from typing import Annotated, Any, Literal
 
@@ -30,6 +30,7 @@ from runtime.settings.record import (
     Resample,
     Scale,
     Units,
+    with_law,
 )
 from runtime.settings.schema import (
     Count,
@@ -74,7 +75,8 @@ class Lowpass(Settings):
     ----------
     cutoff : float or str, Hz
         Cutoff frequency; auto: from the motion and the noise of the records
-        (`runtime.signals.cutoff`), 50, as in the chapter, for counts and where no record is.
+        (`runtime.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50
+        where no record is.
     order : int
         Order of the filter.
     on : tuple of str
@@ -135,6 +137,10 @@ class Signals(Settings):
         Step of the encoders, for counts; null: from the record.
     side : str
         Side of the encoders, for counts: joint, or motor by the drives of the robot.
+    velocity : str or float or tuple of float, Hz
+        Where record.columns.qd are velocities that were recorded: from which frequency on they
+        stand for differences of q; auto: where the noise of both is alike, and not where they
+        disagree with the positions; differences: they are not used. For reader lowpass.
     lines : str
         Lines of the encoders at unequal distances, for counts: detected widens the bounds by their
         deviation; estimated finds them with the motion.
@@ -147,6 +153,7 @@ class Signals(Settings):
     reader: Literal["lowpass", "counts"] = "lowpass"
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
+    velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
     lines: Literal["detected", "estimated"] = "detected"
 
     def __post_init__(self) -> None:
@@ -413,6 +420,14 @@ class Study(Settings):
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
     stream: Literal["auto", "off"] | Annotated[Whole, Field(ge=LIMIT.FEWEST_SAMPLES)] = "auto"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "record", with_law(self.record, self.controller))
+        for section in ("validate", "payload"):
+            given = getattr(self, section)
+            if given is not None and any(record.by_law for record in given.record):
+                own = replace(given, record=with_law(given.record, self.controller))
+                object.__setattr__(self, section, own)
 
 
 def study_from_mapping(mapping: Mapping[str, Any]) -> Study:

@@ -74,20 +74,38 @@ class States:
         return len(self.q)
 
 
-def filtered_states(q: Array, rate: float, signals: Signals) -> States:
+def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = None) -> States:
     """q, qd, qdd of measured positions: median, low-pass on q, difference, low-pass on qd,
     difference.
 
-    q : ndarray, shape (N, n), rad or m.   rate : Hz.
+    q : ndarray, shape (N, n), rad or m.   rate : Hz.   v : recorded velocities, shape (N, n), which
+    take over from the differences where signals.velocity says.
     """
     q = median_filtered(q, signals.median)
     low = signals.lowpass
     if low is not None and "q" in low.on:
         q = lowpass_filtered(q, rate, low)
     qd = derivative(q, rate, signals.ends)
+    if v is not None and not isinstance(signals.velocity, str):
+        v = median_filtered(v, signals.median)
+        if low is not None and "q" in low.on:
+            v = lowpass_filtered(v, rate, low)
+        qd = blended(qd, v, rate, signals.velocity)
     if low is not None and "qd" in low.on:
         qd = lowpass_filtered(qd, rate, low)
     return States(q, qd, derivative(qd, rate, signals.ends))
+
+
+def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
+    """v + L (qd - v), shape (N, n), of differences qd and recorded velocities v; L the zero-phase
+    first-order low-pass at `crossing`, Hz (`runtime.signals.recorded_speed`).
+    """
+    mixed = qd.copy()
+    for j, f in enumerate(np.broadcast_to(crossing, qd.shape[1:]).tolist()):
+        if f < rate / 2:
+            low = Lowpass(cutoff=f, order=1)
+            mixed[:, j] = v[:, j] + lowpass_filtered(qd[:, j] - v[:, j], rate, low)
+    return mixed
 
 
 IN_CACHE = 4096

@@ -36,6 +36,7 @@ def observed_states(
     missing: Missing | None = None,
     name: str = "record",
     counts: CountStage | None = None,
+    v: Array | None = None,
 ) -> States:
     """q, qd, qdd of measured joint positions by the reader of the study.
 
@@ -55,6 +56,8 @@ def observed_states(
         What errors call the record.
     counts : CountStage, optional
         Reads the counts of a piece of the record, whose findings it keeps; default: q is the whole.
+    v : ndarray, shape (N, n), optional
+        Recorded velocities, for reader lowpass.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def observed_states(
     """
     if signals.reader == "lowpass":
         require_positions(missing, "reader: lowpass", name, COUNTS)
-        return filtered_states(q, rate, signals)
+        return filtered_states(q, rate, signals, v)
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(q, drives, missing)
     if counts is not None:

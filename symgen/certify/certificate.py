@@ -36,10 +36,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
-from symgen.certify.witness import base_values
+from symgen.certify.witness import base_values, is_assumed
 from symgen.derive.angles import rows_of, units_of
+from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
+from symgen.derive.roots import require_simple_roots
+from symgen.description.at_values import WITHIN
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
 from symgen.regroup.closed_draw import closed_draw
@@ -256,11 +259,8 @@ def certify_formulas(
                 f"the constants of the file ({values}) are special: the rank is {rank} there, "
                 f"{len(regrouping)} elsewhere; {AT_VALUES}"
             )
-            if gap > CLEAR
-            else f"the file is a hair off a special geometry: {len(regrouping) - rank} of its base "
-            "parameters act by less than 1e-9 of the others, "
-            "which no record can tell; round the numbers that are meant round, angles and axes "
-            "first"
+            if gap > CLEAR and robot.constants and not nearly_round(robot, WITHIN)
+            else hair_off(robot, f"{len(regrouping) - rank} base parameters")
         )
     sizes = sorted(
         x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants)))
@@ -270,12 +270,14 @@ def certify_formulas(
             f"lengths between {sizes[0]:.3g} and {sizes[-1]:.3g} m lie too far apart for checks in "
             "double precision; give them in one order of size"
         )
-    chi = np.random.default_rng(6).standard_normal(len(robot.parameters))
+    chi = np.random.default_rng(6).standard_normal(len(robot.parameters)) * ~is_assumed(robot)
     tau = witness.W @ chi
     error = float(
         np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi, robot.constants)).max()
         / np.abs(tau).max()
     )
+    if failures or rank != exact_rank:
+        require_simple_roots(robot)
     return Certificate(
         robot.name,
         regrouping.method,
@@ -289,6 +291,16 @@ def certify_formulas(
         torque_error=error,
         rank_in_floats=len(ranks) < draws,
         error_probability=bound**draws if primes else 1.0,
+    )
+
+
+def hair_off(robot: Robot, what: str) -> str:
+    """Where a geometry is so near to a special one that floats do not tell them apart."""
+    angles = "; ".join(nearly_round(robot, WITHIN)) or "round the numbers that are meant round"
+    return (
+        f"the file is a hair off a special geometry: {what} of it act by less than 1e-9 of the "
+        f"others, which no record can tell; {angles}; --at-values takes angles within 1e-6 rad of "
+        "a multiple of pi/12 as that"
     )
 
 
@@ -386,7 +398,7 @@ def _modulo(
             residue = draw.residues(draw.constant(coefficient))
             column = names.index(name)
             predicted[..., column] = (predicted[..., column] + few[..., own[k]] * residue) % p
-    wrong = np.flatnonzero((predicted != few).any(axis=(0, 1)))
+    wrong = np.flatnonzero((predicted != few).any(axis=(0, 1)) & ~is_assumed(robot))
     return rank, [names[c] for c in wrong]
 
 
@@ -397,6 +409,7 @@ def _false_in_floats(regrouping: Regrouping, W: Array, base: list[int]) -> list[
     robot = regrouping.robot
     K = base_values(regrouping, np.eye(len(robot.parameters)), robot.constants)
     off = np.abs(W[:, base] @ K - W).max(axis=0) > ROUNDED * np.abs(W).max()
+    off &= ~is_assumed(robot)
     return [robot.parameters[c] for c in np.flatnonzero(off)]
 
 

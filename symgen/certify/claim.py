@@ -66,6 +66,7 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
         "family": e.family,
         "kind": e.kind,
         "when": e.when,
+        **({"laws": [str(e.law(j) + e.potential(j)) for j in e.along]} if e.is_own else {}),
         "along": {str(j): {str(i): str(c) for i, c in row.items()} for j, row in e.along.items()},
         "form": {
             str(j): {f"{i},{k}": str(c) for (i, k), c in form.items()} for j, form in e.form.items()

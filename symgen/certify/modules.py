@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-from symgen.certify.certificate import Certificate, certify_formulas
+from symgen.certify.certificate import Certificate, certify_formulas, hair_off
 from symgen.certify.importing import cached_path, imported, stored_path
 from symgen.certify.texts import headed, text_check
 from symgen.certify.witness import Witness
+from symgen.derive.doubts import nearly_round
 from symgen.derive.time_limit import limited
+from symgen.description.at_values import WITHIN
 from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
@@ -22,7 +24,11 @@ from symgen.regroup.regrouping import Regrouping, regroup
 PYTHON = tuple(name for name, target in TARGETS.items() if target.file.endswith(".py"))
 
 
-def certify(regrouping: Regrouping, files: Mapping[str, str] | None = None) -> Certificate:
+def certify(
+    regrouping: Regrouping,
+    files: Mapping[str, str] | None = None,
+    options: Sequence[str] = (),
+) -> Certificate:
     """The certificate of the formulas of `regrouping` and of texts made from it: the verdict of
     `symgen check`.
 
@@ -32,6 +38,8 @@ def certify(regrouping: Regrouping, files: Mapping[str, str] | None = None) -> C
         Base parameters with their formulas.
     files : mapping, optional
         Texts by the file names of their targets. Default: the NumPy module.
+    options : sequence of str
+        What the texts have on request.
 
     Raises
     ------
@@ -43,13 +51,21 @@ def certify(regrouping: Regrouping, files: Mapping[str, str] | None = None) -> C
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
     files = generate_files(robot, regrouping=regrouping) if files is None else files
-    witness = Witness(regrouping)
+    witness = Witness(regrouping, options=options)
     texts = {file: text_check(file, text, target[file], witness) for file, text in files.items()}
-    return replace(certificate, texts=texts)
+    certificate = replace(certificate, texts=texts)
+    unsaid = not certificate.valid and not certificate.failures
+    if unsaid and nearly_round(robot, WITHIN):
+        return replace(certificate, failures=(hair_off(robot, "some columns"),))
+    return certificate
 
 
 def certified_files(
-    robot: Robot, *, targets: Sequence[str] = ("numpy",), command: str | None = None
+    robot: Robot,
+    *,
+    targets: Sequence[str] = ("numpy",),
+    command: str | None = None,
+    options: Sequence[str] = (),
 ) -> dict[str, str]:
     """{file name: text} of every target as `generate_files`, below what their certificate says;
     they then lie in the cache of texts that runtime runs.
@@ -57,14 +73,16 @@ def certified_files(
     Raises CertificateError, in one sentence, where the certificate does not hold.
     """
     regrouping = regroup(robot)
-    return _certified(
-        regrouping,
-        generate_files(robot, targets=targets, command=command, regrouping=regrouping),
+    files = generate_files(
+        robot, targets=targets, command=command, regrouping=regrouping, options=options
     )
+    return _certified(regrouping, files, options)
 
 
-def _certified(regrouping: Regrouping, files: Mapping[str, str]) -> dict[str, str]:
-    certificate = certify(regrouping, files)
+def _certified(
+    regrouping: Regrouping, files: Mapping[str, str], options: Sequence[str] = ()
+) -> dict[str, str]:
+    certificate = certify(regrouping, files, options)
     require_valid(certificate)
     texts = {
         file: headed(text, certificate.texts[file], certificate.formulas)

@@ -28,6 +28,9 @@ READ_CALLS: dict[str, Any] = {
     "sin": np.sin,
     "sqrt": np.sqrt,
     "sign": np.sign,
+    "exp": np.exp,
+    "tanh": np.tanh,
+    "pow": np.power,
     "abs": np.abs,
     "Abs": np.abs,
     "max": np.maximum,
@@ -35,8 +38,6 @@ READ_CALLS: dict[str, Any] = {
     "min": np.minimum,
     "Min": np.minimum,
     "Rational": operator.truediv,
-    "Integer": int,
-    "S": int,
     "Matrix": list,
 }
 NEXT = re.compile(r", (?=[A-Za-z]\w* = )")
@@ -76,6 +77,8 @@ def _value(e: ast.AST, known: Mapping[str, Any]) -> Any:
             return e.value
         case ast.Name():
             return known[e.id]
+        case ast.Attribute(attr="pi"):
+            return np.pi
         case ast.UnaryOp():
             return OPERATORS[type(e.op)](_value(e.operand, known))
         case ast.BinOp():
@@ -87,7 +90,7 @@ def _value(e: ast.AST, known: Mapping[str, Any]) -> Any:
             for operate, right in reversed(later):
                 value = operate(value, _value(right, known))
             return value
-        case ast.Call(func=ast.Name(id=function)):
+        case ast.Call(func=ast.Name(id=function) | ast.Attribute(attr=function)):
             return READ_CALLS[function](*(_value(a, known) for a in e.args))
         case ast.List():
             return [_value(a, known) for a in e.elts]
@@ -105,7 +108,7 @@ def equations(text: str) -> list[tuple[str, str]]:
         found += [(e["name"], e["expression"]) for e in document.get("equations", ())]
         found += document.get("entries", {}).items()
         return found + [("det A", e) for e in [document.get("denominator")] if e]
-    if text.startswith("from sympy"):
+    if text.startswith("import sympy"):
         assigned = [s for s in ast.parse(text).body if isinstance(s, ast.Assign)]
         return [
             (s.targets[0].id, ast.unparse(s.value))

@@ -14,6 +14,7 @@ from symgen.certify.witness import Witness
 from symgen.derive.columns import acting, element_names, unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
+from symgen.emit.header import scalars
 from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping
 
@@ -50,12 +51,12 @@ def _right(module: ModuleType, name: str, witness: Witness) -> bool:
             defaults = [d for f in vars(module).values() for d in _defaults(f)]
             return all(constants[c] == x for c, x in defaults if c in constants)
         case "ELEMENTS":
-            drawn = module.elements(**witness.constants)
+            drawn = module.elements(**witness.keywords)
             return _same_elements(value, constants, witness) and _same_elements(
                 drawn, witness.constants, witness
             )
         case "ENTRIES" | "SIGNALS":  # the functions read the entries
-            signals = module.signals(witness.q, witness.qd, witness.qdd, **witness.constants)
+            signals = module.signals(witness.q, witness.qd, witness.qdd, **witness.keywords)
             D = np.zeros_like(witness.own)
             for k, j, s, c in module.ENTRIES:
                 D[:, j, k] = c * signals[s]
@@ -99,6 +100,7 @@ def _defaults(function: Any) -> list[tuple[str, float]]:
 def _expected(witness: Witness) -> dict[str, Any]:
     robot, regrouping = witness.robot, witness.regrouping
     return {
+        **robot.constants,  # values of a module that takes no others
         "SCHEMA": 1,
         "NAME": robot.name,
         "SOURCE_SHA256": robot.sha256,
@@ -106,7 +108,7 @@ def _expected(witness: Witness) -> dict[str, Any]:
         "PASSIVE": robot.passive,
         "LINKS": robot.links,
         "LABELS": robot.labels,
-        "CONSTANTS": robot.constants,
+        "CONSTANTS": regrouping.constants,
         "BASE_PARAMETERS": regrouping.names,
         "STANDARD_PARAMETERS": robot.parameters,
         "UNITS": {b.name: unit(robot, b.own) for b in regrouping.base},
@@ -114,6 +116,7 @@ def _expected(witness: Witness) -> dict[str, Any]:
         "DRIVES": robot.drives and asdict(robot.drives),
         "LIMITS": robot.limits,
         "VALUES": robot.values,
+        **({"FIT": fit} if (fit := scalars(robot)) else {}),
     }
 
 
@@ -134,7 +137,7 @@ def _same_elements(table: Any, constants: Mapping[str, float], witness: Witness)
     for name, (e, j) in expected.items():
         kind, when, row = table[name]
         right = {i: c.value(constants) for i, c in acting(e, j).items()}
-        if (kind, when) != (e.kind, e.when or "both") or {*row} != {*right}:
+        if (kind, when) != (e.acts_as, e.when or "both") or {*row} != {*right}:
             return False
         if any(abs(row[i] - c) > EVALUATED_TWICE * abs(c) for i, c in right.items()):
             return False

@@ -159,7 +159,7 @@ def largest(
     """Largest error of a function in all its checks."""
     try:
         return max(
-            difference(c.compared(call(module, name, c, witness.constants)), c.expected, c.scale)
+            difference(c.compared(call(module, name, c, witness.keywords)), c.expected, c.scale)
             for c in checks
         )
     except Exception:  # a text may fail in any way
@@ -171,7 +171,9 @@ def difference(value: Any, expected: Array, scale: Array | float) -> float:
     value = np.asarray(value, dtype=float)
     if value.shape != expected.shape:
         return float("inf")
-    return float(np.max(np.abs(value - expected) / scale, initial=0.0))
+    error = np.abs(value - expected)
+    error = np.divide(error, scale, out=error, where=error != 0)  # 0/0 is 0
+    return float(np.max(error, initial=0.0))
 
 
 def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
@@ -202,7 +204,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     """Errors of the functions of a C file, results written past the caches too."""
     name, library = witness.robot.name, path.with_suffix(".so")
     rows = np.arange(TILES) % STATES
-    own, constants = witness.own[rows], [*witness.constants.values(), 0.0]
+    own, constants = witness.own[rows], [*witness.keywords.values(), 0.0]
     N, n, b = own.shape
     found = re.findall(rf"^int32_t {name}_(\w+)\(", text, re.MULTILINE)
     checks = {
@@ -247,9 +249,11 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     errors["signals"] = difference(store.reshape(b, n, N).T, own, 1.0)
     store[row[:varying]] = 0.0  # the functions leave to their caller what is constant
     for (f, check, _), (status, numbers) in zip(2 * asked, results, strict=True):
-        value = np.reshape(numbers, (*check.expected.shape[:0:-1], N)).T
+        shape = check.expected.shape[1:]
         if MODELS[f].by_columns:
-            value = value + store.reshape(b, n, N).T
+            value = (np.reshape(numbers, (*shape[::-1], N)) + store.reshape(b, n, N)).T
+        else:
+            value = np.moveaxis(np.reshape(numbers, (*shape, N)), -1, 0)
         worst = float("inf") if status else difference(value, check.expected, check.scale)
         errors[f] = max(errors.get(f, 0.0), worst)
     return errors | {"SOURCE_SHA256": 0.0 if f'"{witness.robot.sha256}"' in text else float("inf")}

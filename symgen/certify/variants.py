@@ -8,8 +8,8 @@ length or gravity, without another derivation.
 Its columns are all standard parameters: which of them regroup depends on the geometry, and is left
 to the numbers. `runtime.identify` takes it
 as `variants` and tries with it whether another table explains a record better. A robot with closed
-loops keeps its table, which the loops
-have to close; gravity alone is free there.
+loops keeps its table, which the loops have to close; gravity alone is free there. Frames between
+joints that a constraint ties keep their entries: it holds for this geometry.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def freed(robot: Robot) -> Robot:
     """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of
     its gravity.
     """
-    constants = dict(robot.constants)
+    constants, tied = dict(robot.constants), tied_frames(robot)
 
     def symbol(name: str, entry: Expression) -> Expression:
         constants[f"{FREE}{name}"] = float(entry.value(robot.constants))
@@ -83,8 +83,19 @@ def freed(robot: Robot) -> Robot:
         }
         return replace(f, **entries)
 
-    frames = robot.frames if robot.loops else tuple(map(free, robot.frames))
+    frames = tuple(f if robot.loops or f.j in tied else free(f) for f in robot.frames)
     gx, gy, gz = (
         symbol(f"g{axis}", entry) for axis, entry in zip("xyz", robot.gravity, strict=True)
     )
     return replace(robot, frames=frames, gravity=(gx, gy, gz), constants=constants)
+
+
+def tied_frames(robot: Robot) -> set[int]:
+    """Frames on the paths between the joints that constraints tie to each other."""
+    return {
+        frame
+        for j, e in robot.constraints.items()
+        for i in robot.joints
+        if f"q{i}" in e.symbols
+        for frame in {*robot.path(j)} ^ {*robot.path(i)}
+    }

@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symgen.certify.on_request import ANGLE_STEP, SIX_POINTS, of_elements, requested_values
 from symgen.derive.exact import Array
 from symgen.derive.loop_residual import inertia_of
 from symgen.derive.loops import close
-from symgen.derive.models import DISSIPATIVE, EMITTED
+from symgen.derive.models import EMITTED, ON_REQUEST
 from symgen.description.expression import ONE
 from symgen.description.robot import INERTIAL, Robot, parameter
 from symgen.emit.header import one_sided_friction_that_absorbs
@@ -39,8 +40,8 @@ MOVED = 1e-9  # rows of a Jacobian below are zero
 SMALL = 1e-6  # of the largest entry: columns of the regressor below are compared with that
 SPREADS = ((0.25, 0.3), (0.25, 0.0), (0.03, 0.03), (0.03, 0.0))  # of constants, of those that are 0
 RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
-ANGLE_STEP, SPEED_STEP = 1e-2, 1e-4  # rad or m, and their rates
-SIX_POINTS = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}  # central differences of sixth order
+SPEED_STEP = 1e-4  # rad/s or m/s
+ANGLE_STEP_OF_LAWS, SPEED_STEP_OF_LAWS = 1e-4, 1e-5  # the same, where laws bend and jump
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,17 @@ class Witness:
     fixed : mapping, optional
         Values of constants, of q1, QP1, QDP1 ... of actuated joints, and of parameters, in the
         place of drawn ones.
+    options : sequence of str
+        Models on request that are asked for.
     """
 
-    def __init__(self, regrouping: Regrouping, fixed: Mapping[str, float] | None = None) -> None:
-        self.regrouping, self.robot = regrouping, regrouping.robot
+    def __init__(
+        self,
+        regrouping: Regrouping,
+        fixed: Mapping[str, float] | None = None,
+        options: Sequence[str] = (),
+    ) -> None:
+        self.regrouping, self.robot, self.options = regrouping, regrouping.robot, options
         fixed = fixed or {}
         sample, self.drawn = _sampled(regrouping, fixed)
         self.model, self.constants = sample.model, sample.model.constants
@@ -118,6 +126,11 @@ class Witness:
     def X(self) -> Array:
         """Base parameters of chi by the formulas."""
         return base_values(self.regrouping, self.chi, self.constants)
+
+    @property
+    def keywords(self) -> dict[str, float]:
+        """Constants that the functions take by keyword."""
+        return {name: self.constants[name] for name in self.regrouping.constants}
 
     @cached_property
     def own(self) -> Array:
@@ -165,6 +178,7 @@ class Witness:
             ]
 
         given = {"q": q, "qd": qd, "qdd": qdd, "tau": self.tau, "X": X}
+        given |= {"qdr": qdd, "qddr": self.tau / largest}
         checks = {
             "base_parameters": [Check((self.chi,), X, size)],
             "regressor": [],  # its place, before what is stacked of it
@@ -173,7 +187,8 @@ class Witness:
                 Check((q[0], qd[0], qdd[0]), self.own[0], columns),
             ],
         }
-        for m in EMITTED.values():
+        asked = [m for m in ON_REQUEST.values() if m.option in self.options]
+        for m in (*EMITTED.values(), *asked):
             arguments, checks[m.name] = tuple(given[a] for a in m.arguments), []
             for j in (None, *(f.j for f in self.robot.frames)) if m.of_frames else (None,):
                 expected = self.value(m.name, j or self.robot.frames[-1].j)
@@ -217,7 +232,7 @@ class Witness:
         """What a model has to give, (N, ...): of frame `of`, in components of frame `frame`; of a
         determinant, of these rows from 1, else of those that are not zero.
         """
-        N, chi, T = len(self.q), self.chi, self.poses
+        N, chi, T, friction = len(self.q), self.chi, self.poses, lambda e: e.is_friction
         R = T[:, frame, :3, :3].swapaxes(1, 2)
 
         def turned(twist: Array) -> Array:
@@ -239,7 +254,7 @@ class Witness:
 
         def coriolis() -> Array:
             """C e_j = (h(qd + e_j) - h(qd) - h(e_j))/2 of the quadratic h = C(qd) qd."""
-            q, qd, still = self.q, self.qd, chi * ~of_kinds(self.robot, *DISSIPATIVE)
+            q, qd, still = self.q, self.qd, chi * ~of_elements(self.robot, friction)
             at_rest = self.torque(q, 0 * q, 0 * q, still)
             h = [
                 self.torque(q, u, 0 * q, still) - at_rest
@@ -264,13 +279,16 @@ class Witness:
             "acceleration": lambda: acceleration(self.qdd),
             "coriolis": coriolis,
             "friction": lambda: self.torque(
-                self.q, self.qd, 0 * self.q, chi * of_kinds(self.robot, *DISSIPATIVE)
+                self.q, self.qd, 0 * self.q, chi * of_elements(self.robot, friction)
             ),
             "kinetic_energy": lambda: np.einsum("ti,tij,tj->t", self.qd, self.A, self.qd) / 2,
             "potential_energy": lambda: self.model.potential_energy(self.x, chi),
             "base_parameters": lambda: np.tile(self.X, (N, 1)),
             "closure": lambda: np.zeros((N, 1)),
         }
+        states, tree = (self.q, self.qd, self.qdd), (self.x, self.xd, self.xdd)
+        qddr = self.tau / np.abs(self.tau).max()
+        values |= requested_values(self.model, self.regrouping, chi, states, tree, qddr)
         return np.asarray(values[name]())
 
     @cached_property
@@ -279,16 +297,16 @@ class Witness:
         zero.
         """
         q, qd, qdd, n = self.q[:FEW], self.qd[:FEW], self.qdd[:FEW], self.q.shape[1]
-        smooth = self.chi * ~of_kinds(self.robot, "coulomb")
+        smooth = self.chi * ~of_elements(self.robot, lambda e: e.kind == "coulomb")
+        laws = any(e.is_own for e in self.robot.elements)
+        h, hd = (ANGLE_STEP_OF_LAWS, SPEED_STEP_OF_LAWS) if laws else (ANGLE_STEP, SPEED_STEP)
         by_q, by_qd = np.zeros((2, FEW, n, n))
         for k, e in enumerate(np.eye(n)):
             for m, c in SIX_POINTS.items():
-                ahead, behind = (
-                    self.torque(q + s * m * ANGLE_STEP * e, qd, qdd, smooth) for s in (1, -1)
-                )
-                by_q[:, :, k] += c * (ahead - behind) / ANGLE_STEP
-            ahead, behind = (self.torque(q, qd + s * SPEED_STEP * e, qdd, smooth) for s in (1, -1))
-            by_qd[:, :, k] = (ahead - behind) / (2 * SPEED_STEP)
+                ahead, behind = (self.torque(q + s * m * h * e, qd, qdd, smooth) for s in (1, -1))
+                by_q[:, :, k] += c * (ahead - behind) / h
+                ahead, behind = (self.torque(q, qd + s * m * hd * e, qdd, smooth) for s in (1, -1))
+                by_qd[:, :, k] += c * (ahead - behind) / hd
         A, D = self.A[:FEW], self.own[:FEW]
         by_motion = np.concatenate([by_q, by_qd], axis=2)
         inverse = np.concatenate([by_motion, A, D], axis=2)
@@ -315,10 +333,9 @@ def ungrouped(robot: Robot) -> Regrouping:
     )
 
 
-def of_kinds(robot: Robot, *kinds: str) -> Array:
-    """Whether each standard parameter is one of elements of these kinds."""
-    own = {parameter(e.family, j) for e in robot.elements if e.kind in kinds for j in e.keys}
-    return np.array([name in own for name in robot.parameters])
+def is_assumed(robot: Robot) -> Array:
+    """Whether each standard parameter is one that the robot file says is zero."""
+    return np.array([name in robot.assume for name in robot.parameters])
 
 
 def bodies(robot: Robot, rng: np.random.Generator) -> Array:
@@ -331,7 +348,7 @@ def bodies(robot: Robot, rng: np.random.Generator) -> Array:
         J = np.einsum("p,pk,pk->", m, P, P) * np.eye(3) - np.einsum("p,pk,pl->kl", m, P, P)
         first = robot.parameters.index(parameter(INERTIAL[0], j))
         chi[first : first + len(INERTIAL)] = [*J[np.triu_indices(3)], *(m @ P), m.sum()]
-    return chi
+    return np.asarray(chi * ~is_assumed(robot))
 
 
 def base_values(regrouping: Regrouping, chi: Array, constants: Mapping[str, float]) -> Array:

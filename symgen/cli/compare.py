@@ -32,7 +32,7 @@ def compare(
     record.
 
     Of one study: as stated, without the rows of joints that stand, with known torques left out. In
-    each, the parameters that identify prints first are taken. Exit code 1 where the best cannot be
+    each, the set of parameters that predicts best is taken. Exit code 1 where the best cannot be
     used.
     """
     with session.progress_lines(), session.results_in(output) as results:

@@ -5,7 +5,7 @@ there.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +14,7 @@ import typer
 from runtime.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import NEGATIVE, described_robot, fail, reported_errors
+from symgen.derive.models import OPTIONS
 from symgen.emit.targets import TARGETS
 
 
@@ -38,6 +39,16 @@ def generate(
             )
         ),
     ] = "numpy",
+    with_: Annotated[
+        str,
+        typer.Option(
+            "--with",
+            help=(
+                "Functions on request: coriolis, slotine_li, momentum, energy, "
+                "base_wrench_regressor, or several as coriolis,energy."
+            ),
+        ),
+    ] = "",
     at_values: options.AtValues = False,
     exact: options.Exact = False,
     check: Annotated[
@@ -51,19 +62,28 @@ def generate(
     All are written, or none.
     """
     with reported_errors():
-        targets = tuple(dict.fromkeys(map(str.strip, target.split(","))))
-        if unknown := [part for part in targets if part not in TARGETS]:
-            fail(f"target {', '.join(map(repr, unknown))}; there is {', '.join(TARGETS)}")
-        modules = emitted(robots, targets, at_values, exact)
+        targets = _among(TARGETS, "target", target)
+        requested = _among(OPTIONS, "--with", with_) if with_ else ()
+        modules = emitted(robots, targets, requested, at_values=at_values, exact=exact)
         if check:
             report_differences(output, modules)
         else:
             typer.echo("\n".join(map(str, write_all(output, modules))))
 
 
+def _among(known: Collection[str], what: str, text: str) -> tuple[str, ...]:
+    """The words of a list as one writes them; a wrong one ends the program with those there are."""
+    words = tuple(dict.fromkeys(map(str.strip, text.split(","))))
+    if unknown := [word for word in words if word not in known]:
+        fail(f"{what} {', '.join(map(repr, unknown))}; there is {', '.join(known)}")
+    return words
+
+
 def emitted(
     robots: list[str],
     targets: Sequence[str] = ("numpy",),
+    requested: Sequence[str] = (),
+    *,
     at_values: bool = False,
     exact: bool = False,
 ) -> dict[str, str]:
@@ -76,7 +96,8 @@ def emitted(
         robot = described_robot(source, at_values, exact)
         command = source if source in packaged_robots() else robot.file
         command += " --at-values" * at_values + " --exact" * exact
-        files = certified_files(robot, targets=targets, command=command)
+        command += f" --with {','.join(requested)}" * bool(requested)
+        files = certified_files(robot, targets=targets, command=command, options=requested)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
         for left_out in (t for t in targets if TARGETS[t].file.format(robot.name) not in files):

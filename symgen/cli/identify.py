@@ -50,10 +50,24 @@ def identify(
     workers: options.Workers = 1,
     trust: options.Trust = False,
     exact: options.Exact = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            help="Print also how parameters were removed, the validation, deviations, residuals.",
+        ),
+    ] = False,
+    suggest: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a study file in which the records can be read, with what is likely to cure "
+            "each refusal (columns by their names, resampling, units), and go on with it."
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> None:
-    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Exit code
-    1 where the estimator does not end well.
+    """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Ends with
+    the verdict: exit code 0 for Yes and With care, 1 for No.
     """
     from runtime.parallel import Workers
 
@@ -70,6 +84,7 @@ def identify(
         model = session.model_of(robot, target, trust=trust, exact=exact)
         study = session.study_of_arguments(record)
         study = study if block is None else replace(study, stream=block)
+        study = study if suggest is None else session.suggested_study(study, model, suggest)
         if is_stream(study.record, study.stream):
             processes.start("runtime.identification.identification")
         records = records_or_streams(
@@ -88,5 +103,8 @@ def identify(
         )
         if results is not None:
             runtime.report(result, results)
-        session.show(result.to_json() if json else result.to_text(), results, json=json)
-    session.end(good=result.usable)
+        text = result.to_text() if verbose else result.brief()
+        said = session.assumptions_of(robot, records, study, exact=exact)
+        text = "\n".join([*(f"assume: {line}" for line in said), text])
+        session.show(result.to_json() if json else text, results, json=json)
+    session.end(good=result.checklist.state != "no")

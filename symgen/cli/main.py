@@ -30,6 +30,7 @@ VERBS = {
     "apply": "Write identified values into your own URDF or MJCF, in place.",
     "new": "Write a skeleton robot file.",
     "schema": "Print the JSON Schema of robot files or of results.",
+    "studio": "Serve a local page where one works: robot, record, check, solve, results.",
     "demo": "The main job end to end, with a report.",
 }
 

@@ -143,7 +143,7 @@ def model_of(
     if path.suffix == ".py":
         model = load_model(path, trust=trust)
     else:
-        model = load_model(symgen.model(symgen.load_robot(robot, exact=exact)))
+        model = load_model(symgen.model(described_robot(robot, exact=exact)))
     return model if target == "numpy" else _in_c(model, robot, exact)
 
 
@@ -173,6 +173,25 @@ def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
         if Path(robot).suffix == ".py"
         else load_model(symgen.variants(symgen.load_robot(robot, exact=exact)))
     )
+
+
+def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = False) -> list[str]:
+    """A sentence on each parameter that the file of a ROBOT argument assumes to be zero."""
+    from dataclasses import replace
+
+    import runtime
+    import symgen
+    from runtime.identification.assumptions import assumptions_asked
+    from runtime.model.generated import load_model
+
+    described = None if Path(robot).suffix == ".py" else symgen.load_robot(robot, exact=exact)
+    if described is None or not described.assume:
+        return []
+    free = load_model(symgen.model(replace(described, assume=frozenset())))
+    fit = runtime.estimate(free, runtime.observe(free, records, study))
+    if fit.status != "ok":
+        return ["assume: the record does not determine the model without the assumptions"]
+    return [a.text for a in assumptions_asked(free, fit, sorted(described.assume))]
 
 
 def model_of_job(robot: str, *, trust: bool = False, exact: bool = False) -> GeneratedModel:
@@ -254,6 +273,22 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
             )
         further = replace(like, files=(record,), dataset=None, name=None)
         study = replace(study, record=(*study.record, further))
+    return study
+
+
+def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
+    """The study with what is likely to cure each refusal of its records, written to `path`."""
+    from runtime.errors import InputError
+    from runtime.records.suggested import suggested
+    from runtime.result_files import write_all
+    from runtime.settings.location import study_text
+
+    if path.exists():
+        raise InputError("the study to suggest exists; choose another name", file=str(path))
+    study, told = suggested(study, model)
+    write_all(path.resolve().parent, {path.name: study_text(study, path.resolve().parent)})
+    for text in (*told, f"suggested study: {path}; look at it before you trust the values"):
+        say(text)
     return study
 
 

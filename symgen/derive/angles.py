@@ -18,6 +18,7 @@ from functools import lru_cache
 from math import gcd, lcm
 
 from symgen.description.expression import Call, Expression, Monomial, Number, quarter_turns
+from symgen.description.kinds import STATE
 from symgen.description.robot import REVOLUTE, Robot
 
 PI: Monomial = (("pi", 1),)
@@ -184,6 +185,33 @@ def _angles(robot: Robot) -> Iterator[Expression]:
         if robot.frame(j).sigma == REVOLUTE:
             yield e.substitute(joints)
     yield from (a.argument for a in _calls(robot) if a.function in ("cos", "sin"))
+    yield from _angles_of_laws(robot)
+
+
+def _angles_of_laws(robot: Robot) -> Iterator[Expression]:
+    """The constants of the angles in laws of columns, where these are whole turns of joints."""
+    keys = [(e, j) for e in robot.elements if e.is_own for j in e.along]
+    pending = [x for e, j in keys for x in (e.law(j), e.potential(j))]
+    for law in pending:
+        for a in law.atoms:
+            if isinstance(a, Call):
+                pending += a.operands
+                if a.function in ("cos", "sin"):
+                    yield Expression(
+                        {
+                            m: c
+                            for m, c in a.argument.terms.items()
+                            if not any(varies(b) for b, _ in m)
+                        }
+                    )
+
+
+def varies(a: str | Number | Call) -> bool:
+    """Whether an atom of a law is no constant expression of robot files."""
+    if isinstance(a, Call):
+        exact = a.function in ("cos", "sin", "inv")
+        return not exact or any(varies(b) for e in a.operands for b in e.atoms)
+    return not isinstance(a, Number) and bool(STATE.match(a))
 
 
 def rows_of(robot: Robot) -> list[Expression]:

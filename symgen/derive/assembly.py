@@ -83,6 +83,17 @@ class Assembly:
         """Free joints without an actuator."""
         return tuple(self.free[k] for k in self.passive)
 
+    def guess(self, start: Mapping[int, float], rng: np.random.Generator | None) -> Array:
+        """A place to look from: joints of `start` there, the others drawn, or at one and the same
+        place.
+        """
+        drawn = (
+            rng.uniform(-np.pi, np.pi, len(self.free))
+            if rng
+            else [0.3 + 0.1 * j for j in self.free]
+        )
+        return np.array([start.get(j, x) for j, x in zip(self.free, drawn, strict=True)])
+
     def configuration(self, q: Array) -> dict[int, float]:
         """All moving joints of one configuration."""
         return dict(zip(self.robot.moving, (self.N @ q + self.c).tolist(), strict=True))

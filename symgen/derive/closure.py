@@ -66,12 +66,15 @@ class Closure:
         for i, g in sorted(self.row[j].items()):
             c = g.constant
             if c is None or c.denominator != 1:
+                theirs, other = (
+                    f"{label!a:.60} (q{k})" if (label := self.robot.labels.get(k)) else f"q{k}"
+                    for k in (j, i)
+                )
                 raise DescriptionError(
-                    (
-                        f"q{j} turns {g} times with q{i}; a passive angle needs whole multiples of "
-                        "other angles"
-                    ),
+                    f"constraints.q{j}: {theirs} turns {g} times with {other}; a passive angle "
+                    "needs whole multiples of other angles",
                     path=("constraints", f"q{j}"),
+                    file=self.robot.file or None,
                 )
             turn.append((i, int(c)))
         return tuple(turn), self.offset[j]

@@ -43,7 +43,7 @@ def unit(robot: Robot, name: str) -> str:
     if name in inertial:
         return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
     e, j = element_names(robot)[name]
-    return KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
+    return e.unit or KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
 
 
 def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:

@@ -12,6 +12,7 @@ from symgen.derive.loops import close
 from symgen.description.expression import PI, twelfths
 from symgen.description.robot import REVOLUTE, Robot
 
+FAR = 0.3  # rad, or of the longest length
 CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
 
 GRAVITY = 0.5, 30.0  # m/s^2, of small moons and large planets
@@ -23,10 +24,10 @@ UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 def doubts(robot: Robot) -> list[str]:
     """A sentence for each. Raises DescriptionError where a loop does not close."""
-    return [*nearly_round(robot), *other_units(robot), *equal_sides(robot)]
+    return [*nearly_round(robot), *other_units(robot), *equal_sides(robot), *far_starts(robot)]
 
 
-def nearly_round(robot: Robot) -> list[str]:
+def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
     """Angles written as decimals, such as 1.5708: exact arithmetic takes them for oblique ones,
     with formulas and base parameters of their own.
     """
@@ -35,7 +36,7 @@ def nearly_round(robot: Robot) -> list[str]:
         for name, angle in (("gamma", f.gamma), ("alpha", f.alpha), ("theta", f.theta0)):
             if not (value := angle.constant):
                 continue
-            k = twelfths(float(value), CLOSE)
+            k = twelfths(float(value), within)
             if k is not None:
                 meant = PI * Fraction(k, 12)
                 notes.append(
@@ -115,3 +116,15 @@ def equal_sides(robot: Robot) -> list[str]:
                 "parallelogram is seen as one"
             )
     return notes
+
+
+def far_starts(robot: Robot) -> list[str]:
+    """Joints that no closed configuration has near the `start` of their loop."""
+    closed, longest = close(robot).start, robot.longest
+    units = {j: 1.0 if robot.frame(j).sigma == REVOLUTE else longest for j in robot.start}
+    far = [j for j, x in robot.start.items() if abs(closed[j] - x) > FAR * units[j]]
+    wanted, found = (
+        ", ".join(f"q{j} = {values[j]:.4g}" for j in far) for values in (robot.start, closed)
+    )
+    text = f"start: the loops close nowhere near {wanted}; nearest, and derived, is {found}"
+    return [text] if far else []

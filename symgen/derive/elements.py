@@ -1,60 +1,160 @@
-"""Torque columns of the elements on the joints: inertia, viscous and Coulomb friction, offset,
-stiffness.
+"""Torque columns of the elements on the joints: those of KINDS, and those of the user.
 
-along G, s = G q:   Gamma += c G' x,   x = sdd | sd | sign(sd) | 1 | s
+along G, s = G q:   Gamma += c G' x,   x the law of the element over s, sd, sdd
 form B:             Gamma += c B x,    x = qdd | qd | q
+energy U:           Gamma_i += c dU/dq_i
+
+A law is a polynomial over calls. Cosines and sines of whole multiples of joint angles and signs of
+velocities are those of the robot, hence exact over F_p; every other call of a state is a node of
+its own, of which exact arithmetic knows nothing but what it is of.
 """
 
 from __future__ import annotations
 
+from symgen.derive.angles import varies
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import Scalar, add, linear, mul
-from symgen.description.robot import Element, Form, parameter
+from symgen.derive.scalar import AT_ZERO, Scalar, Turn, add, linear, mul
+from symgen.description.expression import ONE, ZERO, Atom, Call, Expression
+from symgen.description.kinds import STATE
+from symgen.description.robot import Element, Form, Row, parameter
+
+NODES = {"cos": "cosine", "sin": "sine", "sqrt": "root", "pow": "power"}
+"""Operations of calls that exact arithmetic does not know; others keep their names."""
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
     """{i: D_ik} of the parameter of element `e` with key j, i over the moving joints it acts on."""
     if j in e.form:
-        return _form(motion, e.kind, e.form[j])
+        return _form(motion, str(e.law(j)), e.form[j])
     row = e.along[j]
-    x = _along(motion, e, j)
-    if type(x) is int and x == 0:
+    law, others = e.laws(j)
+    values = _Law(motion, e, j)
+    x = values.one_sided(law) if e.when is not None else values.of(law)
+    if type(x) is int and x == 0 and not others:
         return dict.fromkeys(row, 0)
-    return {i: mul(motion.algebra.constant(g), x) for i, g in row.items()}
+    column = {i: mul(motion.algebra.constant(g), x) for i, g in row.items()} if law else {}
+    for i, slope in others.items():
+        column[i] = add(column.get(i, 0), values.of(slope))
+    return column
 
 
-def _coordinate(motion: Motion, kind: str, j: int) -> Scalar:
-    rates = {"inertia": motion.qdd, "viscous": motion.qd, "coulomb": motion.qd}
-    return rates.get(kind, motion.q)(j)
+def law_value(motion: Motion, e: Element, j: int, law: Expression) -> Scalar:
+    """The value of an expression over the states that the law of key j of an element has."""
+    return _Law(motion, e, j).of(law)
 
 
-def _along(motion: Motion, e: Element, j: int) -> Scalar:
-    """x of the element with key j; the velocity along several joints is named after the element,
-    since other rows may have these joints.
+class _Law:
+    """Values of the law of key j of an element over the scalars of a motion; the velocity along
+    several joints is named after the element, since other rows may have these joints.
     """
-    if e.kind == "offset":
-        return 1
-    row = e.along[j]
-    rate = linear(motion.algebra, row, {i: _coordinate(motion, e.kind, i) for i in row})
-    if e.kind in ("viscous", "coulomb"):
-        if len(row) > 1:
-            rate = motion.algebra.name(rate, f"{motion.named('QP')}{parameter(e.family, j)}")
-        if type(rate) is int:
-            return 0  # at rest
-        key = motion.geometry.closure.in_independent(row)
-        if not key:
-            return 0  # the closure holds s still
-        if e.when is not None:
-            direction, speed = motion.algebra.one_sided(rate, key, e.when)
-            return direction if e.kind == "coulomb" else speed
-        return motion.algebra.sign(rate, key) if e.kind == "coulomb" else rate
-    return rate
+
+    def __init__(self, motion: Motion, e: Element, j: int) -> None:
+        self.motion, self.element, self.row = motion, e, e.along[j]
+        self.name = f"{motion.named('QP')}{parameter(e.family, j)}"
+
+    def of(self, e: Expression) -> Scalar:
+        """The value of an expression."""
+        total: Scalar = 0
+        for m, c in e.ordered:
+            varying = [(a, n) for a, n in m if varies(a)]
+            fixed = Expression({tuple(an for an in m if an not in varying): c})
+            term = self.motion.algebra.constant(fixed)
+            for a, n in varying:
+                x = self._atom(a)
+                x = self.motion.algebra.function("inv", x) if n < 0 else x
+                for _ in range(abs(n)):
+                    term = mul(term, x)
+            total = add(total, term)
+        return total
+
+    def one_sided(self, law: Expression) -> Scalar:
+        """sd or sign(sd) in motion of the direction `when` alone."""
+        rate, key = self._atom("qd"), self.motion.geometry.closure.in_independent(self.row)
+        if type(rate) is int or not key:
+            return 0  # at rest, or the closure holds s still
+        direction, speed = self.motion.algebra.one_sided(rate, key, str(self.element.when))
+        return speed if law == Expression.symbol("qd") else direction
+
+    def _atom(self, a: Atom) -> Scalar:
+        if isinstance(a, Call):
+            return self._call(a)
+        state, joint = STATE.match(str(a)).groups()  # type: ignore[union-attr]
+        coordinate = getattr(self.motion, state)
+        if joint:
+            return coordinate(int(joint))
+        rate = linear(self.motion.algebra, self.row, {i: coordinate(i) for i in self.row})
+        if state == "qd" and len(self.row) > 1:
+            rate = self.motion.algebra.name(rate, self.name)
+        return rate
+
+    def _call(self, a: Call) -> Scalar:
+        motion, algebra = self.motion, self.motion.algebra
+        if a.function == "sign" and (part := linear_in(a.argument, "qd", self.row)):
+            row, rest = part
+            key = motion.geometry.closure.in_independent(row)
+            if not rest:
+                rate = self.of(a.argument)
+                return 0 if type(rate) is int or not key else algebra.sign(rate, key)
+        if a.function in ("cos", "sin") and (turn := self._turn(a.argument)):
+            return algebra.cos_sin(*turn)[a.function == "sin"]
+        operands = [self.of(e) for e in a.operands]
+        op = NODES.get(a.function, a.function)
+        if type(operands[0]) is int and operands[0] == 0 and op in AT_ZERO:
+            return AT_ZERO[op]
+        return algebra.function(op, *operands)
+
+    def _turn(self, angle: Expression) -> tuple[Turn, Expression] | None:
+        """The whole multiples of independent joints that an angle is, and its constant."""
+        if not (part := linear_in(angle, "q", self.row)):
+            return None
+        row, rest = self.motion.geometry.closure.relation(*part)
+        whole = {i: c.constant for i, c in row.items()}
+        if any(c is None or c.denominator != 1 for c in whole.values()):
+            return None
+        return tuple((i, int(c)) for i, c in whole.items() if c), rest
 
 
-def _form(motion: Motion, kind: str, form: Form) -> dict[int, Scalar]:
+def is_opaque(e: Element, j: int) -> bool:
+    """Whether the law of key j of an element has a function that exact arithmetic does not know."""
+    pending = [e.law(j), e.potential(j)]
+    for law in pending:
+        for a in law.atoms:
+            if isinstance(a, Call) and varies(a):
+                state = {"sign": "qd", "cos": "q", "sin": "q"}.get(a.function, "")
+                part = linear_in(a.argument, state, e.along[j])
+                rest = a.function == "sign" and part and part[1]
+                if a.function != "inv" and (not state or not part or rest):
+                    return True
+                pending += a.operands
+    return False
+
+
+def linear_in(
+    e: Expression, state: str, along: Row
+) -> tuple[dict[int, Expression], Expression] | None:
+    """(row, rest) of e = row . x + rest, x the positions (q) or velocities (qd) of the joints and
+    `state` alone the sum of those `along` a row; None where e is something else.
+    """
+    row: dict[int, Expression] = {}
+    rest = ZERO
+    for m, c in e.terms.items():
+        varying = [(a, n) for a, n in m if varies(a)]
+        fixed = Expression({tuple(an for an in m if an not in varying): c})
+        if not varying:
+            rest = rest + fixed
+            continue
+        match = STATE.match(str(varying[0][0]))
+        if len(varying) > 1 or varying[0][1] != 1 or not match or match[1] != state:
+            return None
+        joints = {int(match[2]): ONE} if match[2] else along
+        for i, g in joints.items():
+            row[i] = row.get(i, ZERO) + fixed * g
+    return row, rest
+
+
+def _form(motion: Motion, coordinate: str, form: Form) -> dict[int, Scalar]:
     column: dict[int, Scalar] = {}
     for (i, m), b in form.items():
-        column[i] = add(
-            column.get(i, 0), mul(motion.algebra.constant(b), _coordinate(motion, kind, m))
-        )
+        x = mul(motion.algebra.constant(b), getattr(motion, coordinate)(m))
+        column[i] = add(column.get(i, 0), x)
     return column

@@ -1,5 +1,5 @@
-"""What the recursions of `derive` do not give by themselves: velocities of links, energies, and
-C(q, qd) by recursion.
+"""What the recursions of `derive` do not give by themselves: velocities of links, energies,
+C(q, qd), and the columns of reference torques and of momentum.
 
 Energies of link j, with its velocities v_j of the origin and w_j in its frame, gravity g and its
 origin P_0j in frame 0:
@@ -8,7 +8,7 @@ origin P_0j in frame 0:
             U_j = -g . (M_j P_0j + A_0j MS_j)
 
 Both are linear in the parameters. Elements add E = 1/2 c sd**2 (inertia), U = 1/2 c s**2
-(stiffness), U = c s (offset).
+(stiffness), U = c s (offset), U = c energy (columns that give one).
 
 C by recursion. Per unit rate of joint k, a point r of link j has the velocity v_k + z_k x r. Its
 rate of change in space is
@@ -19,17 +19,30 @@ and C_ik is the torque at joint i that moves the links with these accelerations:
 mass points of dx/dq_i . d/dt(dx/dq_k), whose part per
 qd_l is the Christoffel symbol sum dx/dq_i . d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C',
 and Ad - 2C is skew symmetric.
+
+Columns of other dynamics, all linear in the parameters:
+
+    A qddr + C qdr + Q + friction    links that accelerate by qddr, and by C at the rates qdr
+    p = A qd                         torques of the accelerations qd from rest, without gravity
+    dp/dt - Gamma = C' qd - Q - friction ,    (C' qd)_i = sum_j v_j . F_ij + w_j . N_ij ,
+
+with the wrench (F_ij, N_ij) that moves link j with the accelerations a_i + U_i r of a unit rate of
+joint i.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from fractions import Fraction
 
-from symgen.derive.columns import element_names
+from symgen.derive.columns import columns, element_names, inertial_names
 from symgen.derive.derivation import Derivation
+from symgen.derive.elements import law_value
 from symgen.derive.frames import Frames
+from symgen.derive.graph import Symbol
 from symgen.derive.newton_euler import LinkMotion, Motion, joint_torques
+from symgen.derive.regressor import unit_wrench
 from symgen.derive.scalar import (
     E3,
     ZERO3,
@@ -44,6 +57,7 @@ from symgen.derive.scalar import (
     mul,
     scale,
     sub,
+    turned,
     vadd,
 )
 from symgen.description.expression import Expression
@@ -101,6 +115,8 @@ def potential_energy(d: Derivation) -> Scalar:
             total = add(total, mul(d.chi[name], mul(half, _square(d, e, j, positions))))
         elif e.kind == "offset":
             total = add(total, mul(d.chi[name], linear(d.algebra, e.along[j], positions)))
+        elif e.energy is not None:
+            total = add(total, mul(d.chi[name], law_value(d.motion, e, j, e.potential(j))))
     return total
 
 
@@ -112,36 +128,40 @@ def _square(d: Derivation, e: Element, j: int, x: Mapping[int, Scalar]) -> Scala
     return linear(d.algebra, e.form[j], {(i, m): mul(x[i], x[m]) for i, m in e.form[j]})
 
 
-class UnitRate(Motion):
-    """The accelerations a_k + U_k r of all links, by which the torques of `joint_torques` are
-    column k of C.
+class AtRates(Motion):
+    """The accelerations sum_k qdr_k (a_k + U_k r) of all links, by which the torques of
+    `joint_torques` are C qdr: column k of C where qdr_k = 1 is the only rate.
 
     Parameters
     ----------
     motion : Motion
         The links with their velocities.
-    k : int
-        Independent joint with unit rate.
+    rates : mapping
+        qdr of the independent joints; 0 of one that it leaves out.
+    tag : int
+        Last index of the names of the steps.
     """
 
-    def __init__(self, motion: Motion, k: int) -> None:
+    def __init__(self, motion: Motion, rates: Mapping[int, Scalar], tag: int) -> None:
         self.geometry, self.robot, self.algebra, self.named, self.tag = (
             motion.geometry,
             motion.robot,
             motion.algebra,
             motion.named,
-            (k,),
+            (tag,),
         )
+        every = dict.fromkeys(self.geometry.closure.independent, 0) | dict(rates)
         half = self.algebra.constant(HALF)
         z: dict[int, Vector] = {0: ZERO3}
         zd: dict[int, Vector] = {0: ZERO3}
         self.link: dict[int, LinkMotion] = {0: _link(ZERO3, ZERO3, ZERO3, ZERO3, half)}
         for f in self.robot.frames:
             j, w = f.j, motion.link[f.j].w
-            self.algebra.section(f"Link {j}, unit rate of joint {k}")
-            m, turn = self.geometry.carrier[j].m, dict(self.geometry.carrier[j].turn)
+            of = f"unit rate of joint {tag}" if tag else "reference rates"
+            self.algebra.section(f"Link {j}, {of}")
+            m = self.geometry.carrier[j].m
             axis_rate = (w[1], -w[0], 0)  # w x e3
-            n = self.algebra.constant(Expression.number(turn.get(k, 0)))
+            n = turned(self.algebra, self.geometry.carrier[j].turn, every)
             z[j] = self.vector("Z", vadd(self.geometry.from_carrier(j, z[m]), scale(n, E3)), j)
             zd[j] = self.vector(
                 "ZP", vadd(self.geometry.from_carrier(j, zd[m]), scale(n, axis_rate)), j
@@ -150,7 +170,7 @@ class UnitRate(Motion):
                 vadd(self.link[f.ant].a, apply(self.link[f.ant].U, self.geometry.P[j]))
             )
             if f.sigma == PRISMATIC:
-                n = self.algebra.constant(self.geometry.closure.row[j].get(k, Expression()))
+                n = linear(self.algebra, self.geometry.closure.row[j], every)
                 a = vadd(vadd(a, scale(n, axis_rate)), cross(z[j], scale(motion.qd(j), E3)))
             self.link[j] = _link(z[j], zd[j], w, self.vector("VP", a, j), half)
 
@@ -177,5 +197,65 @@ def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:
     return {
         (i, k): c
         for k in d.robot.joints
-        for i, c in d.actuated(joint_torques(UnitRate(d.motion, k), d.chi)).items()
+        for i, c in d.actuated(joint_torques(AtRates(d.motion, {k: 1}, k), d.chi)).items()
     }
+
+
+Columns = Mapping[str, Mapping[int, Scalar]]
+
+
+def _accelerated(d: Derivation, qdd: Mapping[int, Scalar]) -> Motion:
+    """The links at rest under gravity, accelerated by qdd; the joints have their rates."""
+    zero = dict.fromkeys(d.closure.independent, 0)
+    motion = copy(d.motion)
+    motion.link = Motion(d.geometry, tag=(0,), qd=zero, qdd={**zero, **qdd}).link
+    motion._qdd = {**zero, **qdd}
+    return motion
+
+
+def slotine_li(d: Derivation) -> Columns:
+    """Columns of A qddr + C qdr + Q + friction(qd), qdr and qddr inputs of their own."""
+    qdr, qddr = (
+        {i: d.algebra.graph.symbol(Symbol(kind, f"{family}{i}")) for i in d.robot.joints}
+        for kind, family in (("qdr", "QPR"), ("qddr", "QDPR"))
+    )
+    motion, turning = _accelerated(d, qddr), AtRates(d.motion, qdr, 0).link
+    motion.link = {j: _together(a, turning[j]) for j, a in motion.link.items()}
+    return columns(motion, d.robot.parameters)
+
+
+def _together(a: LinkMotion, b: LinkMotion) -> LinkMotion:
+    """The sum of two accelerations of a link."""
+    return LinkMotion(
+        b.w,
+        vadd(a.wd, b.wd),
+        tuple(map(vadd, a.DV, b.DV)),  # type: ignore[arg-type]
+        vadd(a.DW, b.DW),
+        tuple(map(vadd, a.U, b.U)),  # type: ignore[arg-type]
+        vadd(a.a, b.a),
+    )
+
+
+def momentum_rate(d: Derivation) -> Columns:
+    """Columns of C' qd - Q - friction = dp/dt - Gamma."""
+    at_rest = columns(_accelerated(d, {}), d.robot.parameters)
+    found = {name: {i: -x for i, x in D.items()} for name, D in at_rest.items()}
+    v, inertial = origin_velocities(d.motion), inertial_names(d.robot)
+    for i in d.robot.joints:
+        unit = AtRates(d.motion, {i: 1}, i).link
+        for name, (p, j) in inertial.items():
+            F, N = unit_wrench(unit[j], p)
+            power = add(dot(v[j], F), dot(d.motion.link[j].w, N))
+            found[name][i] = add(found[name].get(i, 0), power)
+    return found
+
+
+def base_wrench(d: Derivation) -> dict[str, tuple[Scalar, ...]]:
+    """{inertial parameter: force, then moment about the origin of frame 0}, in frame 0, by which
+    the base moves the robot.
+    """
+    found = {}
+    for name, (p, j) in inertial_names(d.robot).items():
+        F, N = (apply(d.poses[j][0], x) for x in unit_wrench(d.motion.link[j], p))
+        found[name] = (*F, *vadd(N, cross(d.poses[j][1], F)))
+    return found

@@ -20,6 +20,10 @@ Number Theory, 6.4):
 pi as a number is a random residue: it is transcendental. A `Number` has its value, or a residue
 where `geometry` gives one.
 
+Functions of laws that F_p does not have (exp, tanh, sin of half an angle, sign of a position) are
+x -> (x + k)**m with a k of the function and one large m: equal where what they are of is equal, and
+related in no other way. What else relates them shows in numbers (`regroup.regrouping`).
+
 Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of
 proportional rows G; max(sd, 0) = b sd. A torque is a
 polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero
@@ -28,9 +32,10 @@ polynomial; b is drawn from F_p as every other variable.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import lru_cache
+from itertools import islice
 from math import lcm
 
 import numpy as np
@@ -51,6 +56,7 @@ from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 
 Array = np.ndarray
+KEY, OPAQUE_POWER = 40_503, 479_001_599  # of functions that F_p does not have; the latter a prime
 FEW, MOST_PRIMES = (
     12,
     300,
@@ -334,6 +340,15 @@ class Draw(Unnamed):
         b, orientation = self._forward(row)
         return (b + b - 1) * orientation
 
+    def function(self, op: str, *operands: Scalar) -> Fp:
+        """A function of a law, see the head of this module."""
+        x = [self.residues(value) for value in operands]
+        if op == "inv":
+            return self._fp(power(x[0], self.p - 2, self.p))
+        total = sum((value * KEY**k % self.p for k, value in enumerate(x)), sum(op.encode()) * KEY)
+        value = power(total % self.p, OPAQUE_POWER, self.p)
+        return self._fp((2 * value - 1) % self.p if op == "sign" else value)
+
     def one_sided(
         self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str
     ) -> tuple[Scalar, Scalar]:
@@ -350,20 +365,25 @@ def primes_for(robot: Robot, count: int, seed: int | None = None) -> tuple[int, 
 
     Raises SymgenError where so many of them nest that none of MOST_PRIMES has all.
     """
+    nested, primes = nested_roots(robot), []
+    for p in islice(candidates(robot, seed), MOST_PRIMES):
+        if not nested or Draw(robot, 5, 1, p=p, attempts=FEW).complete:
+            primes.append(p)
+        if len(primes) == count:
+            return tuple(primes)
+    raise SymgenError(
+        f"robot {robot.name}: no prime found over which angles pi/{units_of(robot).D} and all its "
+        "square roots exist; write some of them as decimals"
+    )
+
+
+def candidates(robot: Robot, seed: int | None = None) -> Iterator[int]:
+    """Primes with p = -1 modulo 4 and 2D over which the large radicands are squares: downwards from
+    the largest, or from a random place.
+    """
     step = lcm(4, 2 * units_of(robot).D)
     top = 2**31 if seed is None else int(np.random.default_rng(seed).integers(2**30, 2**31))
-    squares, nested = [c for c in radicands(robot) if c >= LARGEST_RADICAND], nested_roots(robot)
-    p, tried = top // step * step - 1, 0
-    primes: list[int] = []
-    while len(primes) < count:
-        if p < 2**20 or tried == MOST_PRIMES:
-            raise SymgenError(
-                f"robot {robot.name}: no prime found over which angles pi/{step // 2} and all its "
-                "square roots exist; write some of them as decimals"
-            )
+    squares = [c for c in radicands(robot) if c >= LARGEST_RADICAND]
+    for p in range(top // step * step - 1, 2**20, -step):
         if is_prime(p) and all(pow(c, (p - 1) // 2, p) == 1 for c in squares):
-            tried += 1
-            if not nested or Draw(robot, 5, 1, p=p, attempts=FEW).complete:
-                primes.append(p)
-        p -= step
-    return tuple(primes)
+            yield p

@@ -9,11 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from symgen.derive.graph import OPAQUE
 from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Expression
 from symgen.description.robot import Robot
 
 Array = np.ndarray[Any, Any]
+
+
+ON_ARRAYS = {op: getattr(np, name) for op, name in OPAQUE.items() if op != "power"} | {
+    "power": np.power,
+    "inv": lambda x: 1.0 / x,
+    "sign": np.sign,
+}
 
 
 class FloatAlgebra(Unnamed):
@@ -83,6 +91,9 @@ class FloatAlgebra(Unnamed):
 
     def sign(self, rate: Scalar, row: object) -> Scalar:
         return np.sign(rate)
+
+    def function(self, op: str, *operands: Scalar) -> Scalar:
+        return ON_ARRAYS[op](*operands)
 
     def one_sided(self, rate: Scalar, row: object, when: str) -> tuple[Scalar, Scalar]:
         limit = np.maximum if when == "positive" else np.minimum

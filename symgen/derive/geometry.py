@@ -102,16 +102,19 @@ def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
 
 
 class Geometry:
-    """Rotations, positions and carriers of all frames of `robot`, over the scalars of `algebra`."""
+    """Rotations, positions and carriers of all frames of `robot`, over the scalars of `algebra`; of
+    those that frame `root` carries alone, where it is not the base.
+    """
 
-    def __init__(self, robot: Robot, algebra: Algebra, closure: Closure) -> None:
-        self.robot, self.algebra, self.closure = robot, algebra, closure
+    def __init__(self, robot: Robot, algebra: Algebra, closure: Closure, root: int = 0) -> None:
+        self.robot, self.algebra, self.closure, self.root = robot, algebra, closure, root
         self.rotation: dict[int, Rotation] = {}
         self.P: dict[int, Vector] = {}  # P_ij, origin of frame j in frame i = ant(j)
         self.carrier: dict[int, Carrier] = {}
         self.turn: dict[int, tuple[Turn, Expression]] = {}  # angle from the carrier to frame j
         for f in robot.frames:
-            self._frame(f)
+            if root in (0, *robot.path(f.ant)):
+                self._frame(f)
 
     def _frame(self, f: Frame) -> None:
         algebra, j = self.algebra, f.j
@@ -137,7 +140,7 @@ class Geometry:
         if f.sigma == PRISMATIC:
             r = algebra.name(add(r, self.position(j)), f"r{j}")
         self.P[j] = displacement(A, b, d, r)
-        if parallel and f.ant:
+        if parallel and f.ant != self.root:
             inner = self.carrier[f.ant]
             turn, offset = summed(self.turn[f.ant][0] + turn), self.turn[f.ant][1] + offset
             self.carrier[j] = Carrier(inner.m, self._rotation(inner.rotation.A, turn, offset), turn)

@@ -5,8 +5,8 @@ A node is (op, operands); equal nodes are one object, so a shared sub-expression
 Signs live on the edges: a
 `Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a
 name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin, sign, pos (positive part max(x, 0));
-sqrt and inv (1/x) of constants.
+Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos
+(positive part max(x, 0)), inv (1/x), sqrt of constants; in the laws of columns also OPAQUE.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS, SQRT, INV = (
     "inv",
 )
 
+OPAQUE = {
+    "exp": "exp", "tanh": "tanh", "cosine": "cos", "sine": "sin", "root": "sqrt", "power": "pow",
+}  # fmt: skip
+"""Operations that exact arithmetic does not know, with the names of their functions."""
+
 
 class Symbol(NamedTuple):
     """An input of a derivation: two inputs of one name and different kinds are different.
@@ -35,7 +40,8 @@ class Symbol(NamedTuple):
     Attributes
     ----------
     kind : str
-        constant, pi, q, qd, qdd, torque, rate (of a tied joint), parameter or gravity.
+        constant, pi, q, qd, qdd, qdr, qddr, channel, torque, rate (of a tied joint), parameter
+        or gravity.
     name : str
         As it is written: D3, q1, QP1, QDP1, GAM1, G31, XX1; of gravity the axis, 0 to 2.
     """
@@ -204,8 +210,12 @@ class Graph:
         )
         return s if sign > 0 else -s
 
-    def call(self, op: str, x: Scalar) -> Scalar:
-        """A function of one operand: cos is even; sin, sign and 1/x are odd."""
+    def call(self, op: str, x: Scalar, *more: Scalar) -> Scalar:
+        """A function of one operand: cos is even; sin, sign and 1/x are odd; OPAQUE of any."""
+        if op in OPAQUE:
+            operands = (x, *more)
+            key = (op, *((o.node.index, o.sign) for o in operands))
+            return self._scalar(key, op, operands, None, all(o.node.fixed for o in operands))
         apart = op not in (POS, SQRT)
         operand, kept = (_positive(x), 1) if apart else (x, x.sign)
         s = self._scalar((op, x.node.index, kept), op, (operand,), None, x.node.fixed)

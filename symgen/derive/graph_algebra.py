@@ -109,6 +109,9 @@ class GraphAlgebra:
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
         return self.graph.call(SIGN, rate)
 
+    def function(self, op: str, *operands: Scalar) -> Scalar:
+        return self.graph.call(op, *map(self.graph.lift, operands))
+
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
         forward = when == "positive"
         sides = [x if forward else -x for x in (self.graph.call(SIGN, rate), rate)]

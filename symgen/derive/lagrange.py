@@ -149,7 +149,7 @@ class Lagrange:
         self.robot, self.names = robot, robot.parameters
         self.constants = {**robot.constants, **(constants or {})}
         self._functions, self._values = _functions(robot), np.array([*self.constants.values(), 1.0])
-        start = {j: x for loop in robot.loops for j, x in loop.start.items()}
+        start = robot.start
         self._home = (
             np.array([start[j] for j in robot.moving]) if set(robot.moving) <= set(start) else None
         )
@@ -189,6 +189,8 @@ class Lagrange:
 
     def _element(self, e: Element, j: int, q: Array, qd: Array, qdd: Array) -> Array:
         """Gamma of an element's key j for parameter 1, (..., n)."""
+        if e.is_own:
+            return np.asarray(self._floats(parameter(e.family, j), q, qd)[..., 0])
         G, B = self._row(e, j), self._form(e, j)
         if e.kind in ("inertia", "stiffness"):
             return np.asarray({"inertia": qdd, "stiffness": q}[e.kind] @ B)
@@ -244,6 +246,25 @@ class Lagrange:
         W = second[..., :3] @ np.swapaxes(R, -1, -2) + rate @ np.swapaxes(rate, -1, -2)
         return np.concatenate([second[..., 3], _axial(W)], axis=-1)
 
+    def base_regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Force and moment about O_0, in frame 0, that move the links against gravity, by standard
+        parameter, (..., 6, p): the moments of mass of hat(r) rdd, from Tdd Sigma T'.
+        """
+        g = np.array([e.value(self.constants) for e in self.robot.gravity])
+        T, Tdd = (
+            self.poses(q),
+            _matrices(self._floats("accelerations", q, qd, qdd))[..., 0, :, :, :],
+        )
+        D = np.zeros((*np.shape(q)[:-1], 6, len(self.names)))
+        for j in self.robot.links:
+            second = Tdd[..., j - 1, :3, :].copy()
+            second[..., 3] -= g
+            R = np.einsum("...ab,pbc,...dc->...pad", second, LINK, T[..., j - 1, :, :])
+            first = self.names.index(parameter(INERTIAL[0], j))
+            wrench = np.concatenate([R[..., :3, 3], _axial(R) - _axial(R.swapaxes(-1, -2))], -1)
+            D[..., first : first + len(INERTIAL)] = np.swapaxes(wrench, -1, -2)
+        return D
+
     def potential_energy(self, q: Array, chi: Array) -> Array:
         """U of gravity, springs and offsets, (...)."""
         value, T = dict(zip(self.names, chi, strict=True)), self.poses(q)
@@ -259,6 +280,9 @@ class Lagrange:
                 elif e.kind == "stiffness":
                     Bq = q @ self._form(e, j) * q / 2
                     U += value[parameter(e.family, j)] * Bq.sum(axis=-1)
+                elif e.energy is not None:
+                    own = self._floats(f"U_{parameter(e.family, j)}", q)[..., 0, 0]
+                    U += value[parameter(e.family, j)] * own
         return U
 
     def motion(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
@@ -341,6 +365,10 @@ def _functions(robot: Robot) -> dict[str, Any]:
         "loop_rate": ([q, qd], ca.jtimes(ca.jtimes(phi, q, qd), q, qd)),
         "start": ([actuated], start),
     }
+    for e in (e for e in robot.elements if e.is_own):
+        for j in e.along:
+            name, (torque, U) = parameter(e.family, j), _law(robot, e, j, q, qd, constants)
+            outputs |= {name: ([q, qd], torque), f"U_{name}": ([q], U)}
     return {
         name: ca.Function(name, [*inputs, symbols], [ca.densify(value)])
         for name, (inputs, value) in outputs.items()
@@ -365,8 +393,10 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
     of their loop, else 0.
     """
     names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
-    guess = {j: x for loop in robot.loops for j, x in loop.start.items()}
-    x = [names[f"q{j}"] if j in robot.joints else ca.SX(guess.get(j, 0.0)) for j in robot.moving]
+    x = [
+        names[f"q{j}"] if j in robot.joints else ca.SX(robot.start.get(j, 0.0))
+        for j in robot.moving
+    ]
     for _ in robot.constraints:  # a constraint may name joints that have one themselves
         now = dict(zip(names, x, strict=True))
         x = [
@@ -378,12 +408,26 @@ def _start(robot: Robot, q: SX, constants: Mapping[str, SX]) -> tuple[SX, SX]:
     return ca.vertcat(*(names[f"q{j}"] for j in robot.joints)), ca.vertcat(*x)
 
 
+def _law(
+    robot: Robot, e: Element, j: int, q: SX, qd: SX, constants: Mapping[str, SX]
+) -> tuple[SX, SX]:
+    """Torque (n,) of key j for parameter 1, dU/dq of an energy by CasADi, and the energy."""
+    G = ca.SX.zeros(len(robot.moving))
+    for i, g in e.along[j].items():
+        G[robot.moving.index(i)] = _symbolic(g, {}, constants)
+    states = {"q": ca.dot(G, q), "qd": ca.dot(G, qd)}
+    for k, i in enumerate(robot.moving):
+        states |= {f"q{i}": q[k], f"qd{i}": qd[k]}
+    U = _symbolic(e.potential(j), states, constants)
+    return ca.gradient(U, q) + G * _symbolic(e.law(j), states, constants), U
+
+
 def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -> SX:
     values = {"pi": np.pi, **constants, **q}
 
-    def function(name: str, argument: Expression) -> SX:
-        x = _symbolic(argument, q, constants)
-        return 1 / x if name == "inv" else getattr(ca, name)(x)
+    def function(name: str, *operands: Expression) -> SX:
+        x = [_symbolic(operand, q, constants) for operand in operands]
+        return 1 / x[0] if name == "inv" else getattr(ca, {"pow": "power"}.get(name, name))(*x)
 
     return ca.SX(e.evaluate(values.__getitem__, function, float))
 
@@ -439,7 +483,6 @@ def sampled(
     of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
-    start = {j: x for loop in robot.loops for j, x in loop.start.items()}
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
     longest = max(
         [abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0
@@ -451,7 +494,7 @@ def sampled(
             for j in robot.joints
         ]
     )
-    centre = np.array([start.get(j, 0.0) for j in robot.joints])
+    centre = np.array([robot.start.get(j, 0.0) for j in robot.joints])
     n, leverage = len(robot.joints), _leverage(robot, model.constants)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):

@@ -1,8 +1,9 @@
 """The residual of closed loops over any algebra, and Newton's method for it.
 
-A loop closes where its cut frame and its twin coincide, 0T_cut = 0T_twin. `coincidence` says so by
-twelve differences; `residuals` by six, of which the three of the orientation vanish half a turn
-away too: an equation for each freedom that a loop takes.
+A loop closes where its cut frame and its twin coincide, rT_cut = rT_twin, r its root: the last
+frame on the paths of both. `coincidence` says so by twelve differences; `residuals` by six, of
+which the three of the orientation vanish half a turn away too: an equation for each freedom that a
+loop takes.
 """
 
 from __future__ import annotations
@@ -25,9 +26,13 @@ ALL = slice(None)
 
 
 def loop_ends(robot: Robot, algebra: Algebra, closure: Closure) -> list[tuple[Pose, Pose]]:
-    """Orientation and origin of the cut frame and of its twin in frame 0, loop by loop."""
-    pose = frame_poses(Geometry(robot, algebra, closure))
-    return [(pose[loop.cut], pose[loop.twin]) for loop in robot.loops]
+    """Orientation and origin of the cut frame and of its twin in the root of their loop, which no
+    joint before it turns, loop by loop.
+    """
+    roots = [robot.root(loop) for loop in robot.loops]
+    pose = {root: frame_poses(Geometry(robot, algebra, closure, root)) for root in {*roots}}
+    loops = zip(robot.loops, roots, strict=True)
+    return [(pose[root][loop.cut], pose[root][loop.twin]) for loop, root in loops]
 
 
 def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:

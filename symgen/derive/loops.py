@@ -19,18 +19,20 @@ from itertools import product
 
 import numpy as np
 
-from symgen.derive.assembly import Assembly, declared_relations
+from symgen.derive.assembly import STEPS, TOLERANCE, Assembly, declared_relations
 from symgen.derive.closure import Closure, Relation, open_tree
 from symgen.derive.exact import Draw
 from symgen.derive.float_algebra import FloatAlgebra
 from symgen.derive.geometry import Geometry
 from symgen.derive.kinematics import frame_poses
-from symgen.derive.loop_residual import Array, coincidence, loop_ends
+from symgen.derive.loop_residual import Array, coincidence, loop_ends, newton
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
 from symgen.description.robot import PRISMATIC, REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError
 
-STARTS = 60
+STARTS, NEAR_STARTS = 60, 16  # places looked from, without and with a `start`
+BESIDE = 1.0  # rad or m: passive joints looked from beside a `start`
+DRAWN = 0.01  # rad or m: a `start` is drawn to half a degree
 CLOSED = 1e-6  # residual below which two frames coincide
 VARIED = 1e-3  # of a length, or rad: constants at which an offset is looked at once more
 FEW_TERMS, MOST_TERMS = 5, 10  # fixed angles or lengths of an offset, each at most twice or once
@@ -71,29 +73,51 @@ def find_relations(robot: Robot) -> Closure:
 
 
 def _configurations(assembly: Assembly) -> Iterator[Array]:
-    """Closed configurations: near the `start` of the loops and no other where there is one, else
-    from random places, or from the closest approach.
+    """Closed configurations: the one nearest to the `start` of the loops and no other where there
+    is one, else from random places, or from the closest approach.
     """
     robot, rng, closed = assembly.robot, np.random.default_rng(3), False
-    wanted = {j: x for loop in robot.loops for j, x in loop.start.items()}
+    wanted = {j: x for j, x in robot.start.items() if j in assembly.free}
+    if wanted and (near := _nearest(assembly, wanted)) is not None:
+        yield near
+        return
     for attempt in range(STARTS):
-        q = (
-            rng.uniform(-np.pi, np.pi, len(assembly.free))
-            if attempt
-            else np.zeros(len(assembly.free))
-        )
-        for k, j in enumerate(assembly.free):
-            q[k] = wanted.get(j, q[k] if attempt else 0.3 + 0.1 * j)
+        q = assembly.guess(wanted, rng if attempt else None)
         if (solution := assembly.solve(q)) is not None:
             closed = True
             yield solution
-            if wanted and attempt == 0:
-                return
     if not closed:  # the actuators move too: short jacks fit no pose drawn at random
         solution = assembly.solve(assembly.closest())
         if solution is None or assembly.mobility(solution) != (len(robot.joints), 0):
             raise _cannot_close(assembly)
         yield solution
+
+
+def _nearest(assembly: Assembly, wanted: Mapping[int, float]) -> Array | None:
+    """The closed configuration nearest to the joints that `start` names, hinges up to whole turns:
+    those that it does not name are free, from several places, and passive ones that it names from
+    beside it; None where none closes.
+    """
+    rng, free = np.random.default_rng(5), assembly.free
+    others, passive = [k for k, j in enumerate(free) if j not in wanted], assembly.passive
+    nearest, least = None, np.inf
+    for attempt in range(NEAR_STARTS):
+        q = assembly.guess(wanted, rng if attempt else None)
+        if attempt:
+            q[passive] += rng.uniform(-BESIDE, BESIDE, len(passive)) * (attempt % 2)
+            q = newton(assembly.rows, q, others, steps=STEPS, tolerance=TOLERANCE)
+        if (closed := assembly.solve(q)) is None:
+            continue
+        for k, j in enumerate(free):
+            if assembly.robot.frame(j).sigma == REVOLUTE and (j in wanted or attempt):
+                turns = np.round((closed[k] - wanted.get(j, 0.0)) / (2 * np.pi))
+                closed[k] -= 2 * np.pi * turns
+        away = max(abs(closed[k] - wanted[j]) for k, j in enumerate(free) if j in wanted)
+        if away < least - EQUAL:
+            nearest, least = closed, away
+        if least < DRAWN:
+            break
+    return nearest
 
 
 def _general(assembly: Assembly, q: Array) -> Closure:

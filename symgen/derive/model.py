@@ -113,6 +113,8 @@ class Model:
         Whether a constant may be added to it.
     page : int
         Its place on the page of a robot, from 1; 0 where it is not shown there.
+    option : str
+        What asks targets for it (`symgen generate --with`); empty where they always have it.
     """
 
     name: str
@@ -133,6 +135,7 @@ class Model:
     denominator: str = ""
     up_to_a_constant: bool = False
     page: int = 0
+    option: str = ""
 
     @property
     def summary(self) -> str:
@@ -189,6 +192,12 @@ def labels(d: Derivation, axis: str, parameters: Sequence[str]) -> tuple[str, ..
             return ("1", "2", "3", "4")
         case "twist":
             return ("vx", "vy", "vz", "wx", "wy", "wz")
+        case "wrench":
+            return ("fx", "fy", "fz", "nx", "ny", "nz")
+        case "energies":
+            return ("kinetic", "potential")
+        case "standard parameters":
+            return robot.parameters
         case "equations":
             return tuple(str(k + 1) for k in range(len(equations(d))))
         case "residual, derivatives":

@@ -5,11 +5,20 @@ A new model is one entry here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from symgen.derive.columns import element_names
 from symgen.derive.derivation import Derivation
-from symgen.derive.energies import coriolis, kinetic_energy, origin_velocities, potential_energy
+from symgen.derive.energies import (
+    Columns,
+    base_wrench,
+    coriolis,
+    kinetic_energy,
+    momentum_rate,
+    origin_velocities,
+    potential_energy,
+    slotine_li,
+)
 from symgen.derive.frames import Frames
 from symgen.derive.graph import Symbol
 from symgen.derive.loop_equations import LoopSystem, loop_system
@@ -18,10 +27,9 @@ from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
 from symgen.derive.scalar import Vector
 from symgen.description.expression import ONE, ZERO
-from symgen.description.robot import KINDS
+from symgen.description.robot import Element
 from symgen.errors import SymgenError
 
-DISSIPATIVE = ("viscous", "coulomb")
 HOMOGENEOUS = (0, 0, 0, 1)  # last row of a pose
 
 
@@ -32,13 +40,15 @@ def _still(d: Derivation, *kinds: str, tied: bool = True) -> dict[Symbol, Input]
     return {Symbol(kind, f"{letter[kind]}{i}"): ZERO for kind in kinds for i in independent}
 
 
-def _without(d: Derivation, *kinds: str) -> dict[Symbol, Input]:
-    """Zero parameters: of elements of these kinds; "link" stands for the inertial ones."""
-    elements = {name: e.kind for name, (e, _) in element_names(d.robot).items()}
+def _without(
+    d: Derivation, kept: Callable[[Element], bool], links: bool = True
+) -> dict[Symbol, Input]:
+    """Zero parameters: of elements that are not `kept`, and of links where they are not."""
+    elements = element_names(d.robot)
     return {
         Symbol("parameter", name): ZERO
         for name in d.robot.parameters
-        if elements.get(name, "link") in kinds
+        if not (kept(elements[name][0]) if name in elements else links)
     }
 
 
@@ -66,14 +76,14 @@ def _gravity(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _friction(d: Derivation, r: Request) -> Iterator[Case]:
-    others = _without(d, "link", *(kind for kind in KINDS if kind not in DISSIPATIVE))
+    others = _without(d, lambda e: e.is_friction, links=False)
     yield Case(_torques(d), others | _still(d, "qdd"))
 
 
 def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
     """Column i: Gamma from rest, without gravity, for qdd_i = 1; tied joints accelerate by G."""
     named, common = Names(len(d.robot.frames)), _still(d, "qd", "qdd") | _weightless(d)
-    common |= _without(d, *(kind for kind in KINDS if kind != "inertia"))
+    common |= _without(d, lambda e: e.kind == "inertia")
     for column, i in enumerate(d.robot.joints):
         unit: dict[Symbol, Input] = {Symbol("qdd", f"QDP{i}"): ONE}
         for u in d.closure.tied:
@@ -81,13 +91,17 @@ def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
         yield Case(_torques(d, "Inertia matrix", (column,)), common | unit, f"{named.separator}{i}")
 
 
-def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
+def _require_closed_form(d: Derivation) -> None:
     if d.closure.tied:
         tied = ", ".join(f"q{u}" for u in d.closure.tied)
         raise SymgenError(
             f"C(q, qd) of {d.robot.name} has no closed form in its actuated joints while {tied} "
             "are symbols; bias has C qd + Q + friction, with the passive joints as symbols"
         )
+
+
+def _coriolis(d: Derivation, r: Request) -> Iterator[Case]:
+    _require_closed_form(d)
     row = {j: k for k, j in enumerate(d.robot.joints)}
     yield Case([Entry((row[i], row[k]), x) for (i, k), x in coriolis(d).items()])
 
@@ -100,6 +114,53 @@ def _regressor(d: Derivation, r: Request) -> Iterator[Case]:
         if j in d.columns[own]
     ]
     yield Case(entries)
+
+
+def _by_column(d: Derivation, r: Request, columns: Columns) -> list[Entry]:
+    return [
+        Entry((row, column), columns[own].get(j, 0), f"Joint {j}")
+        for row, j in enumerate(d.robot.joints)
+        for column, own in enumerate(r.parameters)
+    ]
+
+
+def _momentum_regressor(d: Derivation, r: Request) -> Iterator[Case]:
+    """Columns of Gamma from rest, without gravity, for qdd = qd."""
+    elements = element_names(d.robot)
+    moved = {
+        own: {} if own in elements and elements[own][0].kind != "inertia" else d.columns[own]
+        for own in r.parameters
+    }
+    rates = {Symbol("qdd", f"QDP{i}"): Symbol("qd", f"QP{i}") for i in d.closure.independent}
+    yield Case(_by_column(d, r, moved), {**_still(d, "qd"), **rates, **_weightless(d)})
+
+
+def _of_columns(columns: Callable[[Derivation], Columns]) -> Callable[..., Iterator[Case]]:
+    def cases(d: Derivation, r: Request) -> Iterator[Case]:
+        _require_closed_form(d)
+        yield Case(_by_column(d, r, columns(d)))
+
+    return cases
+
+
+def _energy_regressor(d: Derivation, r: Request) -> Iterator[Case]:
+    energies = (kinetic_energy(d), potential_energy(d))
+    for column, own in enumerate(r.parameters):
+        unit: dict[Symbol, Input] = {
+            Symbol("parameter", name): ONE if name == own else ZERO for name in d.robot.parameters
+        }
+        yield Case([Entry((row, column), x) for row, x in enumerate(energies)], unit)
+
+
+def _base_wrench_regressor(d: Derivation, r: Request) -> Iterator[Case]:
+    found = base_wrench(d)
+    yield Case(
+        [
+            Entry((row, column), x, f"Parameter {own}")
+            for column, own in enumerate(d.robot.parameters)
+            for row, x in enumerate(found.get(own, (0,) * 6))
+        ]
+    )
 
 
 def _kinetic_energy(d: Derivation, r: Request) -> Iterator[Case]:
@@ -266,7 +327,36 @@ MODELS = {
         Model(
             "coriolis", "C", ("q", "qd", "X"), ("joints", "joints"), "N*m*s/rad | N*s/m",
             "C(q, qd) of Coriolis and centrifugal torques C qd, with Christoffel symbols: "
-            "Ad - 2C is skew symmetric", _coriolis, page=4,
+            "Ad - 2C is skew symmetric", _coriolis, page=4, result="C", option="coriolis",
+        ),
+        Model(
+            "slotine_li_regressor", "Y", ("q", "qd", "qdr", "qddr"), ("joints", "parameters"),
+            "Gamma by X",
+            "Y of Y X = A qddr + C qdr + Q + friction(qd), reference rates qdr and accelerations "
+            "qddr", _of_columns(slotine_li), result="Y", symbolic=False, option="slotine_li",
+        ),
+        Model(
+            "momentum_regressor", "PI", ("q", "qd"), ("joints", "parameters"),
+            "generalised momentum by X", "columns of p = A qd", _momentum_regressor, result="PI",
+            symbolic=False, option="momentum",
+        ),
+        Model(
+            "momentum_rate_regressor", "PIP", ("q", "qd"), ("joints", "parameters"), "Gamma by X",
+            "columns of dp/dt - Gamma = C' qd - Q - friction", _of_columns(momentum_rate),
+            result="PIP", symbolic=False, option="momentum",
+        ),
+        Model(
+            "energy_regressor", "EU", ("q", "qd"), ("energies", "parameters"), "J by X",
+            "columns of the kinetic and of the potential energy", _energy_regressor, result="EU",
+            symbolic=False, option="energy",
+        ),
+        Model(
+            "base_wrench_regressor", "WB", ("q", "qd", "qdd"), ("wrench", "standard parameters"),
+            "wrench by standard parameter",
+            "columns of force and moment about the origin of frame 0, in frame 0, by which the "
+            "base moves the links; of the standard parameters, more of which act here than on the "
+            "joints", _base_wrench_regressor, result="WB", symbolic=False,
+            option="base_wrench_regressor",
         ),
         Model(
             "friction", "F", ("q", "qd", "X"), ("joints",), TORQUE,
@@ -303,5 +393,8 @@ MODELS = {
     )
 }  # fmt: skip
 SYMBOLIC = {name: model for name, model in MODELS.items() if model.symbolic}
-EMITTED = {name: m for name, m in MODELS.items() if m.result and not m.of_loops}
+EMITTED = {n: m for n, m in MODELS.items() if m.result and not m.of_loops and not m.option}
 """Those that targets have as functions."""
+ON_REQUEST = {n: m for n, m in MODELS.items() if m.option}
+"""Those that targets have when they are asked for."""
+OPTIONS = tuple(dict.fromkeys(m.option for m in ON_REQUEST.values()))

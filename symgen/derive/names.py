@@ -22,6 +22,8 @@ FAMILIES = {
     "r": "position of a prismatic joint with its constant, m",
     "QP": "joint velocity; with the name of an element, QPFSM6, the velocity that it acts along",
     "QDP": "joint acceleration",
+    "QPR": "reference velocity of a joint",
+    "QDPR": "reference acceleration of a joint",
     "G": "rate of a passive joint per unit rate of an actuated one",
     "W": "angular velocity of a link, in its frame",
     "WP": "angular acceleration of a link, in its frame",

@@ -86,14 +86,23 @@ class Motion:
         Rotations and positions of the frames.
     tag : tuple of int
         Last indices of the names of the steps.
+    qd, qdd : mapping, optional
+        Rates and accelerations of the independent joints. Default: the inputs QP and QDP.
     """
 
-    def __init__(self, geometry: Geometry, *, tag: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self,
+        geometry: Geometry,
+        *,
+        tag: tuple[int, ...] = (),
+        qd: Mapping[int, Scalar] | None = None,
+        qdd: Mapping[int, Scalar] | None = None,
+    ) -> None:
         self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
         self.named, self.tag = Names(len(self.robot.frames)), tag
         independent = geometry.closure.independent
-        self._qd = {i: self.algebra.qd(i) for i in independent}
-        self._qdd = {i: self.algebra.qdd(i) for i in independent}
+        self._qd = qd or {i: self.algebra.qd(i) for i in independent}
+        self._qdd = qdd or {i: self.algebra.qdd(i) for i in independent}
         self.link: dict[int, LinkMotion] = {0: self._base()}
         for f in self.robot.frames:
             self.link[f.j] = self._link(f.j)

@@ -21,6 +21,7 @@ from symgen.derive.graph import (
     ADD,
     CONST,
     COS,
+    OPAQUE,
     SIGN,
     SIN,
     SQRT,
@@ -31,6 +32,7 @@ from symgen.derive.graph import (
 )
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
+from symgen.derive.scalar import AT_ZERO
 from symgen.description.expression import Expression
 
 SAMPLES = 3
@@ -138,8 +140,10 @@ class Rewrite:
                 return turned
             case "sign" | "pos" if type(x[0]) is int and x[0] == 0:
                 return 0
-        operand = graph.lift(x[0])
-        image = graph.call(node.op, operand)
+            case op if op in OPAQUE and type(x[0]) is int and x[0] == 0:
+                return AT_ZERO[op]
+        operand, *more = map(graph.lift, x)
+        image = graph.call(node.op, operand, *more)
         if node.op in (COS, SIN):
             turn, offset = self.source.angles[node.index]
             if operand.sign < 0:
@@ -220,6 +224,8 @@ class Rewrite:
                 return np.asarray(self.draw.constant(self.algebra.roots[node.index]).x)
             case "inv":
                 return power(self._operand(node.operands[0]), p - 2, p)
+            case op if op in OPAQUE:
+                return self._random((op, *((x.node.index, x.sign) for x in node.operands)))
         return self._directed(node)
 
     def _directed(self, node: Node) -> Array:

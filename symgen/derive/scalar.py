@@ -22,6 +22,8 @@ Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]  # rows
 Turn = tuple[tuple[int, int], ...]  # ((j, n), ...): the angle sum_j n q_j
 
+AT_ZERO = {"sign": 0, "tanh": 0, "sine": 0, "root": 0, "power": 0, "exp": 1, "cosine": 1}
+"""Values of `Algebra.function` at the structural zero."""
 ZERO3: Vector = (0, 0, 0)
 E3: Vector = (0, 0, 1)
 
@@ -61,6 +63,9 @@ class Algebra(Protocol):
         self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str
     ) -> tuple[Scalar, Scalar]:
         """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
+
+    def function(self, op: str, *operands: Scalar) -> Scalar:
+        """inv (1/x), sign, exp, tanh, cosine, sine, root or power (x**y) of scalars."""
 
     def name(self, value: Scalar, name: str) -> Scalar:
         """The same value, which later steps call `name`."""

@@ -18,7 +18,7 @@ from symgen.errors import DescriptionError
 
 K = TypeVar("K")
 Change: TypeAlias = Callable[[Expression], Expression]
-WITHIN = 1e-9  # rad, of a multiple of pi/12: rounding of 1.5707963267948966
+WITHIN = 1e-6  # rad, of a multiple of pi/12: rounding of 1.570796
 
 
 def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> Robot:
@@ -41,8 +41,25 @@ def at_values(robot: Robot, values: Mapping[str, Expression] | None = None) -> R
     replaced = _numbers(robot) if values is None else values
 
     change = partial(substituted, values=replaced)
-    constants = {name: x for name, x in robot.constants.items() if name not in replaced}
-    return replace(mapped(robot, change, change), constants=constants)
+    scalars = {name for e in robot.elements for name in e.constants}  # of laws: they stay
+    constants = {
+        name: float(replaced.get(name, Expression.number(repr(x))))
+        for name, x in robot.constants.items()
+        if name not in replaced or name in scalars
+    }
+    elements = tuple(
+        replace(e, torque=e.torque and change(e.torque), energy=e.energy and change(e.energy))
+        for e in robot.elements
+    )
+    angle: Change = change if values is not None else lambda e: round_angle(change(e))
+    return replace(mapped(replace(robot, elements=elements), change, angle), constants=constants)
+
+
+def round_angle(e: Expression) -> Expression:
+    """An angle, a joint's with it, its decimal as a multiple of pi/12 where it is one."""
+    c = e.terms.get((), Fraction(0))
+    near = c and twelfths(float(c), WITHIN) is not None
+    return e - c + exact(float(c), angle=True) if near else e
 
 
 def substituted(e: Expression, values: Mapping[str, Expression]) -> Expression:

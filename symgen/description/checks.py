@@ -10,8 +10,10 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from symgen.description.advice import degrees_advice
+from symgen.description.element import Element, check_law
 from symgen.description.expression import ONE, Call, Expression
 from symgen.description.fields import Path, dotted
+from symgen.description.kinds import KINDS, OWN_LAWS
 from symgen.description.naming import check_names
 from symgen.description.parts import (
     ANGLES,
@@ -19,10 +21,8 @@ from symgen.description.parts import (
     FIXED,
     GEOMETRY,
     INERTIAL,
-    KINDS,
     PRISMATIC,
     REVOLUTE,
-    Element,
     Form,
     Frame,
     Row,
@@ -48,6 +48,13 @@ def check_robot(robot: Any) -> None:
     _check_loops(robot)
     _check_drives(robot)
     _check_limits(robot)
+    for name in sorted(robot.assume):
+        if name not in robot.parameters:
+            raise DescriptionError(
+                f"assume: {name!r} is not a standard parameter of {robot.name}"
+                f"{_meant(name, robot)}",
+                path=("assume", name),
+            )
     for name in robot.values:
         if name not in robot.parameters:
             raise DescriptionError(
@@ -228,7 +235,17 @@ def _check_element(e: Element, robot: Any) -> None:
     """Kind, direction, and tables along joints of the robot."""
     where: Path = ("elements", e.family)
     both = sorted(set(e.along) & set(e.form))
+    laws = [law for law in (e.torque, e.energy) if law is not None]
+    own = e.kind in OWN_LAWS
     problems = (
+        (
+            own and len(laws) != 1,
+            "give one of `torque` and `energy`, or a `kind` that has a law",
+            "",
+        ),
+        (laws and not own, f"{e.kind} has its law; leave out torque and energy", "kind"),
+        (own and not e.unit, "give the `unit` of its parameter, such as N*m", ""),
+        (not e.unit.isprintable() or len(e.unit) > 40 or '"' in e.unit, "unit: up to 40 signs", ""),
         (e.kind not in KINDS, f"kind {e.kind!r}; expected one of {', '.join(KINDS)}", "kind"),
         (
             e.when is not None
@@ -274,6 +291,8 @@ def _check_element(e: Element, robot: Any) -> None:
                 _check_expression(c, place, robot.constants)
             if not any(coefficients.values()):
                 raise DescriptionError(f"element {e.family}{j}: zero along every joint", path=place)
+    if e.is_own and (not own or laws):
+        check_law(e, robot)
 
 
 def _check_loops(robot: Any) -> None:

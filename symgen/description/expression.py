@@ -5,9 +5,10 @@ An expression is a polynomial with rational coefficients
 
     e = sum_k c_k prod_i atom_i**n_ki ,
 
-each atom a symbol, a number as it is written, or cos(e), sin(e), sqrt(e), inv(e), so that two equal
-forms are equal objects; decimals are exact (0.225 = 9/40). Quarter turns leave cos and sin at once,
-square roots of rationals become products of sqrt(prime) to the first power.
+each atom a symbol, a number as it is written, or cos(e), sin(e), sqrt(e), inv(e), in laws also
+sign(e), exp(e), tanh(e) and pow(e, f), so that two equal forms are equal objects; decimals are
+exact (0.225 = 9/40). Quarter turns leave cos and sin at once, square roots of rationals become
+products of sqrt(prime) to the first power.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
+LONGEST_SLOPE = 2000  # terms of a derivative
 LARGEST_PRIME = 1000  # of the trial division under square roots
+PLACES = 40  # of a decimal
 
 Atom: TypeAlias = "str | Number | Call"
 Monomial = tuple[tuple[Atom, int], ...]
@@ -27,20 +30,33 @@ Monomial = tuple[tuple[Atom, int], ...]
 
 @dataclass(frozen=True)
 class Call:
-    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt or inv
-    (1/argument).
+    """A function of an expression that the polynomial cannot hold: cos, sin, sqrt, sign, exp, tanh,
+    inv (1/argument) or pow (argument**exponent).
     """
 
     function: str
     argument: Expression
+    exponent: Expression | None = None
 
     @cached_property
     def text(self) -> str:
+        if self.exponent is not None:
+            return f"({self.argument})**({self.exponent})"
         return (
             f"1/({self.argument})"
             if self.function == "inv"
             else f"{self.function}({self.argument})"
         )
+
+    @property
+    def operands(self) -> tuple[Expression, ...]:
+        return (self.argument,) if self.exponent is None else (self.argument, self.exponent)
+
+    def of(self, *operands: Expression) -> Expression:
+        """The same function of other operands."""
+        if self.exponent is not None:
+            return power(*operands)
+        return call(self.function, *operands)
 
     def __str__(self) -> str:
         return self.text
@@ -56,7 +72,7 @@ class Number:
 
     @cached_property
     def text(self) -> str:
-        text = decimal(self.value)
+        text = decimal(self.value, fractions=False)
         return f"({text})" if "/" in text else text
 
     def __str__(self) -> str:
@@ -169,13 +185,9 @@ class Expression:
         """Names of all symbols, those inside calls included; `pi` is not a symbol."""
         names: set[str] = set()
         for a in self.atoms:
-            names |= (
-                a.argument.symbols
-                if isinstance(a, Call)
-                else {a} - {"pi"}
-                if isinstance(a, str)
-                else set()
-            )
+            for e in a.operands if isinstance(a, Call) else ():
+                names |= e.symbols
+            names |= {a} - {"pi"} if isinstance(a, str) else set()
         return names
 
     def coefficient(self, *names: str) -> Expression:
@@ -207,15 +219,28 @@ class Expression:
 
         def image(a: Atom) -> Expression:
             if isinstance(a, Call):
-                return call(a.function, a.argument.substitute(values))
+                return a.of(*(e.substitute(values) for e in a.operands))
             return values.get(a, _atom(a)) if isinstance(a, str) else _atom(a)
 
         return self.mapped(image)
 
+    def derivative(self, name: str) -> Expression:
+        """The derivative by a symbol; that of sign is 0."""
+        result = Expression()
+        for m, c in self.terms.items():
+            for k, (a, n) in enumerate(m):
+                rest = Expression({(): c * n}) * _atom(a) ** (n - 1)
+                for b, l in (*m[:k], *m[k + 1 :]):
+                    rest = rest * _atom(b) ** l
+                result = result + rest * _slope(a, name)
+                if len(result.terms) > LONGEST_SLOPE:
+                    raise ValueError(f"a derivative of more than {LONGEST_SLOPE} terms")
+        return result
+
     def evaluate(
         self,
         value: Callable[[str], Any],
-        function: Callable[[str, Expression], Any],
+        function: Callable[..., Any],
         number: Callable[[Fraction], Any],
         written: Callable[[Number], Any] | None = None,
     ) -> Any:
@@ -229,7 +254,7 @@ class Expression:
             term: Any = number(c)
             for a, n in m:
                 base = (
-                    function(a.function, a.argument)
+                    function(a.function, *a.operands)
                     if isinstance(a, Call)
                     else value(a)
                     if isinstance(a, str)
@@ -252,9 +277,9 @@ class Expression:
         missing one.
         """
 
-        def function(name: str, argument: Expression) -> float:
-            x = argument.value(values)
-            return 1.0 / x if name == "inv" else float(getattr(math, name)(x))
+        def function(name: str, *operands: Expression) -> float:
+            x = [e.value(values) for e in operands]
+            return float(FLOATS[name](*x) if name in FLOATS else getattr(math, name)(*x))
 
         symbols = {"pi": math.pi, **values}
         return float(self.evaluate(symbols.__getitem__, function, float))
@@ -274,10 +299,17 @@ class Expression:
 
 
 ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
+FLOATS: dict[str, Callable[..., float]] = {
+    "inv": lambda x: 1.0 / x,
+    "sign": lambda x: float((x > 0) - (x < 0)),
+}
+"""Functions that `math` does not have."""
 
 
-def decimal(c: Fraction) -> str:
-    """A rational as an exact decimal where it is one of reasonable length, else as p/q."""
+def decimal(c: Fraction, *, fractions: bool = True) -> str:
+    """A rational as an exact decimal where it is one of reasonable length, else as p/q; halves,
+    quarters and eighths are p/q too where `fractions` is true.
+    """
     if c.denominator == 1:
         return str(c.numerator)
     d, twos, fives = c.denominator, 0, 0
@@ -286,7 +318,7 @@ def decimal(c: Fraction) -> str:
     while d % 5 == 0:
         d, fives = d // 5, fives + 1
     places = max(twos, fives)
-    if d != 1 or places > 15 or (twos <= 3 and not fives):
+    if d != 1 or places > PLACES or (fractions and twos <= 3 and not fives):
         return f"{c.numerator}/{c.denominator}"
     digits = str(abs(c.numerator) * 10**places // c.denominator).rjust(places + 1, "0")
     return ("-" if c < 0 else "") + digits[:-places] + "." + digits[-places:]
@@ -298,7 +330,7 @@ def _factors(m: Monomial, c: Fraction) -> str:
     down = [_power(f"{a}", -n) for a, n in m if n < 0]
     down += [_power(f"({a.argument})", n) for a, n in m if n > 0 and a in inverses]
     c = abs(c)
-    text = decimal(c)
+    text = decimal(c, fractions=bool(m))
     if m and "/" in text:
         head, _, tail = text.partition("/")
         down, text = [tail, *down], head
@@ -327,13 +359,15 @@ def _product(m1: Monomial, m2: Monomial) -> Monomial:
 
 
 def _with_simple_roots(m: Monomial) -> tuple[Monomial, Fraction]:
-    """The monomial with every sqrt(rational) to the power 0 or 1, and the rational factor that
-    leaves: sqrt(3)**-1 = sqrt(3)/3.
+    """The monomial with every sqrt(rational) and every sign to the power 0 or 1, and the rational
+    factor that leaves: sqrt(3)**-1 = sqrt(3)/3, sign(x)**2 = 1.
     """
-    if not any(n != 1 and isinstance(a, Call) and a.function == "sqrt" for a, n in m):
+    if not any(n != 1 and isinstance(a, Call) and a.function in ("sqrt", "sign") for a, n in m):
         return m, Fraction(1)
     factor, powers = Fraction(1), []
     for a, n in m:
+        if isinstance(a, Call) and a.function == "sign":
+            n %= 2
         c = a.argument.constant if isinstance(a, Call) and a.function == "sqrt" else None
         if c is not None:
             factor *= c ** (n // 2)
@@ -363,18 +397,48 @@ def _sqrt_of_rational(c: Fraction) -> Expression:
     return result * (whole if whole**2 == rest else _atom(Call("sqrt", Expression.number(rest))))
 
 
+def _sqrt(e: Expression) -> Expression:
+    """sqrt(c m) = sqrt(c) sqrt(m) for a rational c > 0, and sqrt(a + b) = sqrt((a + s)/2) +-
+    sqrt((a - s)/2) where b**2 and s = sqrt(a**2 - b**2) are rational: sqrt(3 + 2 sqrt(2)) = 1 +
+    sqrt(2).
+    """
+    c, a = e.constant, e.terms.get((), Fraction(0))
+    if c is not None:
+        return _sqrt_of_rational(c)
+    if len(e.terms) == 1:
+        ((m, c),) = e.terms.items()
+        sign = Fraction(1 if c > 0 else -1)
+        return _sqrt_of_rational(abs(c)) * _atom(Call("sqrt", Expression({m: sign})))
+    rest = e - a
+    square = (rest * rest).constant
+    if a > 0 and square is not None and square <= a * a:
+        s = _sqrt_of_rational(a * a - square).constant
+        if s is not None:
+            longer, shorter = (_sqrt_of_rational((a + x) / 2) for x in (s, -s))
+            return longer + shorter * (1 if min(rest.terms.values()) > 0 else -1)
+    return _atom(Call("sqrt", e))
+
+
 @lru_cache(maxsize=4096)
 def call(function: str, argument: Expression) -> Expression:
-    """cos, sin, tan, sqrt or inv of an expression; quarter turns, signs and perfect squares are
-    taken out exactly.
+    """cos, sin, tan, sqrt, inv, sign, abs, exp or tanh of an expression; quarter turns, signs and
+    perfect squares are taken out exactly.
     """
+    if function == "abs":
+        return argument * call("sign", argument)
+    if function in ("sign", "tanh", "exp"):
+        if not argument:
+            return ONE if function == "exp" else ZERO
+        if function != "exp" and _leading(argument) < 0:
+            return -call(function, -argument)
+        c = argument.constant
+        return ONE if function == "sign" and c is not None else _atom(Call(function, argument))
     if function == "tan":
         return call("sin", argument) * call("cos", argument).inverse()
     if function == "inv":
         return argument.inverse()
     if function == "sqrt":
-        c = argument.constant
-        return _atom(Call("sqrt", argument)) if c is None else _sqrt_of_rational(c)
+        return _sqrt(argument)
     turns, rest = quarter_turns(argument)
     if function == "sin":
         turns -= 1  # sin x = cos(x - pi/2)
@@ -391,6 +455,36 @@ def call(function: str, argument: Expression) -> Expression:
     return _atom(Call("sin", rest)) * -sign  # cos(x + pi/2) = -sin x
 
 
+def power(base: Expression, exponent: Expression) -> Expression:
+    """base**exponent; a whole number stays in the polynomial."""
+    c = exponent.constant
+    if c is not None and c.denominator == 1:
+        return base ** int(c)
+    return _atom(Call("pow", base, exponent))
+
+
+def _slope(a: Atom, name: str) -> Expression:
+    """The derivative of an atom by a symbol."""
+    if not isinstance(a, Call):
+        return ONE if a == name else ZERO
+    x, value = a.argument, _atom(a)
+    inner = x.derivative(name)
+    if a.exponent is not None:
+        if name in a.exponent.symbols:
+            raise ValueError(f"{a}: {name} in an exponent has no derivative here; use exp")
+        return a.exponent * power(x, a.exponent - ONE) * inner
+    outer = {
+        "cos": lambda: -call("sin", x),
+        "sin": lambda: call("cos", x),
+        "sqrt": lambda: value.inverse() * Fraction(1, 2),
+        "inv": lambda: -(value**2),
+        "exp": lambda: value,
+        "tanh": lambda: ONE - value**2,
+        "sign": lambda: ZERO,
+    }
+    return outer[a.function]() * inner if inner else ZERO
+
+
 def with_known_cosines(e: Expression) -> Expression:
     """The same expression with the values of cos and sin of pi/6, pi/4 and pi/3 in their place."""
 
@@ -401,6 +495,23 @@ def with_known_cosines(e: Expression) -> Expression:
         return _atom(a)
 
     return e.mapped(image)
+
+
+def simplified(e: Expression) -> Expression:
+    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
+    with one coefficient.
+    """
+    for m, c in e.terms.items():
+        for a, n in m:
+            if isinstance(a, Call) and a.function == "cos" and n >= 2:
+                rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
+                cosine, common = Expression({m: c}), Expression({rest: c})
+                sine = common * _atom(Call("sin", a.argument)) ** 2
+                for partner, shorter in ((sine, common), (-common, -sine)):
+                    ((key, value),) = partner.terms.items()
+                    if e.terms.get(key) == value:
+                        return simplified(e - cosine - partner + shorter)
+    return e
 
 
 def quarter_turns(angle: Expression) -> tuple[int, Expression]:

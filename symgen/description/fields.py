@@ -46,7 +46,10 @@ def located(file: str, line: Callable[[Path], int] = lambda _: 1) -> Iterator[No
         yield
     except DescriptionError as error:
         raise DescriptionError(
-            error.message, path=error.path, file=file, line=error.line or line(error.path)
+            error.message,
+            path=error.path,
+            file=error.file or file,
+            line=error.line or line(error.path),
         ) from error.__cause__
 
 

@@ -4,10 +4,12 @@ written by suffix.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
+from symgen.description.fields import located
 from symgen.description.par import read_par
 from symgen.description.robot import Robot
 from symgen.description.yaml import parse_robot, write_yaml
@@ -105,6 +107,11 @@ def read_robot(
     content = content_of(path)
     if suffix == ".par":
         return read_par(content, path.name, constants, exact=exact)
+    if suffix in TREES[1:] and b"<include" in content:
+        from symgen.description.mjcf_text import with_includes
+
+        with located(path.name):
+            content = with_includes(content, _beside(path))
     if suffix in TREES:
         from symgen.description.tree_parts import TreePart  # numpy, which robot files do without
         from symgen.description.tree_robot import read_tree
@@ -112,6 +119,29 @@ def read_robot(
         part = TreePart(lock or {}, chain)
         return read_tree(content, path.name, exact=exact, keep_fixed=keep_fixed, part=part)
     return parse_robot(content, path.name), ()
+
+
+def _beside(path: Path) -> Callable[[str, int], bytes]:
+    """Reader of the files that the file `path` includes: each once, in its folder or below."""
+    folder, before = path.resolve().parent, {path.resolve()}
+
+    def read(name: str, line: int) -> bytes:
+        included = (folder / name).resolve()
+        problems = (
+            (
+                not included.is_relative_to(folder),
+                "outside of its folder; copy it there",
+            ),
+            (included in before, "a file is included once, and never by itself"),
+            (not os.path.isfile(included), "no such file"),  # noqa: PTH113 (of any length)
+        )
+        for wrong, what in problems:
+            if wrong:
+                raise DescriptionError(f"<include file={name[:100]!r}>: {what}", line=line)
+        before.add(included)
+        return content_of(included)
+
+    return read
 
 
 def write_robot(

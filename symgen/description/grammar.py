@@ -4,11 +4,12 @@
     product = unary (("*" | "/") unary)*
     unary   = ("+" | "-")* power
     power   = primary ["**" ["-"] primary]          exponent: a whole number
-    primary = number | name | function "(" sum ")" | "(" sum ")"
+    primary = number | name | function "(" sum ["," sum] ")" | "(" sum ")"
 
-Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt; anything else is an
-ExpressionError at its column. Length,
-depth, exponents, terms and digits are bounded, so that no text takes long to read.
+Names are `pi` and the declared symbols, functions sin, cos, tan, sqrt, in the laws of columns also
+abs, sign, exp, tanh, min, max, names channel.NAME, and exponents that are expressions; anything
+else is an ExpressionError at its column. Length, depth, exponents, terms and
+digits are bounded, so that no text takes long to read.
 """
 
 from __future__ import annotations
@@ -18,21 +19,26 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from symgen.description.advice import symbol_advice, unit_advice
-from symgen.description.expression import Expression, call
+from symgen.description.expression import Expression, call, power, simplified
 from symgen.errors import ExpressionError
 
 FUNCTIONS = ("sin", "cos", "tan", "sqrt")
+LAWS = (*FUNCTIONS, "abs", "sign", "exp", "tanh", "min", "max")  # functions of columns
 MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT, MAX_TERMS, MAX_DIGITS = 2000, 40, 32, 400, 60
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<op>\*\*|[-+*/()]))",
     re.ASCII,
 )
+_LAW_TOKEN = re.compile(
+    _TOKEN.pattern.replace("<name>", r"<name>(?:channel\.)?").replace("-+*/()", "-+*/(),"),
+    re.ASCII,
+)
 
 
 class _Parser:
-    def __init__(self, text: str, symbols: Iterable[str] | None) -> None:
-        self.text = text
+    def __init__(self, text: str, symbols: Iterable[str] | None, functions: tuple[str, ...]):
+        self.text, self.functions = text, functions
         self.symbols = None if symbols is None else frozenset(symbols)
         self.depth = 0
         self.tokens: list[tuple[str, str, int]] = []
@@ -42,7 +48,7 @@ class _Parser:
             )
         position, end = 0, len(text.rstrip())
         while position < end:
-            match = _TOKEN.match(text, position)
+            match = (_LAW_TOKEN if functions is LAWS else _TOKEN).match(text, position)
             if match is None:
                 at = len(text) - len(text[position:].lstrip())
                 raise self.error(
@@ -50,7 +56,7 @@ class _Parser:
                         f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** "
                         "( "
                         "), "
-                        "sin, cos, tan, sqrt"
+                        f"{', '.join(functions)}"
                     ),
                     at + 1,
                     unit_advice(text[at]),
@@ -119,7 +125,10 @@ class _Parser:
         if self.accept("**"):
             column = self.tokens[self.position][2]
             negative = self.accept("-") is not None
-            exponent = self.primary().constant
+            raised = self.primary()
+            exponent = raised.constant
+            if self.functions is LAWS and (exponent is None or exponent.denominator != 1):
+                return power(base, -raised if negative else raised)
             if exponent is None or exponent.denominator != 1 or abs(exponent) > MAX_EXPONENT:
                 raise self.error(
                     f"exponent must be a whole number between -{MAX_EXPONENT} and {MAX_EXPONENT}",
@@ -153,17 +162,30 @@ class _Parser:
             return e
         if kind == "name":
             if self.accept("("):
-                if text not in FUNCTIONS:
+                if text not in self.functions:
+                    *others, last = self.functions
                     raise self.error(
-                        f"{text!r} is not a function of the grammar; sin, cos, tan and sqrt are",
+                        f"{text!r} is not a function of the grammar; {', '.join(others)} and "
+                        f"{last} are",
                         column,
                         unit_advice(text),
                     )
                 e = self.sum()
+                if text in ("min", "max"):
+                    if self.accept(",") is None:
+                        raise self.error(
+                            f"{text} takes two values, {text}(a, b)",
+                            self.tokens[self.position][2],
+                        )
+                    other = self.sum()
+                    distance = call("abs", e - other)
+                    e = (e + other + (distance if text == "max" else -distance)) * Fraction(1, 2)
                 if self.accept(")") is None:
                     raise self.error("missing )", self.tokens[self.position][2])
+                if text in ("min", "max"):
+                    return self.guard(e)
                 try:
-                    return call(text, e)
+                    return self.guard(call(text, e))
                 except (ValueError, ZeroDivisionError) as error:
                     raise self.error(
                         f"{text} of {e}: {error or 'division by zero'}", column
@@ -179,18 +201,23 @@ class _Parser:
         raise self.error(f"expected a number, a symbol or (, found {text!r}", column)
 
 
-def parse(text: str | int | float, symbols: Iterable[str] | None = None) -> Expression:
-    """Read one expression; `symbols` are the declared names (None: any).
+def parse(
+    text: str | int | float,
+    symbols: Iterable[str] | None = None,
+    functions: tuple[str, ...] = FUNCTIONS,
+) -> Expression:
+    """Read one expression; `symbols` are the declared names (None: any), `functions` FUNCTIONS, or
+    LAWS for the law of a column.
 
     Raises ExpressionError with the column of whatever is outside the grammar.
     """
     if isinstance(text, (int, float)) and not isinstance(text, bool):
         text = repr(text)
-    parser = _Parser(str(text), symbols)
+    parser = _Parser(str(text), symbols, functions)
     e = parser.sum()
     kind, token, column = parser.tokens[parser.position]
     if kind != "end":
         raise parser.error(
             f"unexpected {token!r} after a complete expression", column, unit_advice(token)
         )
-    return e
+    return simplified(e)

@@ -15,6 +15,7 @@ names no file (`mjcf_text`).
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -23,7 +24,7 @@ import numpy as np
 
 from symgen.description.expression import ZERO, Expression
 from symgen.description.mjcf_text import Mjcf, reduced
-from symgen.description.tree import FIXED_TYPE, MAX_JOINTS, Array, Inertial, Joint, Tree
+from symgen.description.tree import FIXED_TYPE, FREE_TYPE, MAX_JOINTS, Array, Inertial, Joint, Tree
 from symgen.description.xml_text import LARGEST
 from symgen.errors import DescriptionError
 
@@ -51,9 +52,13 @@ def _compiled(mjcf: Mjcf) -> Any:
         return mujoco.MjModel.from_xml_string(mjcf.text)
     except ValueError as error:
         message = " ".join(str(error).split())
+        number = re.search(r",? line (\d+)\Z", message)
+        line = mjcf.lines[int(number[1]) - 2] if number else None
+        message = message[: number.start()] if number else message
         raise DescriptionError(
             "MuJoCo refuses the file: "
-            f"{message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}"
+            f"{message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}",
+            line=line,
         ) from error
     finally:
         mujoco.set_mju_user_warning(before)
@@ -199,12 +204,13 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
     """
     model, line = growing.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
-    if kind in (FREE_JOINT, BALL):
-        what = "free joint" if kind == FREE_JOINT else "ball joint"
-        hint = "the base rests here: remove it" if kind == FREE_JOINT else "write three hinges"
+    if kind == BALL:
         raise DescriptionError(
-            f"{what} {name!r}: hinge and slide joints are read; {hint}", line=line
+            f"ball joint {name!r}: hinge and slide joints are read; write three hinges", line=line
         )
+    if kind == FREE_JOINT:
+        z = np.array([0.0, 0.0, 1.0])
+        return Joint(name, FREE_TYPE, parent, child, pose, z, line), np.eye(4)
     dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k])
     if not 0 < np.linalg.norm(axis) < np.inf:
         raise DescriptionError(
@@ -251,10 +257,10 @@ def _left_out(model: Any) -> list[str]:
         ("damping that grows with speed", "dof_dampingpoly"),
         ("stiffness that grows with deflection", "jnt_stiffnesspoly"),
     ):
-        rows = getattr(
-            model, polynomial, ()
-        )  # since MuJoCo 4; every joint has one degree of freedom
-        if names := [model.joint(k).name for k, row in enumerate(rows) if np.any(row)]:
+        rows = getattr(model, polynomial, ())  # since MuJoCo 4
+        joints = model.dof_jntid if polynomial.startswith("dof") else range(model.njnt)
+        acting = (k for k, row in zip(joints, rows, strict=False) if np.any(row))
+        if names := [model.joint(k).name for k in acting]:
             notes.append(f"{what} not read: {', '.join(f'{name!a:.60}' for name in names[:20])}")
     forces = [
         model.tendon_stiffness,
@@ -262,11 +268,11 @@ def _left_out(model: Any) -> list[str]:
         model.tendon_frictionloss,
         *(getattr(model, "tendon_armature", ()),),
     ]
-    acting = sorted({int(t) for force in forces for t in np.flatnonzero(force)})
-    if acting:
+    tendons = sorted({int(t) for force in forces for t in np.flatnonzero(force)})
+    if tendons:
         notes.append(
             "forces of tendons not read: "
-            f"{', '.join(ascii(model.tendon(t).name) for t in acting[:20])}"
+            f"{', '.join(ascii(model.tendon(t).name) for t in tendons[:20])}"
         )
     return notes
 
@@ -281,12 +287,14 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
     model, names = growing.model, growing.names
     relations: dict[str, Expression] = {}
     for e in range(model.neq):
-        equation = _equation(model, names, e).substitute(relations)
+        line = growing.mjcf.relations[e]
+        equation = _equation(model, names, e, line).substitute(relations)
         free = [name for name in names if name in equation.atoms - growing.mjcf.driven]
         if not free:
             raise DescriptionError(
                 f"equality {model.equality(e).name!r}: it ties driven joints, or says what others "
-                "say already"
+                "say already",
+                line=line,
             )
         of_joint = int(model.eq_type[e]) == JOINT_RELATION
         first = names[int(model.eq_obj1id[e])] if of_joint else ""
@@ -297,7 +305,7 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
     return {name: relations[name] for name in names if name in relations}
 
 
-def _equation(model: Any, names: list[str], e: int) -> Expression:
+def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
     """What is zero by relation e:  y1 - y1_0 - a0 - a1 (y2 - y2_0), y a joint position or the
     length of a fixed tendon.
     """
@@ -306,7 +314,8 @@ def _equation(model: Any, names: list[str], e: int) -> Expression:
     if any(higher):
         raise DescriptionError(
             f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear "
-            "relations are read: a0 + a1 y"
+            "relations are read: a0 + a1 y",
+            line=line,
         )
     first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
     other = _deflection(model, names, kind, second) if second >= 0 else ZERO

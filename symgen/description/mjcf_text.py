@@ -12,10 +12,12 @@ that only a mesh would tell is refused. Actuators are read here: the names of th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
+from symgen.description.fields import located
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 
@@ -25,7 +27,7 @@ _POSE = ("pos", *ORIENTATION)
 ATTRIBUTES: dict[str, tuple[str, ...]] = {  # element: its attributes that matter
     "mujoco": ("model",),
     "compiler": ("angle", "eulerseq", "autolimits", "boundmass", "boundinertia",
-                 "balanceinertia", "inertiafromgeom", "inertiagrouprange"),
+                 "balanceinertia", "inertiafromgeom", "inertiagrouprange", "settotalmass"),
     "option": ("gravity",),
     "default": ("class",),
     "worldbody": (),
@@ -54,6 +56,7 @@ ATTRIBUTES_IN: dict[tuple[str, str], tuple[str, ...]] = {
     },
 }
 TEXTS = ("name", "class", "childclass", "joint", "joint1", "joint2", "tendon1", "tendon2", "model")
+INCLUDE = re.compile(rb"""<include\s(?:[^<>"']|"[^"<]*"|'[^'<]*')*?(?:/>|>\s*</include\s*>)""")
 MULTIPLIED = (
     "replicate", "composite", "flexcomp", "flex", "attach", "include", "plugin", "extension",
 )  # fmt: skip
@@ -66,6 +69,7 @@ INSIDE = {  # element: what of its content matters
     "fixed": ("joint",),
 }
 SECTIONS = ("compiler", "option", "default", "worldbody", "equality", "tendon")
+FLUID, NOT_ZERO = ("density", "viscosity", "wind"), set("123456789")
 IGNORED = (
     "actuator",
     "asset",
@@ -80,6 +84,29 @@ IGNORED = (
 )
 
 
+def with_includes(content: bytes, read: Callable[[str, int], bytes]) -> bytes:
+    """An MJCF file with the content of the files that it includes in their place, each on one line,
+    so that lines of the file stay.
+
+    read : gives the bytes of an included file by its name and the line that includes it, or raises
+    DescriptionError.
+    """
+    parts, end = [], 0
+    for e in (e for e in _every(read_elements(content, DEEPEST)) if e.tag == "include"):
+        name, tag = e.text("file"), INCLUDE.match(content, e.byte)
+        if tag is None:
+            raise DescriptionError("<include> is read from UTF-8, without content", line=e.line)
+        included = read(name, e.line)
+        with located(name):
+            inner = with_includes(included, read)
+            first = next(iter(read_elements(inner, DEEPEST).children), None)
+        body = b"" if first is None else inner[first.byte : inner.rindex(b"</")]
+        inside = b" ".join(body.split(b"\n")) + b"\n" * tag[0].count(b"\n")
+        parts += [content[end : e.byte], inside]
+        end = tag.end()
+    return b"".join([*parts, content[end:]])
+
+
 @dataclass
 class Mjcf:
     """What an MJCF file says of its mechanism.
@@ -92,8 +119,11 @@ class Mjcf:
         Whether gravity is switched off.
     from_geoms : bool
         Whether geoms tell the mass of every body that moves, of those with an <inertial> too.
-    joints : list of int
-        Line of each joint, in the order of the file.
+    all_weighed : bool
+        Whether bodies that never move have a mass that matters, by settotalmass.
+    lines, joints, relations : list of int
+        Line of the file of each line of the text but the first, which is empty, of each joint, and
+        of each relation of joints or tendons.
     bodies : int
         Their number.
     driven : frozenset of str
@@ -106,7 +136,10 @@ class Mjcf:
     text: str = ""
     weightless: bool = False
     from_geoms: bool = False
+    all_weighed: bool = False
+    lines: list[int] = field(default_factory=list)
     joints: list[int] = field(default_factory=list)
+    relations: list[int] = field(default_factory=list)
     bodies: int = 0
     driven: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
@@ -126,24 +159,18 @@ def reduced(content: bytes) -> Mjcf:
                 f"<{e.tag}> is not read; write out what it stands for, as MuJoCo's saved XML does",
                 line=e.line,
             )
-    for e in (e for e in root.children if e.tag == "compiler"):
-        if e.number("settotalmass", "-1") > 0:
-            raise DescriptionError(
-                "settotalmass is not read; write the masses out, as MuJoCo's saved XML does",
-                line=e.line,
-            )
     mjcf = Mjcf(root.attributes.get("model", ""))
-    mjcf.from_geoms = any(
-        e.attributes.get("inertiafromgeom") == "true" for e in root.children if e.tag == "compiler"
-    )
-    parts = [_open(root, ATTRIBUTES["mujoco"])]
+    compilers = [e for e in root.children if e.tag == "compiler"]
+    mjcf.from_geoms = any(e.attributes.get("inertiafromgeom") == "true" for e in compilers)
+    mjcf.all_weighed = any(e.number("settotalmass", "-1") > 0 for e in compilers)
+    parts = [_open(root, ATTRIBUTES["mujoco"], mjcf)]
     for section in SECTIONS:
         parts += (text for e in root.own(section) for text in _copied(e, "mujoco", mjcf))
     mjcf.text = "".join([*parts, "</mujoco>"])
+    options = [e for e in root.children if e.tag == "option"]
     flags = {
         key: value
-        for e in root.children
-        if e.tag == "option"
+        for e in options
         for x in e.children
         if x.tag == "flag"
         for key, value in x.attributes.items()
@@ -157,6 +184,9 @@ def reduced(content: bytes) -> Mjcf:
         if (name := x.attributes.get(key))
     )
     left = [f"<{tag}>" for tag in sorted({e.tag for e in root.children} & set(IGNORED))]
+    left += [key for e in options for key in FLUID if set(e.attributes.get(key, "")) & NOT_ZERO]
+    tendons = (x for e in root.children if e.tag == "tendon" for x in e.children)
+    left += [f"<{tag[:30]}>" for tag in sorted({x.tag for x in tendons} - {"fixed"})]
     left += [f"flag {key[:30]}" for key, value in sorted(flags.items()) if value != "enable"]
     mjcf.notes = (f"not read: {', '.join(left)}",) if left else ()
     if unknown := sorted({e.tag for e in root.children} - set(SECTIONS) - set(IGNORED)):
@@ -170,7 +200,9 @@ def _every(e: XmlElement) -> Iterator[XmlElement]:
         yield from _every(child)
 
 
-def _open(e: XmlElement, attributes: Iterable[str], end: str = "") -> str:
+def _open(e: XmlElement, attributes: Iterable[str], mjcf: Mjcf, end: str = "") -> str:
+    """The start of an element, on a line of its own."""
+    mjcf.lines.append(e.line)
     own = {key: e.attributes[key] for key in attributes if key in e.attributes}
     for key, value in own.items():
         if key not in TEXTS and any(
@@ -179,7 +211,7 @@ def _open(e: XmlElement, attributes: Iterable[str], end: str = "") -> str:
             raise DescriptionError(
                 f"<{e.tag} {key}={value[:60]!r}>: expected finite numbers", line=e.line
             )
-    return f"<{e.tag}{''.join(f' {key}={quoteattr(value)}' for key, value in own.items())}{end}>"
+    return f"\n<{e.tag}{''.join(f' {key}={quoteattr(value)}' for key, value in own.items())}{end}>"
 
 
 def _copied(
@@ -194,16 +226,19 @@ def _copied(
             raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
         tags = {child.tag for child in e.own("joint", "freejoint", "inertial")}
         moves = moves or bool(tags - {"inertial"})
-        weighed = moves and (mjcf.from_geoms or "inertial" not in tags)
+        mass_matters = moves or mjcf.all_weighed
+        weighed = mass_matters and (mjcf.from_geoms or "inertial" not in tags)
     own = ATTRIBUTES_IN.get((holder, e.tag), ATTRIBUTES[e.tag])
     if e.tag not in INSIDE:
-        yield _open(e, own, end="/")
+        yield _open(e, own, mjcf, end="/")
         return
-    yield _open(e, own)
+    yield _open(e, own, mjcf)
     for child in e.children:
         if _matters(child, e.tag, weighed=weighed):
             if e.tag in BODIES and child.tag in ("joint", "freejoint"):
                 mjcf.joints.append(child.line)
+            if e.tag == "equality":
+                mjcf.relations.append(child.line)
             yield from _copied(child, e.tag, mjcf, moves=moves, weighed=weighed)
     yield f"</{e.tag}>"
 

@@ -10,8 +10,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from symgen.description.element import Element
 from symgen.description.fields import Path, dotted
-from symgen.description.parts import INERTIAL, Element
+from symgen.description.parts import INERTIAL
 from symgen.errors import DescriptionError
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}\Z")
@@ -143,9 +144,9 @@ def check_families(elements: Sequence[Element]) -> None:
 def _of_others(name: str) -> str:
     """What of ours, of the grammar or of Python is called so in every text; empty if nothing."""
     if STATES.match(name):
-        return "a joint position, rate or torque"
+        return "a joint position, rate or torque (q, QP, QDP, GAM and a number)"
     if name in LAYOUT:
-        return "an argument, a function or an array of the emitted functions"
+        return f"a word of the emitted functions (these are {', '.join(sorted(LAYOUT))})"
     return "a builtin of Python" if hasattr(builtins, name) else ""
 
 

@@ -1,12 +1,5 @@
-"""The tables of a robot: rows of the frame table, elements on the joints, loops, drives, limits.
-
-An element acts with one parameter for each key, called family + key:
-
-    along {j: G}:  s = G q,  Gamma += G' (c sdd | c sd | c sign(sd) | c | c s)
-    form  {j: B}:  Gamma += c B qdd | c B qd | c B q
-
-for inertia, viscous, coulomb, offset, stiffness; forms for inertia, viscous, stiffness. With
-`when`, viscous and coulomb elements act in motion along s in this direction only.
+"""The tables of a robot: rows of the frame table, rows and forms of elements, loops, drives,
+limits.
 """
 
 from __future__ import annotations
@@ -14,10 +7,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
-from functools import partial
 from itertools import combinations, combinations_with_replacement
 from math import prod
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, ValidationInfo
 from pydantic.dataclasses import dataclass
@@ -31,7 +23,6 @@ from symgen.description.fields import (
     Interval,
     Numeric,
     Position,
-    Text,
     Whole,
     Written,
 )
@@ -40,28 +31,8 @@ from symgen.errors import DescriptionError, ExpressionError
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-JOINT_FAMILIES = ("Ia", "FV", "FS", "OFFSET")  # the rest of eq. (4), link by link
 
 
-class Kind(NamedTuple):
-    """A kind of element: units of its parameter (revolute, prismatic), what it is, whether it takes
-    `form` and `when`.
-    """
-
-    units: tuple[str, str]
-    meaning: str
-    form: bool = False
-    when: bool = False
-
-
-KINDS = {
-    "inertia": Kind(("kg*m**2", "kg"), "inertia of the actuator", form=True),
-    "viscous": Kind(("N*m*s/rad", "N*s/m"), "viscous friction", form=True, when=True),
-    "coulomb": Kind(("N*m", "N"), "Coulomb friction", when=True),
-    "offset": Kind(("N*m", "N"), "constant torque or force"),
-    "stiffness": Kind(("N*m/rad", "N/m"), "stiffness", form=True),
-}
-USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), KINDS, strict=False))
 DIRECTIONS = ("positive", "negative")
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")  # of a row, in the order of application
 ANGLES = ("gamma", "alpha", "theta")
@@ -150,19 +121,21 @@ class Frame:
         return self.r - Expression.symbol(self.q) if self.sigma == PRISMATIC else self.r
 
 
-def _rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
+def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
     """{j: text}, or all, to {j: row}."""
     if texts == "all":
         return {f.j: {f.j: ONE} for f in declared.frames if f.mu}
-    return _reduced(row_of, texts, declared)
+    return reduced(row_of, texts, declared)
 
 
-def _reduced(
+def reduced(
     reduce: Callable[[Expression, tuple[int, ...]], Any], texts: Any, declared: Declared
 ) -> dict[int, Any]:
     """{j: text} to {j: row or form}."""
     joints = tuple(f.j for f in declared.frames if f.sigma != FIXED)
     result: dict[int, Any] = {}
+    if isinstance(texts, int | list):  # joints, each along itself
+        return {j: {j: ONE} for j in ([texts] if isinstance(texts, int) else texts)}
     for j, text in texts.items() if joints else ():
         try:
             result[j] = reduce(parse(text, declared.variables), joints)
@@ -171,42 +144,30 @@ def _reduced(
     return result
 
 
-@dataclass(frozen=True, config=CONFIG)
-class Element:
-    """Inertia, friction, offset or spring on the joint coordinates."""
+PLANES = {"xy": ("XZ", "YZ", "MZ"), "xz": ("XY", "YZ", "MY"), "yz": ("XY", "XZ", "MX")}
+"""Inertial parameters that vanish for a link that is symmetric about a plane of its frame."""
 
-    family: Annotated[str, *UNWRITTEN]
-    kind: Annotated[
-        str,
-        Field(description=f"one of {', '.join(KINDS)}", json_schema_extra={"enum": list(KINDS)}),
-    ]
-    along: Annotated[
-        Mapping[int, Row],
-        Written(Literal["all"] | dict[Whole, Text], _rows),
-        Field(
-            default={},
-            description=(
-                "{6: q5 + q6} (6 numbers the parameter, FSM6), or all: every actuated joint"
-            ),
-        ),
-    ]
-    form: Annotated[
-        Mapping[int, Form],
-        Written(dict[Whole, Text], partial(_reduced, form_of)),
-        Field(default={}, description="quadratic forms: {6: q6**2 + 2*q5*q6}"),
-    ]
-    when: Annotated[
-        str | None,
-        Field(
-            description="direction of motion: positive or negative",
-            json_schema_extra={"enum": [*DIRECTIONS, None]},
-        ),
-    ] = None
 
-    @property
-    def keys(self) -> tuple[int, ...]:
-        """Keys of both tables in order."""
-        return tuple(sorted({*self.along, *self.form}))
+def assumed(table: Mapping[str, str], declared: Declared) -> frozenset[str]:
+    """Standard parameters that a file says are zero, one by one or by the symmetry of a link."""
+    names: set[str] = set()
+    for key, text in table.items():
+        link, plane = re.fullmatch(r"link ([1-9][0-9]*)", key), text.removeprefix("symmetric ")
+        if link and plane in PLANES and plane != text:
+            names |= {parameter(p, int(link[1])) for p in PLANES[plane]}
+        elif link:
+            raise DescriptionError(
+                f"{key}: {text!r}; expected symmetric xy, symmetric xz or symmetric yz", path=(key,)
+            )
+        elif parse(text, ()).constant == 0:
+            names.add(key)
+        else:
+            raise DescriptionError(
+                f"{key}: {text}; only what is zero is taken into the regrouping; a known value "
+                "stands under values, a prior of method feasible",
+                path=(key,),
+            )
+    return frozenset(names)
 
 
 def by_joint(texts: Mapping[str, Any], declared: Declared) -> dict[int, Any]:

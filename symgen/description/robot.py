@@ -31,6 +31,7 @@ from pydantic.dataclasses import dataclass
 
 from symgen.description.checks import check_robot
 from symgen.description.distal import khalil_frames
+from symgen.description.element import Element
 from symgen.description.expression import ONE, Expression
 from symgen.description.fields import (
     CONFIG,
@@ -41,26 +42,25 @@ from symgen.description.fields import (
     Numeric,
     Path,
     Position,
+    Text,
     Whole,
     Written,
 )
+from symgen.description.kinds import JOINT_FAMILIES, KINDS, USUAL_KINDS
 from symgen.description.parts import (
     DIRECTIONS,
     FIXED,
     INERTIAL,
-    JOINT_FAMILIES,
-    KINDS,
     PRISMATIC,
     REVOLUTE,
-    USUAL_KINDS,
     Drives,
-    Element,
     Form,
     Frame,
     Limits,
     LimitsTable,
     Loop,
     Row,
+    assumed,
     by_joint,
     parameter,
 )
@@ -185,6 +185,16 @@ class Robot:
             )
         ),
     ] = Field(default={})
+    assume: Annotated[
+        frozenset[str],
+        Written(dict[str, Text], assumed),
+        Field(
+            description=(
+                "standard parameters that are zero: {XY2: 0, link 3: symmetric xz}; taken into "
+                "the regrouping"
+            )
+        ),
+    ] = Field(default={})  # type: ignore[arg-type]
     labels: Annotated[
         Mapping[int, str],
         Written(dict[Whole, str]),
@@ -202,8 +212,20 @@ class Robot:
     def __post_init__(self) -> None:
         for name in ("constants", "constraints", "limits", "values", "labels"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-        for name, kind in (("elements", tuple), ("loops", tuple), ("massless", frozenset)):
+        for name, kind in (
+            ("elements", tuple),
+            ("loops", tuple),
+            ("massless", frozenset),
+            ("assume", frozenset),
+        ):
             object.__setattr__(self, name, kind(getattr(self, name)))
+        scalars = {name: x for e in self.elements for name, x in e.constants.items()}
+        if scalars:  # of laws: constants, whose values in the file go before
+            constants = {
+                **self.constants,
+                **{n: self.constants.get(n, x) for n, x in scalars.items()},
+            }
+            object.__setattr__(self, "constants", MappingProxyType(constants))
         check_robot(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -241,6 +263,19 @@ class Robot:
         return tuple(j for j in self.moving if not self.frame(j).mu)
 
     @cached_property
+    def start(self) -> dict[int, float]:
+        """Positions that the loops name, near which they close; rad or m."""
+        return {j: x for loop in self.loops for j, x in loop.start.items()}
+
+    @cached_property
+    def longest(self) -> float:
+        """The longest length of the frames at the constants of the file, m; 1 where all are
+        zero.
+        """
+        lengths = (e.value(self.constants) for f in self.frames for e in (f.b, f.d, f.r0))
+        return max(map(abs, lengths)) or 1.0
+
+    @cached_property
     def cut(self) -> frozenset[int]:
         """Frames without a link: the cut joint of each loop and its twin."""
         return frozenset(k for loop in self.loops for k in (loop.cut, loop.twin))
@@ -269,6 +304,11 @@ class Robot:
             if e.family not in JOINT_FAMILIES:
                 names += [parameter(e.family, j) for j in e.keys]
         return tuple(names)
+
+    def root(self, loop: Loop) -> int:
+        """The last frame that carries both ends of a loop: what is before it turns the whole."""
+        twin = self.path(loop.twin)
+        return max((j for j in self.path(loop.cut) if j in twin), key=twin.index, default=0)
 
     def path(self, j: int) -> tuple[int, ...]:
         """Frames from the base to j, j included."""

@@ -30,6 +30,8 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     at fault.
     """
     data = {"file": Given(file), "sha256": Given(sha256), **data}
+    columns = data.get("columns") or {}
+    data = _with_columns(data)
     convention = data.pop("convention", "proximal")
     if convention not in CONVENTIONS:
         raise DescriptionError(
@@ -54,8 +56,28 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)
     try:
         return TypeAdapter(Robot).validate_python(data, context=declared)
-    except ValidationError as error:
-        raise explained(error) from error
+    except (ValidationError, DescriptionError) as error:
+        wrong = explained(error) if isinstance(error, ValidationError) else error
+        if wrong.path[:1] == ("elements",) and wrong.path[1:2] and wrong.path[1] in columns:
+            path: Path = ("columns", *wrong.path[1:])
+            wrong = DescriptionError(wrong.message.replace("elements.", "columns.", 1), path=path)
+        raise wrong from error
+
+
+def _with_columns(data: dict[str, Any]) -> dict[str, Any]:
+    """`columns` among the elements, which they are."""
+    columns, elements = data.pop("columns", {}), data.get("elements", {})
+    if not columns:
+        return data
+    for table, key in ((columns, "columns"), (elements, "elements")):
+        if not isinstance(table, dict):
+            raise DescriptionError(f"{key}: found {table!r:.60}; expected a table", path=(key,))
+    if both := [name for name in columns if name in elements]:
+        raise DescriptionError(
+            f"columns: {both[0]!r} is an element of this robot too; give it another name",
+            path=("columns", both[0]),
+        )
+    return {**data, "elements": {**elements, **columns}}
 
 
 @cache
@@ -75,7 +97,16 @@ def json_schema() -> dict[str, Any]:
         **schema,
         "title": "RobotFile",
         "description": f"A robot file, schema version {SCHEMA}.",
-        "properties": {"symgen": version, **schema["properties"], "convention": convention},
+        "properties": {
+            "symgen": version,
+            **schema["properties"],
+            "columns": schema["properties"]["elements"]
+            | {
+                "title": "Columns",
+                "description": "torques of your own: {SP: {along: 2, torque: sin(q), unit: N*m}}",
+            },
+            "convention": convention,
+        },
         "required": ["symgen", *schema["required"]],
     }
 

@@ -15,7 +15,7 @@ from symgen.description.expression import Expression
 Array = np.ndarray
 MAX_JOINTS = 200
 EARTH = 9.81  # m/s^2, along -z of the root link
-MOVING, FIXED_TYPE = ("revolute", "continuous", "prismatic"), "fixed"
+MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed", "free"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Joint:
     name : str
         Of the file.
     kind : str
-        One of MOVING, or FIXED_TYPE.
+        One of MOVING, FIXED_TYPE, or FREE_TYPE, which has to be held.
     parent, child : str
         Names of the links; the frame of `child` is the joint frame at q = 0.
     pose : ndarray, shape (4, 4)

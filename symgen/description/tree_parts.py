@@ -20,7 +20,7 @@ import numpy as np
 
 from symgen.description.angles import SHOWN
 from symgen.description.expression import Expression
-from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree, turn
+from symgen.description.tree import FIXED_TYPE, FREE_TYPE, Array, Joint, Tree, turn
 from symgen.errors import DescriptionError
 
 
@@ -96,6 +96,10 @@ def _motion(joint: Joint, q: float) -> Array:
     [a]^2.
     """
     T = np.eye(4)
+    if joint.kind == FREE_TYPE and q:
+        raise DescriptionError(
+            f"free joint {joint.name!a:.60} is held where the file has it, at 0", line=joint.line
+        )
     if joint.kind == "prismatic":
         T[:3, 3] = q * joint.axis
         return T

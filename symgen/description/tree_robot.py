@@ -23,7 +23,7 @@ from symgen.description.fields import located
 from symgen.description.mjcf import parse_mjcf
 from symgen.description.naming import is_label
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
-from symgen.description.tree import Array, Inertial, Joint, Tree
+from symgen.description.tree import FREE_TYPE, Array, Inertial, Joint, Tree
 from symgen.description.tree_frames import Body, Table, placed
 from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
 from symgen.description.urdf import parse_urdf
@@ -94,15 +94,18 @@ def robot_of_tree(
 
     Raises DescriptionError, with the line of the joint at fault, where the tree is no robot.
     """
+    if free := [joint for joint in tree.joints if joint.kind == FREE_TYPE]:
+        raise DescriptionError(
+            f"free joint {free[0].name!r}: a robot stands on a base that rests; to hold this one "
+            f"where the file has it: symgen convert --lock {free[0].name}=0",
+            line=free[0].line,
+        )
     table = placed(tree, keep_fixed=keep_fixed)
     try:
         robot = _robot(table, file, sha256)
     except DescriptionError as error:
-        joint = (
-            table.joint.get(int(str(error.path[1])))
-            if len(error.path) > 1 and error.line is None
-            else None
-        )
+        key = str((*error.path, "", "")[1]).removeprefix("q")
+        joint = table.joint.get(int(key)) if key.isdigit() and error.line is None else None
         raise DescriptionError(
             error.message, path=error.path, line=error.line or (joint.line if joint else 1)
         ) from error.__cause__

@@ -30,9 +30,10 @@ from ruamel.yaml.events import (
 )
 
 from symgen.description.advice import yaml_advice
+from symgen.description.element import Element
 from symgen.description.expression import ONE
 from symgen.description.fields import Path, located
-from symgen.description.parts import GEOMETRY, Element, Form, Row
+from symgen.description.parts import GEOMETRY, Form, Row
 from symgen.description.robot import Robot
 from symgen.description.schema import SCHEMA, robot_of
 from symgen.errors import DescriptionError
@@ -182,10 +183,10 @@ def _scalar(event: Any) -> Any:
     return number if decimal and (number := float(text)) - number == 0 else text
 
 
-def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
-    """Text of the file; `comments` are lines that stand first, each after a #."""
+def tables_of(robot: Robot) -> dict[str, Any]:
+    """The tables of a robot file, by their keys; expressions are not yet text."""
     drives = robot.drives
-    tables: dict[str, Any] = {
+    return {
         "symgen": SCHEMA,
         "name": robot.name,
         "title": json.dumps(robot.title, ensure_ascii=False) if robot.title else "",
@@ -211,25 +212,30 @@ def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
         "drives": {} if drives is None else {key: getattr(drives, key) for key in DRIVES},
         "limits": robot.limits,
         "values": robot.values,
+        "assume": dict.fromkeys(sorted(robot.assume), 0),
         "labels": {j: json.dumps(x, ensure_ascii=False) for j, x in robot.labels.items()},
     }
+
+
+def write_yaml(robot: Robot, *, comments: Sequence[str] = ()) -> str:
+    """Text of the file; `comments` are lines that stand first, each after a #."""
     lines = [f"# {line}" for line in comments]
-    for key, table in tables.items():
+    for key, table in tables_of(robot).items():
         if key in BY_ROW and table:
-            lines += [f"{key}:", *(f"  {_flow(k)}: {_flow(row)}" for k, row in table.items())]
+            lines += [f"{key}:", *(f"  {flow(k)}: {flow(row)}" for k, row in table.items())]
         elif key == "loops" and table:
-            lines += ["loops:", *(f"  - {_flow(loop)}" for loop in table)]
+            lines += ["loops:", *(f"  - {flow(loop)}" for loop in table)]
         elif table or key == "constants":
-            lines.append(f"{key}: {_flow(table)}")
+            lines.append(f"{key}: {flow(table)}")
     return "\n".join(lines) + "\n"
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
     """A value on one line; a name that YAML reads as something else between quotes."""
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{_flow(key)}: {_flow(x)}' for key, x in value.items())}}}"
+        return f"{{{', '.join(f'{flow(key)}: {flow(x)}' for key, x in value.items())}}}"
     if isinstance(value, tuple | list):
-        return f"[{', '.join(map(_flow, value))}]"
+        return f"[{', '.join(map(flow, value))}]"
     text = str(value)
     return f'"{text}"' if text.lower() in WORDS else text
 
@@ -239,7 +245,13 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
     along = "all" if everywhere else {j: _row(row) for j, row in e.along.items()}
     form = {j: _form(form) for j, form in e.form.items()}
     table = {"kind": e.kind, "along": along, "form": form, "when": e.when}
-    return {key: value for key, value in table.items() if value}
+    texts = {"torque": e.torque, "energy": e.energy, "unit": e.unit or None}
+    table |= {key: json.dumps(str(x)) for key, x in texts.items() if x is not None}
+    scalars = {
+        name: x.value if x.fixed else {"bounds": x.bounds, "start": x.value, "grid": x.grid}
+        for name, x in e.fit.items()
+    }
+    return {key: value for key, value in {**table, "fit": scalars}.items() if value}
 
 
 def _row(row: Row) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from symgen.derive.graph import CONST, COS, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
+from symgen.derive.graph import CONST, COS, OPAQUE, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
 from symgen.description.namespace import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
 
@@ -21,13 +21,13 @@ if inline int long register restrict return short signed sizeof static struct sw
 unsigned void volatile while"""
 MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL STREAM PORTABLE
 WIDTH"""
-OWN = """sin cos sqrt sign above below load save constants flags m t start row tile U T S N
-size_t int32_t int64_t memcpy memset"""
+OWN = """sin cos sqrt exp tanh pow sign above below load save constants flags m t start row tile
+U T S N size_t int32_t int64_t memcpy memset"""
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
 HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")
 """Macros of math.h and stdint.h."""
 C = Language(
-    {op: op for op in (COS, SIN, SIGN, SQRT)},
+    {op: op for op in (COS, SIN, SIGN, SQRT)} | OPAQUE,
     "above({})",
     "below({})",
     "3.141592653589793",

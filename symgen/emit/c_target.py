@@ -29,10 +29,8 @@ FLAGS = (
     "-std=c11 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-shared -fPIC"
 )
-RESULTS = (
-    "joints",
-    "parameters",
-)  # axes of the models that have a kernel: torques and matrices over the joints
+RESULTS = ("joints", "parameters", "energies", "wrench", "standard parameters")
+"""Axes of the models that have a kernel."""
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -118,14 +116,20 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         for k, j in enumerate(independent)
     }
     needed = text.inputs
+    free = spec.regrouping.constants
     constants, parameters = (
         [
-            f"const double {names.of_file(c)} = {source}[{k}];"
+            f"const double {names.of_file(c)} = {source.format(k)};"
             for k, c in enumerate(every)
             if c in needed
         ]
-        for source, every in (("constants", robot.constants), ("X", spec.regrouping.names))
+        for source, every in (("constants[{}]", free), ("X[{}]", spec.regrouping.names))
     )
+    fixed = [
+        f"const double {names.of_file(c)} = {x!r};"
+        for c, x in robot.constants.items()
+        if c in needed and c not in free
+    ]
     trigonometry = list(text.trigonometry_of.items())
     angles = [_input(name, *place[name]) for name in place if name in text.trigonometry_inputs]
     calls = [
@@ -149,7 +153,7 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         "text": text,
         "result": result,
         "used": used,
-        "before": (*constants, *parameters, *text.fixed),
+        "before": (*fixed, *constants, *parameters, *text.fixed),
         "trigonometry": trigonometry_loops,
         "calls": len(trigonometry),
         "sections": [s for s in sections if s.lines],
@@ -189,7 +193,7 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
             ),
         ),
         *line_of("flags", "1 writes past the caches, for results larger than those"),
-        *line_of("constants", ", ".join(spec.robot.constants) or "none"),
+        *line_of("constants", ", ".join(spec.regrouping.constants) or "none"),
         *line_of("X, columns", " ".join(spec.regrouping.names)),
         *line_of(
             "Results",

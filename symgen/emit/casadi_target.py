@@ -22,7 +22,7 @@ from symgen.regroup.regrouping import sign_conditions
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The CasADi module of a robot. Same robot file, same version: same bytes."""
-    robot, regrouping = spec.robot, spec.regrouping
+    robot, regrouping, free = spec.robot, spec.regrouping, spec.regrouping.constants
     blocks = blocks_of(spec, CASADI)
     what = "base parameters, regressor, dynamics as CasADi functions"
     values = context(spec, command, CASADI, "ca.SX", blocks, what=what)
@@ -32,15 +32,15 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     reads = MODELS["forward_dynamics"].arguments
     takes = {
         **values["takes"],
-        "base_parameters": ["standard", *constants_of(robot, *coefficients)],
-        "forward_dynamics": [a for a in (*reads, *robot.constants) if a in dynamics],
+        "base_parameters": ["standard", *constants_of(regrouping, *coefficients)],
+        "forward_dynamics": [a for a in (*reads, *free) if a in dynamics],
         "passive_joints": ["q", "qd", "qdd", *values["passive_constants"]],
         "jacobian": [
             "q",
-            *constants_of(robot, blocks["frame_poses"].constants, values["path_constants"]),
+            *constants_of(regrouping, blocks["frame_poses"].constants, values["path_constants"]),
         ],
     }
-    example = "".join(f", {name}={value!r}" for name, value in list(robot.constants.items())[:1])
+    example = "".join(f", {name}={value!r}" for name, value in list(free.items())[:1])
     names = spec.names()
     poses = [names.own(f"T{f.j}") for f in robot.frames]
     models = values["models"]

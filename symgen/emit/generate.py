@@ -29,6 +29,7 @@ def generate_files(
     targets: Sequence[str] = ("numpy",),
     command: str | None = None,
     regrouping: Regrouping | None = None,
+    options: Sequence[str] = (),
 ) -> dict[str, str]:
     """Texts of the files of a robot.
 
@@ -42,13 +43,17 @@ def generate_files(
         What the header gives as argument of `symgen generate`. Default: the file of the robot.
     regrouping : Regrouping, optional
         Base parameters of `robot`. Default: derived.
+    options : sequence of str
+        Models on request, among `symgen.derive.models.OPTIONS`.
 
     Returns
     -------
     dict
         {file name: text}. Same robot file, same version: same bytes.
     """
-    spec: ModuleSpec = spec_of(robot) if regrouping is None else module_spec(regrouping)
+    spec: ModuleSpec = (
+        spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
+    )
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
     return {
         TARGETS[name].file.format(robot.name): RENDER[name](spec, command=command)

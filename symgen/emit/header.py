@@ -11,7 +11,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.columns import element_names, unit
 from symgen.derive.names import FAMILIES, families_of
-from symgen.description.robot import FIXED, Robot
+from symgen.description.robot import FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text
 from symgen.emit.render import WIDTH
 from symgen.emit.spec import ModuleSpec
@@ -58,7 +58,11 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
             lines += wrapped(f"{name} = {formula}", "    ")
     else:
         lines.append("    FORMULAS says what they are made of; what it leaves out is as it is")
-    lines += wrapped("No effect: " + (" ".join(regrouping.no_effect) or "none"), "    ")
+    without = [name for name in regrouping.no_effect if name not in robot.assume]
+    lines += wrapped("No effect: " + (" ".join(without) or "none"), "    ")
+    if robot.assume:
+        zero = [name for name in robot.parameters if name in robot.assume]
+        lines += wrapped("Assumed zero: " + " ".join(zero), "    ")
     absorbing = one_sided_friction_that_absorbs(regrouping)
     if absorbing:
         lines += wrapped(
@@ -154,8 +158,21 @@ def element_lines(robot: Robot) -> list[str]:
         parts += [f"{e.family}{j} along {rows[j]}" for j in rows if j not in own]
         parts += [f"{e.family}{j} in the form {_form_text(form)}" for j, form in e.form.items()]
         when = f", {e.when} motion only" if e.when else ""
+        when += _law_text(e)
         lines += wrapped(f"{e.family:<7} {e.kind}{when}: {'; '.join(parts)}", "", "            ")
     return lines
+
+
+def _law_text(e: Element) -> str:
+    """The law of an element that is not inertia, linear friction, offset or spring."""
+    if not e.is_own:
+        return ""
+    law = e.energy if e.energy is not None else e.torque or KINDS[e.kind].torque
+    fixed = [f"{name} = {x.value:g}" for name, x in e.scalars.items() if x.fixed]
+    free = [name for name, x in e.scalars.items() if not x.fixed]
+    free = [f"{', '.join(free)} of each parameter"] if free else []
+    said = f" ({'; '.join([*fixed, *free])})" if fixed or free else ""
+    return f", {'energy' if e.energy is not None else 'torque'} {law}{said}"
 
 
 def loop_lines(robot: Robot, closure: Closure) -> list[str]:
@@ -204,7 +221,8 @@ def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
         f"JOINTS = {robot.joints!r}",
         *([f"PASSIVE = {robot.passive!r}"] if robot.passive else []),
         *(literal("LABELS", dict(robot.labels)) if robot.labels else []),
-        *literal("CONSTANTS", dict(robot.constants)),
+        *literal("CONSTANTS", dict(regrouping.constants)),
+        *(f"{c} = {x!r}" for c, x in robot.constants.items() if c not in regrouping.constants),
         *names("BASE_PARAMETERS", regrouping.names),
         *names("STANDARD_PARAMETERS", robot.parameters),
         *names("NO_EFFECT", regrouping.no_effect),
@@ -221,7 +239,19 @@ def data(spec: ModuleSpec) -> list[str]:
         *_drives(robot),
         *literal("LIMITS", dict(robot.limits)),
         *literal("VALUES", dict(robot.values)),
+        *(literal("FIT", fit) if (fit := scalars(robot)) else ()),
     ]
+
+
+def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
+    """{constant: (bounds, starts, parameter)} of the scalars of laws that may be fitted."""
+    return {
+        f"{name}{j}": (x.bounds, x.grid, f"{e.family}{j}")
+        for e in robot.elements
+        for j in e.keys
+        for name, x in e.scalars.items()
+        if not x.fixed
+    }
 
 
 def _drives(robot: Robot) -> list[str]:

@@ -15,6 +15,7 @@ from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import Function, ModuleSpec
 
 BLOCK = 4096  # samples
+IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
@@ -33,6 +34,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "tables": [*tables(spec), *_loop_tables(spec, slides)],
             "data": [*literal("LINKS", spec.robot.links), *data(spec)],
             "slides": slides,
+            "closed": 1e-13 if spec.robot.longest > IN_METRES else 1e-16,
             "store_constants": list(constant_entries(spec.functions["regressor"], "zeros")),
             "elements": element_lines(spec.robot, NUMPY),
             "evaluated": {name: list(_evaluation(spec, b)) for name, b in blocks.items()},
@@ -52,10 +54,8 @@ def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
     mode = loop_system(robot).mode()
     yield f"_MODE = {mode}  # sign of det J_u in the assembly mode of _START"
     if slides:
-        lengths = (abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0))
-        longest = repr(max(lengths) or 1.0)
         kinds = [robot.frame(j).sigma for j in closure.independent]
-        units = ", ".join(longest if sigma == PRISMATIC else "1.0" for sigma in kinds)
+        units = ", ".join(repr(robot.longest) if sigma == PRISMATIC else "1.0" for sigma in kinds)
         yield f"_UNITS = ({units},)  # rad; of slides the longest length, m"
 
 

@@ -14,6 +14,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from itertools import groupby
 from operator import itemgetter
 from string import ascii_lowercase
@@ -24,6 +25,7 @@ from symgen.derive.graph import (
     COS,
     INV,
     MUL,
+    OPAQUE,
     SIGN,
     SIN,
     SQRT,
@@ -50,7 +52,7 @@ class Language:
     Attributes
     ----------
     calls : mapping
-        Function of each of cos, sin, sign and sqrt.
+        Function of each of cos, sin, sign, sqrt and OPAQUE.
     above, below : str
         The part of {} above or below zero.
     pi, one, square : str
@@ -79,11 +81,17 @@ class Language:
 
 
 def _calls(package: str) -> dict[str, str]:
-    return {op: f"{package}{op}" for op in (COS, SIN, SIGN, SQRT)}
+    return {op: f"{package}{op}" for op in (COS, SIN, SIGN, SQRT)} | {
+        op: f"{package}{name}" for op, name in OPAQUE.items()
+    }
 
 
-NUMPY = Language(_calls("np."), "np.maximum({}, 0.0)", "np.minimum({}, 0.0)", "np.pi")
-CASADI = Language(_calls("ca."), "ca.fmax({}, 0.0)", "ca.fmin({}, 0.0)", "ca.pi")
+NUMPY = Language(
+    _calls("np.") | {"power": "np.power"}, "np.maximum({}, 0.0)", "np.minimum({}, 0.0)", "np.pi"
+)
+CASADI = Language(
+    _calls("ca.") | {"power": "ca.power"}, "ca.fmax({}, 0.0)", "ca.fmin({}, 0.0)", "ca.pi"
+)
 ARRAYS = Language(
     _calls("xp.") | {SIGN: "_sign"},
     "xp.clip({}, min=0.0)",
@@ -91,7 +99,9 @@ ARRAYS = Language(
     "xp.pi",
     lift="zero + ",
 )
-PLAIN = Language(_calls(""), "max({}, 0)", "min({}, 0)", "pi", number=decimal)
+PLAIN = Language(
+    _calls(""), "max({}, 0)", "min({}, 0)", "pi", number=partial(decimal, fractions=False)
+)
 """The grammar of robot files, numbers exact."""
 
 
@@ -306,7 +316,8 @@ class Text:
             case "inv":
                 return f"{minus}{language.one}/{self._divisor(node.operands[0])}"
         lift = language.lift if node.fixed else ""
-        return f"{minus}{language.calls[node.op]}({lift}{self._operand(node.operands[0])})"
+        operands = ", ".join(map(self._operand, node.operands))
+        return f"{minus}{language.calls[node.op]}({lift}{operands})"
 
     def _sum(self, s: Scalar) -> str:
         """Positive terms first: that saves a negation."""

@@ -12,7 +12,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.columns import acting, element_names
 from symgen.derive.model import Entry
-from symgen.derive.models import EMITTED
+from symgen.derive.models import EMITTED, ON_REQUEST
 from symgen.description.expression import Expression
 from symgen.description.namespace import Namespace
 from symgen.description.robot import FIXED, Robot
@@ -20,7 +20,7 @@ from symgen.emit.header import header, packed, plain, wrapped
 from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.render import WIDTH
 from symgen.emit.spec import STATES, Function, ModuleSpec
-from symgen.regroup.regrouping import sign_conditions
+from symgen.regroup.regrouping import Regrouping, sign_conditions
 from symgen.version import VERSION
 
 
@@ -115,7 +115,7 @@ def _block(
             inputs += _unpack(source, wanted, len(items))
         else:
             inputs += [f"{name} = {component(source, k)}" for k, name in wanted]
-    constants = f.constants(spec.robot)
+    constants = f.constants(spec.regrouping.constants)
     states = [rates if state == "G" else state for state in f.states]
     X = ["X"] if f.reads("parameter") else []
     return Block(f, text, names, result, (*states, *X, *constants), constants, tuple(inputs))
@@ -177,7 +177,7 @@ def context(
     robot, regrouping, closure = spec.robot, spec.regrouping, spec.derivation.closure
     read = {name for b in regrouping.base for name in b.combination}
     loops = [b.constants for b in blocks.values() if b.function.model.of_loops]
-    closing = constants_of(robot, *loops)
+    closing = constants_of(regrouping, *loops)
     rows = [(closure.offset[j], *closure.row[j].values()) for j in robot.passive]
     return {
         **spec.sizes,
@@ -192,18 +192,19 @@ def context(
         ],
         "tied": spec.tied,
         "passive": robot.passive,
-        "models": EMITTED,
+        "models": EMITTED | {n: m for n, m in ON_REQUEST.items() if n in spec.functions},
+        "references": any(f.reads("qdr") or f.reads("qddr") for f in spec.functions.values()),
         "functions": spec.functions,
         "takes": {name: list(b.arguments) for name, b in blocks.items()},
         "listed": listed,
         "shapes": {name: f.shape for name, f in spec.functions.items()},
-        "head": Heads(robot, array, quote),
+        "head": Heads(regrouping, array, quote),
         "closing": closing,
         "closed_by": f"({', '.join(map(_tuple, loops))})",
-        "storing": constants_of(robot, blocks["regressor"].constants, closing),
-        "constants": listed(robot.constants),
+        "storing": constants_of(regrouping, blocks["regressor"].constants, closing),
+        "constants": listed(regrouping.constants),
         "keywords": {
-            name: "".join(f", {c}={c}" for c in constants_of(robot, b.constants, closing))
+            name: "".join(f", {c}={c}" for c in constants_of(regrouping, b.constants, closing))
             for name, b in blocks.items()
         },
         "passed": {name: b.constants for name, b in blocks.items()},
@@ -226,9 +227,9 @@ def context(
         "packed": packed(list(regrouping.names)),
         "paths": _paths(robot, closure, language),
         "path_constants": constants_of(
-            robot, _symbols(row for rows in closure.row.values() for row in rows.values())
+            regrouping, _symbols(row for rows in closure.row.values() for row in rows.values())
         ),
-        "passive_constants": constants_of(robot, _symbols(e for row in rows for e in row)),
+        "passive_constants": constants_of(regrouping, _symbols(e for row in rows for e in row)),
         "passive_rows": _passive_rows(robot, closure, language),
     }
 
@@ -236,8 +237,9 @@ def context(
 class Heads:
     """First lines of public functions: signature with hints, then the summary."""
 
-    def __init__(self, robot: Robot, array: str, quote: str) -> None:
-        self.constants = [f"{name}: float = {value!r}" for name, value in robot.constants.items()]
+    def __init__(self, regrouping: Regrouping, array: str, quote: str) -> None:
+        free = regrouping.constants
+        self.constants = [f"{name}: float = {value!r}" for name, value in free.items()]
         self.array, self.quote = array, quote
 
     def hint(self, kind: str) -> str:
@@ -282,9 +284,9 @@ def listed(names: Iterable[str]) -> str:
     return "".join(f", {name}" for name in names)
 
 
-def constants_of(robot: Robot, *used: Iterable[str]) -> tuple[str, ...]:
-    """The constants of the robot that are among those used, in its order."""
-    return tuple(name for name in robot.constants if any(name in names for names in used))
+def constants_of(regrouping: Regrouping, *used: Iterable[str]) -> tuple[str, ...]:
+    """The constants that may have other values and are among those used, in their order."""
+    return tuple(name for name in regrouping.constants if any(name in names for names in used))
 
 
 def _symbols(expressions: Iterable[Expression]) -> set[str]:
@@ -334,7 +336,7 @@ def element_lines(robot: Robot, language: Language) -> list[str]:
         entries.append(
             (
                 robot.parameters.index(name),
-                f"{name!r}: ({e.kind!r}, {e.when or 'both'!r}, {{{text}}})",
+                f"{name!r}: ({e.acts_as!r}, {e.when or 'both'!r}, {{{text}}})",
             )
         )
     return packed([entry for _, entry in sorted(entries)])

@@ -4,7 +4,7 @@ each of them reads, its constant entries, its costs. Made once, printed by every
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -17,7 +17,8 @@ from symgen.description.namespace import Namespace
 from symgen.description.robot import Robot
 from symgen.regroup.regrouping import Regrouping, regroup
 
-STATES = {"q": "q", "qd": "QP", "qdd": "QDP"}  # argument: family of its components
+STATES = {"q": "q", "qd": "QP", "qdd": "QDP", "qdr": "QPR", "qddr": "QDPR"}
+"""Argument: family of its components."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +54,13 @@ class Function:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """What it reads of q, qd, qdd, and of G, the rates of the tied joints."""
+        """What it reads of the states, and of G, the rates of the tied joints."""
         kinds = {**{state: state for state in STATES}, "G": "rate"}
         return tuple(state for state, kind in kinds.items() if self.reads(kind))
 
-    def constants(self, robot: Robot) -> tuple[str, ...]:
-        """What it reads of the constants of the robot, in their order."""
-        return tuple(name for name in robot.constants if Symbol("constant", name) in self.inputs)
+    def constants(self, free: Iterable[str]) -> tuple[str, ...]:
+        """What it reads of the constants that may have other values, in their order."""
+        return tuple(name for name in free if Symbol("constant", name) in self.inputs)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
         """Where an entry stands in the array: twice beside the diagonal of a symmetric matrix."""
@@ -184,10 +185,16 @@ class ModuleSpec:
         return Namespace(own, is_word)
 
 
-def module_spec(regrouping: Regrouping) -> ModuleSpec:
-    """Every model of an emitted module, over the base parameters of `regrouping`."""
+def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSpec:
+    """Every model of an emitted module, over the base parameters of `regrouping`, and those that
+    `options` ask for.
+    """
     d = derive(regrouping.robot)
-    printed = [m for m in MODELS.values() if m.printed and (d.closure.tied or not m.of_loops)]
+    printed = [
+        m
+        for m in MODELS.values()
+        if m.printed and (d.closure.tied or not m.of_loops) and m.option in ("", *options)
+    ]
     return ModuleSpec(d, regrouping, {m.name: function(regrouping, m.name) for m in printed})
 
 
@@ -208,11 +215,11 @@ def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[
 
 
 @lru_cache(maxsize=2)
-def spec_of(robot: Robot) -> ModuleSpec:
+def spec_of(robot: Robot, options: tuple[str, ...] = ()) -> ModuleSpec:
     """The models of a robot over its base parameters; kept, since its module and its C file are
     asked for one after the other.
     """
-    return module_spec(regroup(robot))
+    return module_spec(regroup(robot), options)
 
 
 def is_inertial(robot: Robot) -> Callable[[str], bool]:

@@ -46,8 +46,8 @@ ON_BRANCH = 1e-6  # rad
 class ClosedDraw(Draw):
     """`samples` closed states at each of `count` random geometries.
 
-    `geometry` gives residues, shape (count, 1), of what varies; default: all lengths. Raises
-    ArithmeticError where no two joints close each loop.
+    `geometry` gives residues, shape (count, 1), of what varies; default: all lengths. `wide` times
+    as many states as usual are drawn. Raises ArithmeticError where no two joints close each loop.
     """
 
     def __init__(
@@ -59,6 +59,7 @@ class ClosedDraw(Draw):
         count: int = 1,
         p: int | None = None,
         geometry: Mapping[Variable, Array] | None = None,
+        wide: int = 1,
     ) -> None:
         self.system = loop_system(robot)
         self.tied = self.system.closure.tied
@@ -71,7 +72,8 @@ class ClosedDraw(Draw):
         rng = np.random.default_rng([seed, 1])
         if geometry is None:
             geometry = {v: rng.integers(1, p, count) for v in lengths_of(robot)}
-        more = int(samples * 2.4 ** len(robot.loops)) + SPARE  # half of the draws close a loop
+        # half of the draws close a loop
+        more = wide * (int(samples * 2.4 ** len(robot.loops)) + SPARE)
         drawn = {v: np.repeat(x, more) for v, x in geometry.items()}
         super().__init__(robot, seed, count * more, p=p, geometry=drawn)
         self.shape = (count, samples)
@@ -258,10 +260,12 @@ class ClosedDraw(Draw):
 
 
 def closed_draw(robot: Robot, seed: int, samples: int, **given: Any) -> ClosedDraw:
-    """A ClosedDraw; one that happens to be singular is made again."""
+    """A ClosedDraw; one that happens to be singular, or to close too rarely at one of many
+    geometries, is made again and wider.
+    """
     for k in range(ATTEMPTS):
         try:
-            return ClosedDraw(robot, seed + 1000 * k, samples, **given)
+            return ClosedDraw(robot, seed + 1000 * k, samples, wide=1 + k, **given)
         except ArithmeticError as error:
             if str(error) != SINGULAR:
                 raise

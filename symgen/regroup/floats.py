@@ -25,9 +25,11 @@ from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import SymgenError
 from symgen.regroup.residues import states_for
 
-INDEPENDENT = 1e-7  # of a unit column: what the columns before it leave of an independent one
+# singular values of unit columns: those below are rounding where a gap says so, at most here
+LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14
 NEGLIGIBLE = 1e-6  # of a coefficient between unit columns
-SPREAD, MOST_STATES = 0.4, 4000  # rad about the start, and of half the longest length for slides
+SPREAD, MOST_STATES = 0.8, 4000  # rad about the start, and of half the longest length for slides
+DECADES = -3.5, 1.0  # decades of the velocities at which laws are compared
 Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coefficient}}
 
 
@@ -59,7 +61,12 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
     closure, rng = close(robot), np.random.default_rng(41)
     if not closure.tied:
         count = states_for(robot, names)
+        if any(e.is_own for e in robot.elements):  # which bend and jump
+            count *= 6
         states = rng.uniform(-1, 1, (3, len(robot.moving), count))
+        if any(e.is_own for e in robot.elements):
+            states[0] *= np.pi
+            states[1] *= 10 ** rng.uniform(*DECADES, states[1].shape)
         q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in states)
         D = _columns(closure, FloatAlgebra(robot, q, qd, qdd), names, count)
         return D.reshape(-1, len(names))
@@ -87,8 +94,7 @@ def _columns_near_start(
 ) -> Array:
     """Columns `names` at those of `count` random states that close, (joints, states, columns)."""
     robot, closure, n = system.robot, system.closure, len(system.robot.joints)
-    lengths = [abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)]
-    size = max(lengths) or 1.0
+    size = robot.longest
     slides = np.array([robot.frame(j).sigma == PRISMATIC for j in robot.joints])
     away = SPREAD * np.where(slides, size / 2, 1.0) * rng.uniform(-1, 1, (n, count)).T
     q = np.tile(system.start, (count, 1))
@@ -97,6 +103,7 @@ def _columns_near_start(
         q = system.closed(q, steps=8, tolerance=1e-14 * size)
     r, J = system.residual_floats(q), system.jacobian_floats(q)
     good = (np.abs(r).max(axis=1) < 1e-11 * size) & (np.linalg.cond(J[..., n:]) < 1e6)
+    good &= np.linalg.det(J[..., n:]) * system.mode() > 0  # beyond a dead point is another mode
     q, J = q[good], J[good]
     J_u, G = J[..., n:], -np.linalg.solve(J[..., n:], J[..., :n])
     qd, qdd = rng.standard_normal((2, n, len(q)))[..., None].swapaxes(1, 2)
@@ -122,12 +129,16 @@ def float_base(W: Array) -> tuple[list[int], Array]:
     norms = np.linalg.norm(W, axis=0)
     norms[norms <= 1e-10 * norms.max(initial=0.0)] = np.inf
     U = W / norms
+    s = np.maximum(np.append(np.linalg.svd(U, compute_uv=False), 0.0), SMALLEST)
+    rank = np.flatnonzero(s[1:] < LARGEST_ROUNDING)
+    k = int(rank[np.argmax(s[rank] / s[rank + 1])]) if len(rank) else 0
+    independent = float(np.sqrt(s[k] * s[k + 1]))
     Q = np.zeros((W.shape[0], 0))
     pivots: list[int] = []
     for c in range(W.shape[1]):
         u = U[:, c] - Q @ (Q.T @ U[:, c])
         u = u - Q @ (Q.T @ u)
-        if (size := float(np.linalg.norm(u))) > INDEPENDENT:
+        if (size := float(np.linalg.norm(u))) > independent:
             pivots.append(c)
             Q = np.column_stack([Q, u / size])
     K = np.linalg.lstsq(U[:, pivots], U, rcond=None)[0]

@@ -10,16 +10,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
 
 from symgen.derive.columns import element_names, inertial_names
+from symgen.derive.elements import is_opaque
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
 from symgen.derive.time_limit import limited
-from symgen.description.expression import ONE, ZERO, Call, Expression, with_known_cosines
+from symgen.description.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    simplified,
+    with_known_cosines,
+)
+from symgen.description.kinds import OWN_LAWS
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
@@ -31,7 +38,7 @@ from symgen.regroup.solve import coefficients
 
 FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")
 EXACT = "exact over F_p"
-NUMERIC = "numeric, for the constants of the robot file"
+NUMERIC = "numeric, for the constants of the robot file and no others"
 LAST_CHOICE = ("MZ", "M", "YY")
 
 
@@ -90,6 +97,13 @@ class Regrouping:
     def own(self) -> tuple[str, ...]:
         return tuple(b.own for b in self.base)
 
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Constants of the robot that may have other values: none where coefficients are numbers,
+        which hold for those of the file alone.
+        """
+        return self.robot.constants if self.method == EXACT else {}
+
     def __len__(self) -> int:
         return len(self.base)
 
@@ -131,6 +145,12 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
         reason = str(error)
     else:
         base = tuple(names[c] for c in pivots)
+        if laws := laws_in_numbers(robot):
+            numeric, relations = float_relations(given, names)
+            if len(numeric) < len(base):
+                reason = f"{', '.join(laws)} depend on other columns in numbers alone"
+                base = numeric
+    if not reason:
         supports = {
             name: tuple(base[k] for k in np.flatnonzero(R[:, c]))
             for c, name in enumerate(names)
@@ -155,6 +175,13 @@ def _reason(missing: Mapping[str, str]) -> str:
         f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} "
         f"not recognised: {reason}"
     )
+
+
+def laws_in_numbers(robot: Robot) -> list[str]:
+    """Families whose laws exact arithmetic takes for functions of which it knows nothing; rank is
+    told in numbers too.
+    """
+    return [e.family for e in robot.elements if any(is_opaque(e, j) for j in e.along)]
 
 
 regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is the package
@@ -223,23 +250,6 @@ def _vanishes(c: Expression, draw: Draw) -> bool:
     return not draw.residues(draw.constant(c)).any()
 
 
-def simplified(e: Expression) -> Expression:
-    """cos(a)**2 m + sin(a)**2 m = m and m - cos(a)**2 m = sin(a)**2 m wherever both terms are there
-    with one coefficient.
-    """
-    for m, c in e.terms.items():
-        for a, n in m:
-            if isinstance(a, Call) and a.function == "cos" and n >= 2:
-                rest = tuple((b, k - 2 if b == a else k) for b, k in m if b != a or k > 2)
-                cosine, common = Expression({m: c}), Expression({rest: c})
-                sine = common * Expression({((Call("sin", a.argument), 2),): Fraction(1)})
-                for partner, shorter in ((sine, common), (-common, -sine)):
-                    ((key, value),) = partner.terms.items()
-                    if e.terms.get(key) == value:
-                        return simplified(e - cosine - partner + shorter)
-    return e
-
-
 def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]:
     """(base parameter, ratio of two rates, sign of it in the robot file) wherever a formula adds
     frictions of dependent directions.
@@ -250,7 +260,7 @@ def sign_conditions(regrouping: Regrouping) -> list[tuple[str, Expression, int]]
     leads: dict[str, Expression] = {}
     for name, (e, j) in element_names(robot).items():
         if (
-            (e.kind == "coulomb" or e.when is not None)
+            (e.kind in ("coulomb", *OWN_LAWS) or e.when is not None)
             and j in e.along
             and (row := closure.in_independent(e.along[j]))
         ):

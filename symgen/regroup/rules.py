@@ -53,6 +53,8 @@ class Transfer:
                 and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid)
             ):
                 self.rigid.add(f.j)
+        for name in robot.assume:
+            del self.combination[name]
         for f in reversed(robot.frames):
             if f.j in robot.links and (f.ant == 0 or f.ant in robot.links or f.ant in self.rigid):
                 self._link(f)
@@ -69,7 +71,9 @@ class Transfer:
                     self._reached(k, frame.ant).items() if at else [(parameter(k, frame.j), ONE)]
                 ):
                     into[target] = into.get(target, ZERO) + c * share
-            self._move(parameter(name, frame.j), {target: c for target, c in into.items() if c})
+            acting = {target: c for target, c in into.items() if c}
+            if {parameter(name, frame.j), *acting} <= {*self.combination}:  # none assumed zero
+                self._move(parameter(name, frame.j), acting)
 
     def _reached(self, name: str, j: int) -> Combination:
         """The columns of links that the column of a parameter of frame j is."""

@@ -87,8 +87,9 @@ def effects(spec: ModuleSpec) -> tuple[Effect, ...]:
                 f"joint {j}",
                 "it acts along a coordinate that does not move or carries no torque",
             )
+        said = "the robot file assumes that it is zero" if name in robot.assume else why
         result.append(
-            Effect(name, meaning, unit(robot, name), place, j, base, joints, "" if rows else why)
+            Effect(name, meaning, unit(robot, name), place, j, base, joints, "" if rows else said)
         )
     return tuple(result)
 

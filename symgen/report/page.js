@@ -126,6 +126,7 @@
   function say(name, parameter) {
     const torques = parameter.joints.map((j) => `Γ${j}`).join(", ");
     const lines = [`${name}, ${parameter.place}: ${parameter.text}, ${parameter.unit}`];
+    if (parameter.rule) lines.push(parameter.rule);
     if (parameter.why) lines.push(`no effect: ${parameter.why}`);
     else lines.push(`enters ${torques}` + (parameter.base[0] === name ? "" : ` through ${parameter.base.join(", ")}`));
     by("detail").replaceChildren(...lines.map((text) => Object.assign(document.createElement("p"), { textContent: text })));

@@ -30,6 +30,7 @@ from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec
+from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text
@@ -60,7 +61,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     """
     robot, spec, closure = regrouping.robot, module_spec(regrouping), close(regrouping.robot)
     drawing, parameters = figure(robot, closure), effects(spec)
-    certificate = certificate or certify(regrouping)
+    certificate, absorbed = certificate or certify(regrouping), absorptions(regrouping)
     models, notes = shown_models(regrouping)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
     sources = passive_text(robot, closure)
@@ -73,7 +74,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
             f"default-src 'none'; style-src '{_hash(style)}'; script-src '{_hash(script)}'; "
             "base-uri 'none'; form-action 'none'"
         ),
-        data=embedded(drawing | {"parameters": _pointed_at(spec, parameters)}),
+        data=embedded(drawing | {"parameters": _pointed_at(spec, parameters, absorbed)}),
         verdict=_verdict(regrouping, certificate),
         joints=[j | {"name": _symbol(f"q{j['j']}")} for j in drawing["joints"]],
         passive=[(_symbol(f"q{j}"), j, text) for j, text in sources.items()],
@@ -83,6 +84,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
         elements=[_element_row(e) for e in robot.elements],
         gravity=[mathml.math(trees.expression(e)) for e in robot.gravity],
         formulas=_formulas(spec),
+        absorbed=[(_parameter(a.name), list(map(_parameter, a.base)), a) for a in absorbed],
         models=models,
         model_notes=notes,
         places=_places(parameters),
@@ -210,15 +212,19 @@ def _without_effect(parameters: Sequence[Effect]) -> list[tuple[list[MathML], st
     return [(names, why) for why, names in reasons.items()]
 
 
-def _pointed_at(spec: ModuleSpec, parameters: Sequence[Effect]) -> Mapping[str, Any]:
+def _pointed_at(
+    spec: ModuleSpec, parameters: Sequence[Effect], absorbed: Sequence[Absorption]
+) -> Mapping[str, Any]:
     """What the page says of a parameter under the pointer."""
     robot = spec.robot
     by_name = {e.name: e for e in parameters}
     entries = {e.name: _entry(e, e.meaning, e.base, e.joints, e.why) for e in parameters}
+    for a in absorbed:
+        entries[a.name]["rule"] = f"{a.columns}: {a.rule}"
     for k, b in enumerate(spec.regrouping.base):
         own = by_name[b.own]
-        absorbed = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
-        text = own.meaning + (f"; takes in {', '.join(absorbed)}" if absorbed else "")
+        others = [name for name in b.combination if name != b.own or b.combination[name] != ONE]
+        text = own.meaning + (f"; takes in {', '.join(others)}" if others else "")
         joints = [j for j, entered in zip(robot.joints, spec.structure[k], strict=True) if entered]
         entries[b.name] = _entry(own, text, [b.name], joints, "")
     return entries

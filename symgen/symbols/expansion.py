@@ -20,10 +20,11 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
-from symgen.derive.graph import Node, Scalar, reachable
+from symgen.derive.graph import OPAQUE, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.description.expression import Expression, call
 from symgen.errors import SymgenError
+from symgen.regroup.numbers import numbered, numbers_of
 from symgen.symbols import trees
 from symgen.symbols.factors import Factors
 from symgen.symbols.identities import Angle, Coefficient, Identities, forward, number
@@ -80,7 +81,8 @@ class Expansion:
             for kept in ((RATE, DIRECTION), (CONSTANT, SLIDE, TURN), (CONSTANT,))
         )
         self.shown = shown
-        self.factors = Factors(self.K, shown, (rates, others, constants))
+        decimals = bool(numbers_of(numbered(algebra.robot)))
+        self.factors = Factors(self.K, shown, (rates, others, constants), decimals=decimals)
         self.identities = Identities(
             self.K,
             {a: (self.generator[C], self.generator[S]) for a, (C, S) in self.names.items()},
@@ -122,8 +124,10 @@ class Expansion:
                 for m in self._constant(node).terms:
                     for a, n in m:
                         yield trees.power(a, 1 if n > 0 else -1), CONSTANT
-            case "inv" | "sign" | "pos":
-                yield (node.op, node.index), CONSTANT if node.op == "inv" else DIRECTION
+            case "inv":
+                yield (node.op, node.index), CONSTANT if node.fixed else RATE
+            case op if op in ("sign", "pos", *OPAQUE):
+                yield (node.op, node.index), DIRECTION
 
     def _constant(self, node: Node) -> Expression:
         """The constant that a square root, or the cosine or sine of a fixed angle, is; else
@@ -167,6 +171,9 @@ class Expansion:
         k = self.K.gens.index(made)
         if node.op == "inv":
             self.shown[k] = sympy.Pow(inside, -1, evaluate=False)
+        elif node.op in OPAQUE:
+            operands = [inside, *map(self.written, x[1:])]
+            self.shown[k] = trees.opaque(node.op, operands)
         elif node.op == "sign":
             self.shown[k] = sympy.sign(inside, evaluate=False)
         else:  # max(x, 0)

@@ -31,18 +31,47 @@ HEADINGS = {
     "alpha": r"\alpha",
     "theta": r"\theta",
 }
+# Engines and scripts: letters beyond Latin and Greek by a font that has them
+PREAMBLE = (
+    r"\usepackage{iftex}",
+    r"\ifPDFTeX",
+    r"\usepackage[utf8]{inputenc}\usepackage[T1]{fontenc}",
+    r"\newcommand{\other}[2]{{\footnotesize U+#1}} % XeLaTeX and LuaLaTeX print the letter",
+    r"\else",
+    r"\usepackage{fontspec}",
+    r"""\newcommand{\other}[2]{{\otherfont\iffontchar\font"#1 #2\else U+#1\fi}}""",
+    *(
+        rf"\ifdefined\otherfont\else\IfFontExistsTF{{{font}}}"
+        rf"{{\newfontfamily{{\otherfont}}{{{font}}}}}{{}}\fi"
+        for font in ("Noto Serif CJK SC", "Noto Sans CJK SC", "SimSun", "DejaVu Serif")
+    ),
+    r"\providecommand{\otherfont}{}",
+    r"\fi",
+)
+_GREEK = """
+    alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho varsigma sigma
+    tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega
+"""
 _SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     **{c: "\\" + c for c in "&%$#_{}"},
+    **{
+        c: rf"\ensuremath{{\{name}}}"
+        for c, name in zip(
+            "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ",
+            _GREEK.split(),
+            strict=True,
+        )
+    },
 }
 
 
 class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
     """SymPy's LaTeX with the subscripts of the literature."""
 
-    times = r"\,"
+    times, visible = r"\,", r" \cdot "
 
     def _print_Symbol(self, x: Tree) -> str:
         return symbol(x.name)
@@ -64,7 +93,8 @@ def symbol(name: str) -> str:
     else:
         base, primes = stem.rstrip("'"), "'" * stem.count("'")
         word = base.replace("_", r"\_")
-        plain = rf"\mathit{{{word}}}" if len(base) > 2 else word
+        is_word = len(base) > 2 and base[0].isidentifier()
+        plain = rf"\mathit{{{word}}}" if is_word else word
         text = (rf"\{base}" if base in GREEK else plain) + primes
     return f"{text}_{{{subscript}}}" if subscript else text
 
@@ -97,8 +127,14 @@ def width(text: str) -> int:
 
 
 def escaped(text: str) -> str:
-    """Plain text in LaTeX."""
-    return "".join(_SPECIAL.get(c, c) for c in text)
+    """Plain text in LaTeX; what not every font of it has by \\other, which PREAMBLE defines."""
+    return "".join(_SPECIAL.get(c) or _written(c) for c in text)
+
+
+def _written(c: str) -> str:
+    """A letter as it is, or with its number beside it."""
+    common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
+    return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
 
 
 def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body: str) -> str:
@@ -110,19 +146,19 @@ def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body:
     return "\n".join(
         [
             r"\documentclass[a4paper,10pt]{article}",
-            r"\usepackage[utf8]{inputenc}",
-            r"\usepackage[T1]{fontenc}",
-            r"\usepackage{amsmath}",
+            *PREAMBLE,
+            r"\usepackage{amsmath,graphicx}",
             r"\setlength{\oddsidemargin}{-10mm}\setlength{\textwidth}{180mm}\setlength{\topmargin}{-20mm}\setlength{\textheight}{250mm}",
             r"\setlength{\parindent}{0pt}\allowdisplaybreaks",
             r"\begin{document}",
             rf"\section*{{{escaped(title)}}}",
             rf"{escaped(summary)}\par\medskip",
             r"Modified Denavit-Hartenberg (Khalil and Kleinfinger 1986); SI and rad.\par\medskip",
-            rf"\begin{{tabular}}{{{'r' * len(kept)}}}",
+            rf"\sbox0{{\begin{{tabular}}{{{'r' * len(kept)}}}",
             head + r" \\ \hline",
             *rows,
-            r"\end{tabular}\par\medskip",
+            r"\end{tabular}}",
+            r"\ifdim\wd0>\textwidth\resizebox{\textwidth}{!}{\usebox0}\else\usebox0\fi\par\medskip",
             (
                 rf"Acceleration of gravity in frame 0: $({gravity})$. Torques $\Gamma$ are those "
                 r"of "

@@ -34,6 +34,8 @@ _INDEXED = re.compile(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)")
 
 def letter(name: str) -> tuple[str, str]:
     """(letter, subscript) of a name; both may be printed as they are but for Greek letters."""
+    if not name[0].isidentifier():  # a number
+        return name, ""
     if match := _ENTRY.fullmatch(name):
         return FAMILIES.get(match[1], (match[1], ""))[0], match[2]
     if match := _ANGLE.fullmatch(name):

@@ -75,6 +75,8 @@ class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
         parts: list[Any] = []
         for y in x.args:
             times = [self.element("mo", "\u2062"), self.element("mspace", width="0.14em")]
+            if text.text(y)[0].isdigit():
+                times = [self.element("mo", "·")]
             parts += [
                 *(times if parts else ()),
                 self.parenthesize(y, PRECEDENCE["Mul"], strict=True),

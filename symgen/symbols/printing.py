@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from symgen.derive.names import Names
@@ -161,7 +162,8 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
         sections = {"Angles": angles} if angles else {}
     else:
         listing = model.listing
-        steps, outputs = listing.steps(operated, trees.symbol)
+        operate = partial(operated, number=partial(trees.product, factors=()))
+        steps, outputs = listing.steps(operate, trees.symbol)
         values = dict(zip(listing.places, outputs, strict=True))
         sections = {}
         for equation in listing.lines:
@@ -222,7 +224,7 @@ def latex_document(model: SymbolicModel, form: str) -> str:
 
 
 def sympy_lines(model: SymbolicModel, form: str) -> str:
-    """Python that makes the model with `from sympy import *`; symbols are real, numbers exact."""
+    """Python that makes the model with SymPy; symbols are real, numbers exact."""
     if form == "closed":
         steps: list[tuple[Any, Any]] = []
         value = of_model(model)

@@ -7,15 +7,19 @@ sines are those of the angles: C23 is cos(q2 + q3).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
+from fractions import Fraction
 from typing import Any
 
 import sympy
 
-from symgen.derive.graph import Node
+from symgen.derive.graph import OPAQUE, Node
 from symgen.symbols.symbolic_model import SymbolicModel
-from symgen.symbols.trees import angle, evaluated, rational, symbol
+from symgen.symbols.trees import angle, evaluated, opaque, rational, symbol
 
+OF_SYMPY = re.compile(r"\b(?=[A-Za-z]\w*\(|pi\b)")  # before a name that is none of the robot
+RATIONAL = re.compile(r"(?<![\w*).])(\d+)/(\d+)\b")
 FACTORED = 300  # terms of a determinant, up to which it is factored over the rationals
 
 
@@ -55,11 +59,11 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
     )
 
 
-def operated(node: Node, x: list[Any]) -> Any:
-    """The value of a node by the values of its operands."""
+def operated(node: Node, x: list[Any], number: Callable[[Fraction], Any] = rational) -> Any:
+    """The value of a node by the values of its operands, of a constant by `number`."""
     match node.op:
         case "const":
-            return rational(node.value)
+            return number(node.value)
         case "add":
             return x[0] + x[1]
         case "mul":
@@ -68,6 +72,8 @@ def operated(node: Node, x: list[Any]) -> Any:
             return 1 / x[0]
         case "pos":
             return sympy.Max(x[0], 0)
+        case op if op in OPAQUE:
+            return opaque(op, x)
     return getattr(sympy, node.op)(x[0])
 
 
@@ -78,10 +84,14 @@ def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
     made = {x for x, _ in steps}
     atoms = set().union(value.free_symbols, *(e.free_symbols for _, e in steps))
     free = sorted(str(x) for x in atoms - made)
-    lines = ["from sympy import *", ""]
+    package = "sympy"
+    while package in {*free, *map(str, made)}:
+        package += "_"
+    lines = ["import sympy" if package == "sympy" else f"import sympy as {package}", ""]
     if free:
-        comma, seq = ("," * (len(free) == 1), ", seq=True" * (len(free) == 1))
-        lines.append(f"{', '.join(free)}{comma} = symbols({' '.join(free)!r}, real=True{seq})")
+        made_by = f"{package}.symbols({' '.join(free)!r}, real=True, seq=True)"
+        lines.append(f"{', '.join(free)}{',' * (len(free) == 1)} = {made_by}")
     for x, e in [*steps, (name, value)]:
-        lines.append(f"{x} = {sympy.printing.sstr(e, sympy_integers=True)}")
+        exact = RATIONAL.sub(r"Rational(\1, \2)", sympy.printing.sstr(e))
+        lines.append(f"{x} = {OF_SYMPY.sub(f'{package}.', exact)}")
     return "\n".join(lines)

@@ -23,19 +23,20 @@ def split_sign(x: Tree) -> tuple[Any, Tree]:
 class Ordered:
     """Products with their minus and fraction before them, decimals as decimals.
 
-    A subclass says what stands between factors.
+    A subclass says what stands between factors, and before one that begins with a digit.
     """
 
-    times = "*"
+    times = visible = "*"
 
     def _print_Mul(self, x: Tree) -> str:
         number, rest = split_sign(x)
         if number == 1:
             return str(super()._print_Mul(x))  # type: ignore[misc]
         inside = self.parenthesize(rest, PRECEDENCE["Mul"], strict=True)  # type: ignore[attr-defined]
-        return (
-            f"-{inside}" if number == -1 else f"{self._print_Rational(number)}{self.times}{inside}"
-        )
+        if number == -1:
+            return f"-{inside}"
+        times = self.visible if inside[0].isdigit() else self.times
+        return f"{self._print_Rational(number)}{times}{inside}"
 
     def _print_Rational(self, x: Tree) -> str:
         text = decimal(Fraction(x.p, x.q))

@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy
 
+from symgen.derive.graph import OPAQUE
 from symgen.description.expression import ONE, Call, Expression, Monomial, Number
 from symgen.regroup.formula import Formula
 
@@ -43,11 +44,15 @@ def product(c: Fraction, factors: Iterable[Tree]) -> Tree:
     """c times the factors; a minus stands before the whole product."""
     written = [f for f in factors if f != 1]
     if not written:
-        return rational(c)
+        return rational(c) if c.denominator == 1 else signed(c, power(Number(abs(c)), 1))
     if abs(c) != 1:
         written.insert(0, rational(abs(c)))
-    body = sympy.Mul(*written, evaluate=False)
-    return body if c > 0 else negative(body)
+    return signed(c, sympy.Mul(*written, evaluate=False))
+
+
+def signed(c: Fraction, x: Tree) -> Tree:
+    """x with the sign of c."""
+    return x if c > 0 else negative(x)
 
 
 def negative(x: Tree) -> Tree:
@@ -88,6 +93,12 @@ def power(a: str | Number | Call, n: int) -> Tree:
     else:
         base = getattr(sympy, a.function)(expression(a.argument), evaluate=False)
     return base if n == 1 else sympy.Pow(base, n, evaluate=False)
+
+
+def opaque(op: str, operands: list[Tree]) -> Tree:
+    """A function of a law, by its operation."""
+    made = sympy.Pow if op == "power" else getattr(sympy, OPAQUE[op])
+    return made(*operands, evaluate=False)
 
 
 def formula(f: Formula) -> Tree:

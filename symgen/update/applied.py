@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ class Change:
         In the file, and in the new text.
     sigma : float
         Standard deviation that the record leaves, of the part that it tells; conditions of a
-        physical robot aside.
+        physical robot aside; nan where the record tells nothing of it.
     told_by : str
         record: determined; sum: only together with other numbers, this is the value nearest to the
         file; file: no torque depends on it,
@@ -67,8 +67,10 @@ class Applied:
     spread : tuple of str
         Links on fixed joints that changed too, since no physical link was left otherwise.
     undetermined : tuple of str
-        Numbers of links on which no torque of a motion depends; the file's, as far as a physical
-        robot allows.
+        Numbers of links on which no torque of a motion depends, and which are the file's; others
+        that no torque tells stand in `changes`, told by "file".
+    strange : tuple of str
+        Links whose mass or centre is far from that of the file.
     lost : tuple of str
         Base parameters that the estimate does not hold or the record does not show; the file's.
     """
@@ -84,6 +86,7 @@ class Applied:
     joints: Mapping[str, str]
     spread: tuple[str, ...]
     undetermined: tuple[str, ...]
+    strange: tuple[str, ...]
     lost: tuple[str, ...]
 
     def write(self, output: str | Path) -> Path:
@@ -146,6 +149,17 @@ class Applied:
                 f"not in the estimate, or not shown by the record: {', '.join(self.lost)}; the "
                 "values of the file stay"
             )
+        if self.strange:
+            notes.append(
+                f"far from the file: {'; '.join(self.strange)}. The torques are those of the "
+                "estimate, the links need not be: weigh them, or give what you know of them as "
+                "values and bounds of method feasible"
+            )
+        if decided := [c for c in self.changes if c.told_by == "file"]:
+            notes.append(
+                "on which no torque of this robot depends, changed since no physical link was left "
+                f"otherwise: {_by_place([f'{c.place}: {c.number}' for c in decided])}"
+            )
         if self.undetermined:
             notes.append(
                 "on which no torque of this robot depends, hence of the file: "
@@ -181,6 +195,7 @@ class Applied:
                 "placeless_sigma": dict(self.placeless_sigma),
                 "spread": self.spread,
                 "undetermined": self.undetermined,
+                "strange": self.strange,
                 "lost": self.lost,
             }
         )
@@ -190,7 +205,7 @@ def _percent(c: Change) -> str:
     return f"{100 * (c.after - c.before) / abs(c.before):+.2f}" if abs(c.before) > NOTHING else "-"
 
 
-def _by_place(lines: tuple[str, ...]) -> str:
+def _by_place(lines: Sequence[str]) -> str:
     """link: numbers; link: numbers."""
     places: dict[str, list[str]] = {}
     for line in lines:

@@ -29,7 +29,7 @@ from symgen.description.tree import Array
 from symgen.description.tree_parts import TreePart
 from symgen.errors import DescriptionError
 from symgen.update.applied import Applied
-from symgen.update.nearest import NONE, nearest
+from symgen.update.nearest import NONE, nearest, strange
 from symgen.update.robot_text import read_text, require_same_frames
 from symgen.update.writing import UNITS, Writing
 from symgen.update.xml_edits import XmlEdits, same
@@ -100,7 +100,7 @@ def apply(
         name for name in physical.standard if name not in own and name not in _inertial(physical)
     ]
     try:
-        absent = [*others, *(name for name, x in stated.items() if not x)]
+        absent = [*others, *(name for name, x in stated.items() if not x and own[name][0] != "Ia")]
         closest = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
         writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)
         rows = [*writing.links(edits), *writing.joints(edits)]
@@ -123,7 +123,12 @@ def apply(
         placeless_sigma={name: writing.sigma(closest.elements[name]) for name in placeless},
         joints={name: text.table.joint[own[name][1]].name for name in placeless if name in own},
         spread=closest.spread,
-        undetermined=tuple(f"{row.place}: {row.number}" for row in rows if row.told_by == "file"),
+        undetermined=tuple(
+            f"{row.place}: {row.number}"
+            for row in rows
+            if row.told_by == "file" and same(row.before, row.after)
+        ),
+        strange=tuple(filter(None, (strange(link, closest) for link in links))),
         lost=tuple(lost),
     )
 

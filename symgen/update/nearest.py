@@ -6,11 +6,11 @@ as physics allows.
 chi are ten parameters for each link of the file that has inertia, in the frame of the body it
 belongs to, and those of the elements on the joints;
 chi0 are the values of the file, S their sizes. A body may be several links, held together by fixed
-joints: the record knows their sum. First the link that
-the joint carries changes alone; only where no physical link is left, the others change with it. So
-with a motor inertia that the file does not have: what
-links can take in stays with them. Without conditions chi = chi0 + G (X - K chi0),
-G = S (K S)^+; the semidefinite program is solved where that is no physical robot.
+joints: the record knows their sum. First the link that the joint carries changes alone; only where
+no physical link is left, the others change with it. What the torques cannot tell from a motor
+inertia is one, whether the format has a place for it or not; other elements that the file does not
+have change only where links cannot take them in. Without conditions chi = chi0 + G (X - K chi0);
+the semidefinite program is solved where that is no physical robot.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ NONE = "no physical robot of this file has the estimate"
 MISSED = 1e-9  # of the size of a base parameter: more is not reached
 ACCURACY = 1e-7  # of the size of a parameter, of the semidefinite program
 UNMOVED = 1e-12  # of the size of a parameter
+IN_PROGRAM = 1e2  # size of a motor inertia beside that of the file, in the program
+NEAR = 1e-6  # of the size of a parameter: nearer to the file is rounding
+STRANGE = 2.0  # mass over that of the file
 TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 
@@ -123,7 +126,7 @@ def nearest(
     else:
         raise DescriptionError(f"{NONE}: {answer.replace('NOT physically feasible: ', '')}")
     K_part = K[:, :count]
-    G = _gain(K_part, scales(part))
+    G = _gain(K_part, scales(part), _rotors(part))
     solution, gain, free = (
         chi0.copy(),
         np.zeros((len(chi0), len(X))),
@@ -231,12 +234,13 @@ def _within(
     """chi of the parameters of `part` with K chi = rest; None, and why, where no physical robot has
     them.
     """
-    K, S, chi0 = (
+    K, S, chi0, rotors = (
         part.rows(names),
         scales(part),
         np.array([part.values[name] for name in part.standard]),
+        _rotors(part),
     )
-    chi = chi0 + _gain(K, S) @ (rest - K @ chi0)
+    chi = chi0 + _gain(K, S, rotors) @ (rest - K @ chi0)
     sizes = np.maximum(np.abs(X), np.abs(K) @ S)
     missed = np.abs(K @ chi - rest) > MISSED * np.maximum(sizes, MISSED)
     if missed.any():
@@ -249,8 +253,13 @@ def _within(
         )
     moved = [c for c in part.conditions if not _unmoved(chi, chi0, part, list(c.numbers))]
     if all(c.smallest(chi) >= -TINY for c in moved):
+        clean = _as_it_was(K, S, rest, chi, chi0, NEAR * S, rotors)
+        if np.abs(K @ clean - rest).max() <= MISSED * sizes.max() and min(
+            part.smallest(clean).values()
+        ) >= min(0.0, *part.smallest(chi).values()):
+            chi = clean
         return chi, ""
-    free = np.abs(np.eye(len(chi)) - _gain(K, S) @ K) @ S / S
+    free = np.abs(np.eye(len(chi)) - _gain(K, S, rotors) @ K) @ S / S
     still = [
         c for c in part.conditions if free[list(c.numbers)].max() < MISSED
     ]  # X tells all of it
@@ -264,7 +273,9 @@ def _within(
         )
     part = replace(part, conditions=tuple(c for c in part.conditions if c not in still))
     answer = feasibility(part, names, rest)
-    return (_solved(part, K, S, rest, answer.chi), "") if answer.feasible else (None, answer.text)
+    if not answer.feasible:
+        return None, answer.text
+    return _solved(part, K, np.where(rotors, IN_PROGRAM, 1.0) * S, rest, answer.chi), ""
 
 
 def _solved(part: PhysicalModel, K: Array, S: Array, rest: Array, start: Array) -> Array:
@@ -290,25 +301,62 @@ def _solved(part: PhysicalModel, K: Array, S: Array, rest: Array, start: Array) 
     near = ACCURACY * S
     near[[c.numbers[0] for c in part.conditions if len(c.numbers) == 1]] += 2 * least
     for chi in (
-        (_as_it_was(K, S, rest, optimum.chi, chi0, near), optimum.chi) if optimum.solved else ()
+        (_as_it_was(K, S, rest, optimum.chi, chi0, near, _rotors(part)), optimum.chi)
+        if optimum.solved
+        else ()
     ):
         if min(part.smallest(chi).values()) >= 0:
             return chi
     return start
 
 
-def _as_it_was(K: Array, S: Array, rest: Array, chi: Array, chi0: Array, near: Array) -> Array:
+def _as_it_was(
+    K: Array, S: Array, rest: Array, chi: Array, chi0: Array, near: Array, rotors: Array
+) -> Array:
     """chi with the parameters that differ from those of the file by `near`, the accuracy of the
     solver, set to these.
     """
     moved = np.abs(chi - chi0) > near
     chi = np.where(moved, chi, chi0)
-    chi[moved] += _gain(K[:, moved], S[moved]) @ (rest - K @ chi)
+    chi[moved] += _gain(K[:, moved], S[moved], rotors[moved]) @ (rest - K @ chi)
     return chi
 
 
-def _gain(K: Array, S: Array) -> Array:
-    """G = S (K S)^+, shape (p, b): the smallest change of chi, in sizes S, for a change of X."""
+def strange(link: FileLink, closest: Nearest) -> str:
+    """What of a link is no longer that of the file, a sentence; "" where its mass is within STRANGE
+    times that and its centre has moved by less than the link extends.
+    """
+    (before, m0), (after, m) = (
+        (ten[6:9] / ten[9] if ten[9] else ten[6:9], ten[9])
+        for ten in (link.ten, closest.chi[closest.links[link.name]])
+    )
+    far = float(np.linalg.norm(after - before))
+    extent = np.sqrt(max(link.ten[[0, 3, 5]].sum(), 0.0) / 2 / m0) if m0 else 0.0
+    if m0 / STRANGE <= m <= STRANGE * m0 and far <= extent:
+        return ""
+    return f"link {link.name!a:.60} of {m:.3g} kg (file {m0:.3g}), its centre {far:.2g} m away"
+
+
+def _rotors(part: PhysicalModel) -> Array:
+    """Whether each parameter is a motor inertia, bool (p,)."""
+    return np.array([name.startswith("Ia") for name in part.standard])
+
+
+def _gain(K: Array, S: Array, rotors: Array) -> Array:
+    """G, shape (p, b): d chi = G d X, first of motor inertias, bool (p,), what they can give, then
+    the smallest change of the others in sizes S: with Q the projection on what motor inertias
+    cannot give, G_l = S_l (Q K_l S_l)^+ Q, G_m = S_m (K_m S_m)^+ (1 - K_l G_l).
+    """
+    G, one = np.zeros(K.T.shape), np.eye(len(K))
+    of_rotors = _smallest(K[:, rotors], S[rotors])
+    Q = one - K[:, rotors] @ of_rotors
+    G[~rotors] = _smallest(Q @ K[:, ~rotors], S[~rotors]) @ Q
+    G[rotors] = of_rotors @ (one - K[:, ~rotors] @ G[~rotors])
+    return G
+
+
+def _smallest(K: Array, S: Array) -> Array:
+    """S (K S)^+: the smallest change in sizes S for a change of K chi."""
     return np.asarray(S[:, None] * np.linalg.pinv(K * S, rcond=1e-12))
 
 

@@ -143,7 +143,7 @@ def _link_rows(
         share, left, size = (float(np.linalg.norm(x)) for x in (J[k] @ gain, J[k] @ free, J[k]))
         source = "file" if share <= SLOPE * size else "record" if left < SLOPE * size else "sum"
         before, after = float(stated[k]), float(stated[k] if same(new[k], stated[k]) else new[k])
-        deviation = float(np.linalg.norm(J[k] @ gain @ root))
+        deviation = float(np.linalg.norm(J[k] @ gain @ root)) if source != "file" else np.nan
         number = name if name == label else f"{name} {label}"
         place_name = f"link {link.name!a:.60}"
         rows.append(Change(place_name, number, unit, before, after, deviation, source))

@@ -125,9 +125,12 @@ def test_generated_module_and_plain_record(tmp_path):
     by_name, by_module = (
         run(robot, record, "--json") for robot in ("planar_2r", GENERATED / "planar_2r.py")
     )
-    assert by_name.exit_code == by_module.exit_code == 0, by_name.output
+    assert by_name.exit_code == by_module.exit_code == 1, by_name.output  # the verdict is a No
     assert json.loads(by_name.stdout)["X"] == json.loads(by_module.stdout)["X"]
-    assert "The model of planar_2r with " in run("planar_2r", record).stdout
+    brief, verbose = run("planar_2r", record), run("planar_2r", record, "--verbose")
+    for text in (brief.stdout, verbose.stdout):
+        assert "\nNo. The model of planar_2r with " in text and "\nNext: " in text
+    assert len(brief.stdout.splitlines()) <= 25 and "Ljung-Box" in verbose.stdout
 
 
 def test_rank_deficient_record_names_the_parameters(tmp_path):
@@ -139,7 +142,7 @@ def test_rank_deficient_record_names_the_parameters(tmp_path):
         json.loads((tmp_path / "out" / "estimate.json").read_text())["status"] == "rank-deficient"
     )
     assert (
-        "rank-deficient" in result.stdout
+        "No. The record does not determine" in result.stdout
         and "cannot be told apart" in result.stdout
         and "FV2" in result.stdout
     )
@@ -152,7 +155,7 @@ def test_hostile_record_name_is_escaped(tmp_path):
         "symgen: 1\nrecord: {files: [record.csv], name: '<script>alert(1)</script>'}\n"
     )
     result = run("planar_2r", study, "-o", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 1, result.output
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert (
         "<script>alert" not in html

@@ -42,7 +42,7 @@ def error_of(text):
 WORLD = "<worldbody>"
 WRONG = [  # what is replaced, by what, line of the error, words of the message
     ("<mujoco model", "<robot model", 7, "mismatched tag"),
-    (WORLD, "<worldbody><freejoint/>", 1, "MuJoCo refuses"),
+    (WORLD, "<worldbody><freejoint/>", 2, "MuJoCo refuses"),
     ('<joint name="s" axis="0 0 1"/>', '<freejoint name="s"/>', 3, "free joint 's'"),
     ('<joint name="e" axis="0 1 0"/>', '<joint name="e" type="ball"/>', 4, "ball joint 'e'"),
     (WORLD, '<include file="/etc/passwd"/><worldbody>', 2, "<include> is not read"),
@@ -62,16 +62,15 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
     ),
     (WORLD, '<worldbody><flexcomp file="/etc/passwd"/>', 2, "<flexcomp> is not read"),
     (WORLD, '<worldbody><attach model="m" body="b"/>', 2, "<attach> is not read"),
-    (WORLD, '<compiler settotalmass="3"/><worldbody>', 2, "settotalmass is not read"),
     (WORLD, '<compiler settotalmass="x"/><worldbody>', 2, "expected 1 number"),
     (WORLD, "<nonsense/><worldbody>", 1, "<nonsense> is no part"),
     ('<geom size="0.1" mass="1"/>', '<geom type="mesh" mesh="m"/>', 4, "would come from a mesh"),
-    ('<geom size="0.1" mass="1"/>', "", 1, "MuJoCo refuses"),
+    ('<geom size="0.1" mass="1"/>', "", 4, "MuJoCo refuses"),
     ('<geom size="0.1" mass="1"/>', '<geom size="nan" mass="1"/>', 4, "finite"),
     ('pos="0.4 0 0"', 'pos="1 -Infinity 0"', 4, "finite"),
     ('pos="0.4 0 0"', 'pos="1e300 0 0"', 1, "larger than"),
-    ('axis="0 1 0"', 'axis="0 0 0"', 1, "MuJoCo refuses"),
-    ('axis="0 1 0"', 'axis="&quot;/&gt;"', 1, "MuJoCo refuses"),
+    ('axis="0 1 0"', 'axis="0 0 0"', 4, "MuJoCo refuses"),
+    ('axis="0 1 0"', 'axis="&quot;/&gt;"', 4, "MuJoCo refuses"),
     (
         "</worldbody>",
         '</worldbody><equality><connect name="c" body1="a" anchor="0 0 0"/></equality>',
@@ -85,13 +84,13 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
             '</worldbody><equality><joint name="p" joint1="s" joint2="e" polycoef="0 1 2 0 '
             '0"/></equality>'
         ),
-        1,
+        6,
         "linear relations",
     ),
     (
         "</worldbody>",
         '</worldbody><equality><joint name="p" joint1="s"/><joint name="r" joint1="s"/></equality>',
-        1,
+        6,
         "says what others say",
     ),
     (
@@ -101,7 +100,7 @@ WRONG = [  # what is replaced, by what, line of the error, words of the message
             'joint2="e"/></equality><actuator><motor '
             'joint="s"/><motor joint="e"/></actuator>'
         ),
-        1,
+        6,
         "ties driven joints",
     ),
     (SMALL, '<robot name="x"/>', 1, "ends in .urdf"),
@@ -184,6 +183,18 @@ def test_what_is_left_out_is_said():
         assert "MuJoCo refuses" in error.message
     else:
         assert "damping that grows with speed not read: 'e'" in said
+
+
+def test_fluid_and_spatial_tendons_are_said():
+    text = SMALL.replace(
+        WORLD,
+        '<option density="1000" viscosity="0" wind="1 0 0"/><worldbody><site name="w"/>',
+    ).replace(
+        "</worldbody>",
+        '</worldbody><tendon><spatial stiffness="3"><site site="w"/></spatial></tendon>',
+    )
+    notes = read_tree(text.encode(), "small.xml")[1]
+    assert "not read: density, wind, <spatial>" in notes
 
 
 def test_convert_and_every_verb(tmp_path):

@@ -364,6 +364,7 @@ def test_json_schema_for_editors():
     assert {"symgen", "name", "gravity", "frames"} == set(schema["required"])
     assert schema["additionalProperties"] is False
     assert set(schema["$defs"]) == {
+        "LawScalar",
         "Frame",
         "Loop",
         "Element",

@@ -219,7 +219,7 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
         gains = [entry["g"][0] for entry in found.details["trail"]]
         assert gains[0] == pytest.approx(1 / 95.1, rel=0.01) and gains[-1] == 1.0
     with pytest.raises(
-        InputError, match=r"unstable.*start: values \(robot file\), unit, or parameters by name"
+        InputError, match=r"unstable.*set estimate.options: {start: values, gains: values}"
     ):
         estimate_of(
             seen, EstimateSettings("didim", options={"start": "unit", "gains": "one"}), model=model

@@ -132,9 +132,9 @@ def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
     """
     passes, real = [], runtime.rows.prepared.filtered_states
 
-    def counted(q, rate, signals):
+    def counted(q, rate, signals, v=None):
         passes.append((signals.median, signals.lowpass))
-        return real(q, rate, signals)
+        return real(q, rate, signals, v)
 
     monkeypatch.setattr("runtime.rows.prepared.filtered_states", counted)
     lowpass = Lowpass(cutoff=5)

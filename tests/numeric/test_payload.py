@@ -9,8 +9,8 @@ import pytest
 
 from runtime import InputError, Record, observe
 from runtime.errors import SettingsError
+from runtime.identification.drive_gains import drive_gains
 from runtime.identification.payload import payload
-from runtime.identification.payload_study import drive_gains
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model
 from runtime.settings.study import PayloadSettings, study_from_mapping

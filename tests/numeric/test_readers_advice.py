@@ -74,6 +74,7 @@ def test_steps_by_both_readers():
     )
 
 
+@campaign
 def test_side_by_side_in_words():
     advice = advise(
         planar,

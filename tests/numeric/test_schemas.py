@@ -124,7 +124,8 @@ def test_editors_show_what_a_key_holds():
     definitions = json.loads(schema_text("study"))["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
         "Cutoff frequency; auto: from the motion and the noise of the records "
-        "(`runtime.signals.cutoff`), 50, as in the chapter, for counts and where no record is. [Hz]"
+        "(`runtime.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50 "
+        "where no record is. [Hz]"
     )
     for name, definition in definitions.items():
         assert [

@@ -122,6 +122,16 @@ def test_formats_by_blocks(tmp_path, samples, kind, block):
             np.testing.assert_allclose(found, expected[start:stop], rtol=0, atol=1e-14)
 
 
+def test_pieces_are_read_by_the_process_that_is_there(tmp_path, samples):
+    given = settings(write("parquet", tmp_path, samples))
+    stream = open_stream(given, folder=tmp_path, block=97)
+    table = stream.opened.tables[0]
+    first = table.idle
+    for start, stop in ((0, 300), (250, 700), (650, N), (5, 40)):
+        PieceReader(stream).read(start, stop)
+        assert first is not None and table.idle is first and first.popen.poll() is None
+
+
 def test_two_files_and_a_rate(tmp_path, samples):
     np.save(tmp_path / "q.npy", samples[1])
     np.savez(tmp_path / "tau.npz", tau=samples[2])

@@ -89,6 +89,7 @@ def test_written_settings_read_back(study):
         "excitation",
     }
     assert set(mapping["signals"]) == {
+        "velocity",
         "median",
         "lowpass",
         "ends",
@@ -155,7 +156,7 @@ def test_one_record_or_several():
         (
             {"record": [{"files": "a"}, {"side": "left"}]},
             ("record", 1, "side"),
-            "expected motor or joint",
+            "expected motor, joint or link",
         ),
         ({"record": {"rate": True}}, ("record", "rate"), "expected a number"),
         (

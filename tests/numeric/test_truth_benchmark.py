@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from campaign import sampled
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
+import slips
+import slips_simulated
 import truth
 import truth_simulator as world
 from truth_shared import Unseen, emitted, record_of, study
@@ -138,3 +141,48 @@ def test_correlation_longer_than_blocks_is_said(kind: str, said: bool) -> None:
     result = runtime.identify(emitted(robot.name)[0], record_of(move, noisy))
     text = "\n".join(result.uncertainty.verdict)
     assert ("corrected deviations may be too small" in text) == said
+
+
+NAMED = [
+    (name, k)
+    for name in ("wrist", "panda")
+    for k in (1, 2, 3, 4, 6, 8, 9, 10, 12, 13, 14, 15, 16, 19, 20)
+]
+
+
+@pytest.mark.parametrize(
+    "slip_of",
+    sampled(NAMED, 0, always=[("wrist", 6), ("wrist", 16)]),
+)
+def test_slips_of_strangers_are_named(slip_of: tuple[str, int]) -> None:
+    name, number = slip_of
+    robot = slips_simulated.Simulated(name)
+    (slip,) = (slip for slip in robot.slips() if slip.number == number)
+    assert robot.right.judged().worst is None
+    state, text = slips.told(robot.right, slip.change(robot.right), slip, set())
+    assert state == "named", text
+
+
+def test_a_rotor_inertia_of_zero_is_physical_and_a_certain_negative_one_is_not() -> None:
+    """URDF robots have none: noise takes every second estimate below it."""
+    robot = world.ROBOTS["anthropomorphic"]
+    own, move = world.Truth(robot, 1_000_003), world.fourier(robot, 1_000_003)
+    tau = own.torque(move)
+    tau += world.noise(tau, 0.0, 0.005, 1_000_003)
+    model, _ = emitted(robot.name)
+    asked = study(robot, "fourier")
+    right = runtime.identify(model, record_of(move, tau), asked, physical=True)
+    assert right.feasibility is not None and right.feasibility.feasible
+    tau[:, 2] -= 0.05 * move.qdd[:, 2]  # another rotor inertia, kg m^2
+    wrong = runtime.identify(model, record_of(move, tau), asked, physical=True)
+    assert wrong.feasibility is not None and not wrong.feasibility.feasible
+
+
+def test_physical_parameters_predict_the_other_half_with_the_weight_of_the_whole() -> None:
+    """The weight is a number there: guessed bounds were once asked of a fit that refused it."""
+    robot = world.ROBOTS["wrist"]
+    own, move = world.Truth(robot, 1_000_005), world.fourier(robot, 1_000_005)
+    tau = own.torque(move)
+    tau += world.noise(tau, 0.9, 0.03, 1_000_005)
+    result = runtime.identify(emitted(robot.name)[0], record_of(move, tau), study(robot, "fourier"))
+    assert "feasible" in result.validation[0].errors(), result.missing

@@ -9,6 +9,7 @@ from dead points.
 from __future__ import annotations
 
 import cmath
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -47,8 +48,10 @@ KINDS = (
 TURRET = "  1: {ant: 0, sigma: 0, mu: 1, alpha: 0, d: 0, theta: q1, r: 0}"
 
 
-def random_loop(kind: str, seed: int, *, numbers: bool | None = None) -> Robot:
-    """The robot of a kind and a seed; lengths are numbers for odd seeds unless said."""
+def random_loop(kind: str, seed: int, *, numbers: bool | None = None, behind: int = 0) -> Robot:
+    """The robot of a kind and a seed, `behind` that many motors which turn it as a whole; lengths
+    are numbers for odd seeds unless said.
+    """
     rng = np.random.default_rng([57, KINDS.index(kind), seed])
     for _ in range(300):
         made = _made(kind, rng)
@@ -64,10 +67,30 @@ def random_loop(kind: str, seed: int, *, numbers: bool | None = None) -> Robot:
         for name, x in values.items():
             text = text.replace(f" {name},", f" {x},").replace(f"-{name},", f"-{x},")
     gravity = "[0, 0, -g]" if "turret" in kind else "[0, -g, 0]"
+    if behind:
+        gravity = "[0, -g, 0]"
+        text, loops = (_shifted(part, behind) for part in (text, loops))
+        massless = [j + behind for j in massless]
+        text = "\n".join([*(_turning(j, rng) for j in range(1, behind + 1)), text])
     listed = ", ".join(f"{name}: {x}" for name, x in constants.items())
     bare = f"massless: {sorted(massless)}\n" if massless else ""
     head = f"symgen: 1\nname: loop\ngravity: {gravity}\nconstants: {{{listed}}}\nframes:\n"
     return parse_robot(f"{head}{text}\nloops:\n{loops}\n{bare}{ELEMENTS}".encode(), "loop.yaml")
+
+
+def _shifted(text: str, by: int) -> str:
+    """The numbers of frames and joints of rows and loops, all of them `by` larger."""
+    number = r"(\bq|\bant: |\bcut: |\btwin: |(?m:^)  )(\d+)"
+    return re.sub(number, lambda m: f"{m[1]}{int(m[2]) + by}", text)
+
+
+def _turning(j: int, rng: np.random.Generator) -> str:
+    """A hinge before the loop, its axis at any angle to the one before."""
+    gamma, alpha, b, d, r = (round(float(x), 2) for x in rng.uniform(-1.5, 1.5, 5))
+    return (
+        f"  {j}: {{ant: {j - 1}, sigma: 0, mu: 1, gamma: {gamma}, b: {b}, alpha: {alpha}, d: {d}, "
+        f"theta: q{j}, r: {r}}}"
+    )
 
 
 Made = tuple[list[str], str, Mapping[str, float], list[int]]

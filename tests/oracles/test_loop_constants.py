@@ -17,10 +17,11 @@ from oracles.random_loops import random_loop
 from oracles.random_robots import random_parameters
 from oracles.test_loops_agree import whole
 from oracles.test_random_loops import module_of
-from symgen.description import Robot, load_robot
+from symgen.certify.modules import certify
+from symgen.description import Robot, load_robot, parse_robot
 from symgen.emit.numpy_target import render
 from symgen.emit.spec import module_spec
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import EXACT, regroup
 
 KIND = "offset slider-crank, driven by the slide"
 
@@ -66,3 +67,79 @@ def test_constants_at_which_the_loop_does_not_close(tmp_path: Path) -> None:
         ValueError, match=r"do not close .* L0, L1, L2, L3 = \[1\.5 .*emit the model"
     ):
         module.passive_joints(np.array([[1.0]]), L0=1.5)
+
+
+ISOSCELES = """symgen: 1
+name: isosceles
+gravity: [0, -g, 0]
+constants: {L: 0.4, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: L, theta: q2, r: 0}
+  3: {ant: 0, sigma: 1, gamma: pi/2, alpha: pi/2, d: 0, theta: 0, r: q3}
+  4: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L, theta: q4, r: 0}
+  5: {ant: 3, sigma: 2, alpha: -pi/2, d: 0, theta: 0, r: 0}
+loops: [{cut: 4, twin: 5, start: {q1: 0.6, q2: -1.2, q3: 0.66}}]
+elements: {OFFSET: {kind: offset, along: all}}
+"""
+ON_A_TURRET = """symgen: 1
+name: turret
+gravity: [0, 0, -g]
+constants: {L0: 0.45, L1: 0.2, L2: 0.5, L3: 0.4, g: 9.81, D7: 0.3}
+frames:   # a four-bar on a turret, and a joint more on its coupler
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: pi/2, d: 0,  theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L1, theta: q3, r: 0}
+  4: {ant: 1, sigma: 0, mu: 0, alpha: pi/2, d: L0, theta: q4, r: 0}
+  5: {ant: 3, sigma: 0, mu: 0, alpha: 0, d: L2, theta: q5, r: 0}
+  6: {ant: 4, sigma: 2, alpha: 0, d: L3, theta: 0,  r: 0}
+  7: {ant: 3, sigma: 0, alpha: 0, d: D7, theta: q7, r: 0}
+loops: [{cut: 5, twin: 6, start: {q2: 1, q3: -0.5518, q4: 1.2956, q5: 0.8475}}]
+"""
+SCISSORS = """symgen: 1
+name: scissors
+gravity: [0, -g, 0]
+constants: {L: 0.4, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: L, theta: q2, r: 0}
+  3: {ant: 0, sigma: 1, gamma: pi/2, alpha: pi/2, d: 0, theta: 0, r: q3}
+  4: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L, theta: q4, r: 0}
+  5: {ant: 3, sigma: 2, alpha: -pi/2, d: 0, theta: 0, r: 0}
+  6: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: 2*L, theta: q6, r: 0}
+loops: [{cut: 4, twin: 5, start: {q1: 0.6, q2: -1.2, q3: 0.66}}]
+constraints: {q6: -q1}
+elements: {FV: {kind: viscous, along: all}, OFFSET: {kind: offset, along: all}}
+"""
+
+
+@pytest.mark.parametrize("text", [ISOSCELES, ON_A_TURRET, SCISSORS])
+def test_planar_loops_of_strangers_are_exact_at_all_lengths(text: str, tmp_path: Path) -> None:
+    """Torques of a module at lengths by keyword are those of the base parameters of a file with
+    them, which Lagrange multipliers give.
+    """
+    robot = parse_robot(text.encode(), "stranger.yaml")
+    found = regroup(robot)
+    assert found.method == EXACT and certify(found).valid
+    module = emitted(robot, tmp_path)
+    constants = {c: 1.05 * x if c != "g" else 9.0 for c, x in robot.constants.items()}
+    other, rng = replace(robot, constants=constants), np.random.default_rng(8)
+    q = np.array(module._START[: len(robot.joints)]) + 0.02 * rng.uniform(
+        -1, 1, (6, len(robot.joints))
+    )
+    qd, qdd = rng.standard_normal((2, *q.shape))
+    oracle = Multipliers(other, whole(robot, q, module.passive_joints(q, **constants)), qd, qdd)
+    chi = random_parameters(robot, seed=7)
+    X, torque = module.base_parameters(chi, **constants), oracle.torque(chi)
+    tau = module.regressor(q, qd, qdd, **constants) @ X
+    assert np.abs(tau - torque).max() < 1e-10 * np.abs(torque).max()
+
+
+def test_isosceles_slider_crank() -> None:
+    """OFFSET3 takes g/(2 L) MY1: 9.81 N at L = 0.5 m and 12.2625 N at 0.4 m for 1 kg m."""
+    found = regroup(parse_robot(ISOSCELES.encode(), "isosceles.yaml"))
+    (offset,) = (b for b in found.base if b.own == "OFFSET3")
+    c = offset.combination["MY1"]
+    assert str(c) == "g/2/L"
+    for L, force in ((0.5, 9.81), (0.4, 12.2625)):
+        assert c.value({"L": L, "g": 9.81}) == pytest.approx(force, abs=1e-12)

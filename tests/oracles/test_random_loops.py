@@ -36,13 +36,15 @@ def module_of(text: str, folder: Path) -> ModuleType:
     return module
 
 
-def torques_agree(robot: Robot, module: ModuleType) -> None:
-    """Around the start, at the states farthest from dead points of many, to 1e-10 of the largest
-    torque.
+def torques_agree(robot: Robot, module: ModuleType, behind: int = 0) -> None:
+    """Around the start, joints before the loops at all angles, at the states farthest from dead
+    points of many, to 1e-10 of the largest torque.
     """
     rng, start, joints = np.random.default_rng(3), close(robot).start, robot.joints
-    size = max(abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0))
+    loop = robot.frames[behind:]
+    size = max(abs(e.value(robot.constants)) for f in loop for e in (f.b, f.d, f.r0))
     reach = [0.1 * size if robot.frame(j).sigma else 0.3 for j in joints]
+    reach[:behind] = [np.pi] * behind
     q = np.array([start[j] for j in joints]) + np.array(reach) * rng.uniform(
         -1, 1, (20, len(joints))
     )

@@ -73,8 +73,8 @@ def test_angles_that_are_numbers() -> None:
     closure = parallelogram("TA: 0.4", theta1="0.25", theta2="pi/5", twin="1.1", theta4="2*TA")
     assert formulas(closure) == {
         2: "-0.2*pi - q1 - 1.35",
-        3: "q1 + 1/4",
-        4: "-2*TA - q1 - 1/4",
+        3: "q1 + 0.25",
+        4: "-2*TA - q1 - 0.25",
     }
 
 

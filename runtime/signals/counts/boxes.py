@@ -24,19 +24,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.special import erfcx, log_ndtr
+from scipy.sparse import diags_array
+from scipy.special import erfcx
 
 from runtime.signals.counts.spline import Basis, Factor
 
 Array = np.ndarray
 
-PASSES = 40
-"""Most passes over the sites."""
-CHANGE = 0.02
-"""Relative change of the precisions at which passes end."""
-DAMPING, LEAST_DAMPING = 0.7, 0.1
-SLOWER = 0.95
-"""Ratio of two changes above which the next one is damped more."""
+PASSES, CHANGE = 40, 0.02
+"""Most passes over the sites, and the relative change of the precisions at which they end."""
+DAMPING, LEAST_DAMPING, SLOWER = 0.7, 0.1, 0.95
+"""Damping of the sites and the least one; the ratio of two changes above which the next one is
+damped more.
+"""
 CAVITY = 0.02
 """Least share of a precision that is left without the sample. Sites at it have not settled, unless
 the others tell less than the interval itself.
@@ -45,22 +45,22 @@ FAR = 6.0
 """Deviations from both of its bounds at which a sample says nothing; beyond its bound by which it
 contradicts the motion.
 """
-SUSPECTS = 3
-"""Windows of time in which a jump of the counts is looked for."""
+SUSPECTS, BESIDE = 2, 2048
+"""Windows of time in which a jump of the counts is looked for, beside that of the densest jerk, and
+the samples on either side that tell it.
+"""
 COUNT_ERRORS = (0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Errors of a count beside its rounding that are compared, steps (rms)."""
 CLOCK_ERRORS = (0.0, 0.05, 0.1, 0.2, 0.4)
 """Errors of a time stamp that are compared, sampling periods (rms)."""
 MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1), (-1, 1), (-1, 0), (1, 0))
 """Steps of the search in COUNT_ERRORS and in CLOCK_ERRORS, each as long as the evidence rises."""
-CLEAR = 3.0
-"""Rise of the evidence, nats, that counts as one."""
-WINDOW, OF_RECORD = 0.05, 3.0
-"""Length of time that has a jerk density of its own, s, and the weight of the whole record in it,
-in determined jerks.
+CLEAR, TELLING = 3.0, 1000
+"""Rise of the evidence, nats, that counts as one, and the sites that tell what is promised."""
+WINDOW, OF_RECORD, RANGE = 0.05, 3.0, 1e-3
+"""Length of time that has a jerk density of its own, s; the weight of the whole record in it, in
+determined jerks; the least share of a window's density in that of the record.
 """
-RANGE = 1e-3
-"""Least share of a window's density in that of the record."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,14 @@ class Errors:
 class Posterior:
     """A motion given sites at S samples.
 
-    c : coefficients, shape (1, P).
-    density : r, shape (1, M).
+    c : coefficients, shape (P,).
+    density : r, shape (M,).
     tau, nu : of the sites, shape (S,).
-    Z, factor : covariances, shape (4, 1, P), and the factor of A.
+    Z, factor : covariances, shape (4, P), and the factor of A.
     errors : of the counts, as taken.
     evidence : log Z; minus infinity where the sites have not settled.
+    without : mean and variance of the position at each site without it, and its speed, steps a
+    sample; shape (3, S).
     """
 
     c: Array
@@ -97,6 +99,7 @@ class Posterior:
     factor: Factor
     errors: Errors
     evidence: float
+    without: Array
 
     @property
     def settled(self) -> bool:
@@ -127,61 +130,85 @@ class Boxes:
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
         """Sites passed until they settle, from precisions t and pulls u."""
         basis, gaps = self.basis, np.flatnonzero(self.rest)
-        tau, pull = self.rest[None].copy(), np.zeros((1, len(self.rest)))
+        tau, pull = self.rest.copy(), np.zeros(len(self.rest))
         x, change, damping = basis.at_samples(c), np.inf, DAMPING
         for _ in range(PASSES):
-            tau[0, self.sites], pull[0, self.sites] = t, u - t * x[0, self.sites]
-            pull[0, gaps] = -self.rest[gaps] * x[0, gaps]
+            tau[self.sites], pull[self.sites] = t, u - t * x[self.sites]
+            pull[gaps] = -self.rest[gaps] * x[gaps]
             factor = Factor.of(basis.precision(tau, density))
             c = c + factor.solve(basis.gradient(pull, density, c))
             Z, x = factor.inverse(), basis.at_samples(c)
-            mean, v = x[0, self.sites], basis.variances(Z)[0, self.sites]
-            cavity, m = self._without(mean, v, t, u)
-            e2 = errors.variance(basis.at_samples(c, 1)[0, self.sites] * basis.Ts)
-            mass, t_new, u_new = self._tilted(m, cavity, e2)
-            factors = mass + 0.5 * np.log1p(t * cavity)
-            factors -= 0.5 * (cavity * u**2 + 2 * u * m - t * m**2) / (1 + t * cavity)
-            evidence = factors.sum() + 0.5 * u @ mean
-            evidence -= 0.5 * (factor.log_determinants[0] + np.log(density).sum())
-            evidence -= 2.5 * basis.M * np.log(basis.h)
+            mean, v = x[self.sites], basis.variances(Z)[self.sites]
+            cavity = 1 / np.maximum(1 / v - t, CAVITY / v)
+            m, speed = cavity * (mean / v - u), basis.at_samples(c, 1)[self.sites] * basis.Ts
+            mass, t_new, u_new = self._tilted(m, cavity, errors.variance(speed))
             used, density = density, jerk_density(basis, c, Z, density)
             before, change = change, np.abs(t_new - t).sum() / t.sum()
-            if change > SLOWER * before:
-                damping = max(DAMPING * damping, LEAST_DAMPING)
-            free = ((1 / v - t > CAVITY / v) | (v > CAVITY)).all()
-            t, u = t + damping * (t_new - t), u + damping * (u_new - u)
             if change < CHANGE or not np.isfinite(change):
                 break
+            if change > SLOWER * before:
+                damping = max(DAMPING * damping, LEAST_DAMPING)
+            t, u = t + damping * (t_new - t), u + damping * (u_new - u)
+        factors = mass + 0.5 * np.log1p(t * cavity)
+        factors -= 0.5 * (cavity * u**2 + 2 * u * m - t * m**2) / (1 + t * cavity)
+        evidence = factors.sum() + 0.5 * u @ mean
+        evidence -= 0.5 * (factor.log_determinant + np.log(used).sum())
+        evidence -= 2.5 * basis.M * np.log(basis.h)
+        free = ((1 / v - t > CAVITY / v) | (v > CAVITY)).all()
         settled = change < CHANGE and free and np.isfinite(evidence)
         likely = float(evidence) if settled else -np.inf
-        return Posterior(c, used, t, u, Z, factor, errors, likely)
+        without = np.array([m, cavity, speed])
+        return Posterior(c, used, t, u, Z, factor, errors, likely, without)
 
     def again(self, errors: Errors, start: Posterior) -> Posterior:
         """The motion with other errors, from the sites of `start`."""
         return self.posterior(errors, start.c, start.density, start.tau, start.nu)
 
+    def promised(self, errors: Errors, read: Posterior) -> float:
+        """The rise of the evidence with other errors, to first order: where sites have settled it
+        does not depend on them. From every so many a site.
+        """
+        some = slice(None, None, 1 + 2 * (len(self.sites) // (2 * TELLING)))  # odd: they are pairs
+        boxes = replace(self, low=self.low[some], high=self.high[some])
+        m, v, speed = read.without[:, some]
+        mass, own = (boxes._tilted(m, v, e.variance(speed))[0] for e in (errors, read.errors))
+        return float(np.mean(mass - own) * len(self.sites))
+
     def agrees(self, read: Posterior) -> bool:
         """Whether sites have settled and the motion leaves the interval of no count by more than
         FAR deviations.
         """
-        x, v = self.basis.at_samples(read.c)[0], self.basis.variances(read.Z)[0]
-        e2 = read.errors.variance(self.basis.at_samples(read.c, 1)[0] * self.basis.Ts)
+        x, v = self.basis.at_samples(read.c), self.basis.variances(read.Z)
+        e2 = read.errors.variance(self.basis.at_samples(read.c, 1) * self.basis.Ts)
         outside = np.abs(x - self.y)[self.measured] - 0.5
         near = outside < FAR * np.sqrt((np.maximum(v, 0) + e2)[self.measured])
         return read.settled and bool(near.all())
 
     def suspects(self, read: Posterior) -> Array:
-        """Middles of the SUSPECTS windows of time in which others foretell the counts worst,
-        samples.
+        """Where a jump of the counts may be, samples: where the jerk is densest, and the middles of
+        the SUSPECTS windows of time in which others foretell the counts worst.
         """
-        x, v = self.basis.at_samples(read.c)[0], self.basis.variances(read.Z)[0]
-        speed = self.basis.at_samples(read.c, 1)[0, self.sites] * self.basis.Ts
-        cavity, m = self._without(x[self.sites], v[self.sites], read.tau, read.nu)
-        off = m - (self.low + self.high) / 2
+        m, v, speed = read.without
+        off = (m - (self.low + self.high) / 2) ** 2 / (v + read.errors.variance(speed) + 1 / 12)
         length = max(1, round(WINDOW / self.basis.Ts))
-        variance = cavity + read.errors.variance(speed) + 1 / 12
-        surprise = np.bincount(self.sites // length, off**2 / variance - 1)
-        return np.asarray(np.argsort(surprise)[-SUSPECTS:] * length + length // 2)
+        surprise = np.bincount(self.sites // length, off - 1)
+        worst = np.argsort(surprise)[-SUSPECTS:] * length + length // 2
+        return np.append(worst, np.argmax(read.density) * self.basis.m)[::-1]
+
+    def around(self, middle: int, read: Posterior) -> tuple[int, Boxes, Posterior]:
+        """First sample, bounds and motion of the BESIDE samples on either side of one."""
+        m, end = self.basis.m, min(middle + BESIDE, self.basis.N)
+        first = max(0, middle - BESIDE) // m
+        begin = first * m
+        basis = Basis(end - begin, m, self.basis.Ts)
+        own = slice(*np.searchsorted(self.sites, (begin, end)))
+        y, rest = (x[begin : begin + basis.M * m] for x in (self.y, self.rest))
+        measured = self.measured[(self.measured >= begin) & (self.measured < end)] - begin
+        bounds = self.sites[own] - begin, self.low[own], self.high[own]
+        c, density = read.c[first:][: basis.P], read.density[first:][: basis.M]
+        boxes = Boxes(basis, y, measured, *bounds, rest)
+        sites = read.tau[own], read.nu[own]
+        return begin, boxes, boxes.posterior(read.errors, c, density, *sites)
 
     def jump(self, near: int, read: Posterior) -> tuple[int, float, float]:
         """Sample near `near` from which counts are most likely off by one number, that number, and
@@ -190,100 +217,92 @@ class Boxes:
         The slope of the log posterior by that number is g = sum (nu - tau x) over the later sites,
         its curvature sum tau - (B tau)' A^-1 (B tau).
         """
-        x, away = self.basis.at_samples(read.c)[0], np.abs(self.sites - near)
-        at = self.sites[(away - away.min()) * self.basis.Ts < WINDOW]
-        later = self.sites >= at[:, None]
-        tau, pull = read.tau * later, np.zeros((len(at), len(x)))
-        pull[:, self.sites] = tau
-        basis = Basis(self.basis.N, len(at), self.basis.m, self.basis.Ts)
-        ones = np.ones((len(at), basis.M))
-        B = basis.gradient(pull, ones, np.zeros((len(at), basis.P)))
-        curvature = tau.sum(axis=1) - np.einsum("ij,ij->i", B, read.factor.solve_each(B))
-        g = (later * (read.nu - read.tau * x[self.sites])).sum(axis=1)
+        away = np.abs(self.sites - near)
+        at = np.flatnonzero((away - away.min()) * self.basis.Ts < WINDOW)
+        pull = read.nu - read.tau * self.basis.at_samples(read.c)[self.sites]
+        weighted = diags_array(read.tau[at[0] :]) @ self.basis.rows(self.sites[at[0] :])
+        own, rest = weighted[: len(at)].toarray(), weighted[len(at) :].sum(axis=0)
+        B = np.cumsum(own[::-1], axis=0)[::-1] + rest
+        g, tau = (np.cumsum(x[::-1])[::-1][at] for x in (pull, read.tau))
+        curvature = tau - np.einsum("ij,ji->i", B, read.factor.solve(B.T))
         number = g / np.maximum(curvature, 1e-9)
         best = int(np.argmax(g * number))
-        return int(at[best]), float(number[best]), float(0.5 * g[best] * number[best])
+        return int(self.sites[at[best]]), float(number[best]), float(0.5 * g[best] * number[best])
 
-    def later(self, at: int, counts: int, read: Posterior) -> Posterior:
-        """The motion if there were so many counts more from a sample on."""
+    def later(self, at: int, counts: int, read: Posterior) -> tuple[Boxes, Posterior]:
+        """Bounds and motion if there were so many counts more from a sample on."""
         moved = np.where(self.sites >= at, counts, 0)
         boxes = replace(self, low=self.low + moved, high=self.high + moved)
         nu = read.nu + read.tau * moved
-        return boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
+        return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
 
     def shifted(self, shift: Callable[[Array], Array]) -> Boxes:
         """Bounds at lines that are shifted, by their number."""
         number = np.round(self.y[self.sites]).astype(int)
         return replace(self, low=self.low + shift(number - 1), high=self.high + shift(number))
 
-    def _without(self, mean: Array, v: Array, t: Array, u: Array) -> tuple[Array, Array]:
-        """Variance and mean of the position at each site without it."""
-        cavity = 1 / np.maximum(1 / v - t, CAVITY / v)
-        return cavity, cavity * (mean / v - u)
-
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
         """Log of the mass of every tilted law, and the site that goes with it."""
         s = np.sqrt(v + e2)
         a, b = (self.low - m) / s, (self.high - m) / s
         near = np.flatnonzero(np.minimum(-a, b) < FAR)
-        g, H = np.zeros((2, len(s)))
-        g[near], H[near] = box_moments(a[near], b[near])
+        mass, g, H = np.zeros((3, len(s)))
+        mass[near], g[near], H[near] = box_moments(a[near], b[near])
         g, H = g / s, H / s**2
         left = 1 - v * H
-        return log_mass(a, b), H / left, (g + H * m) / left
+        return mass, H / left, (g + H * m) / left
 
 
-def of_most_evidence(boxes: Boxes, sizes: Sequence[float], start: Posterior) -> Posterior:
+def of_most_evidence(
+    boxes: Boxes, sizes: Sequence[float], start: Posterior, moves: Sequence[tuple[int, int]] = MOVES
+) -> Posterior:
     """The motion with the errors, of `sizes` and CLOCK_ERRORS, whose evidence none beside them
-    exceeds.
+    exceeds, or promises to.
     """
     best, place = start, (sizes.index(start.errors.count), CLOCK_ERRORS.index(start.errors.time))
     tried = {place}
-    for move in MOVES:
+    for move in moves:
         while (to := (place[0] + move[0], place[1] + move[1])) not in tried:
             tried.add(to)
             if not (0 <= to[0] < len(sizes) and 0 <= to[1] < len(CLOCK_ERRORS)):
                 break
-            read = boxes.again(Errors(sizes[to[0]], CLOCK_ERRORS[to[1]]), best)
+            errors = Errors(sizes[to[0]], CLOCK_ERRORS[to[1]])
+            if boxes.promised(errors, best) < -CLEAR:
+                break
+            read = boxes.again(errors, best)
             if not read.evidence > best.evidence + CLEAR:
                 break
             place, best = to, read
     return best
 
 
-def log_mass(a: Array, b: Array) -> Array:
-    """log(Phi(b) - Phi(a)) of a < b."""
-    flip = a + b < 0
-    above, beyond = log_ndtr(np.where(flip, b, -a)), log_ndtr(np.where(flip, a, -b))
-    return np.asarray(above + np.log1p(-np.exp(np.minimum(beyond - above, -1e-300))))
-
-
-def box_moments(a: Array, b: Array) -> tuple[Array, Array]:
-    """g and H of a unit normal between a < b: g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) -
-    Phi(a), at mean m = 0 of unit variance.
+def box_moments(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """log Z, g and H of a unit normal between a < b, one of them within some deviations of zero:
+    g = d log Z/dm, H = -d^2 log Z/dm^2, Z = Phi(b) - Phi(a), at mean m = 0 of unit variance.
     """
-    flip = a + b < 0
-    low, high = np.where(flip, -b, a), np.where(flip, -a, b)
-    low = np.maximum(low, -8.0)
-    ratio = np.exp(np.minimum((low - high) * (low + high) / 2, 0))
-    at_low = np.sqrt(2 / np.pi) / (erfcx(low / np.sqrt(2)) - ratio * erfcx(high / np.sqrt(2)))
+    middle, half = np.abs(a + b) / 2, (b - a) / 2  # the side that is nearer to the mean first
+    low, high = middle - half, middle + half
+    ratio = np.exp(-2 * half * middle)
+    inside = erfcx(low / np.sqrt(2)) - ratio * erfcx(high / np.sqrt(2))
+    at_low = np.sqrt(2 / np.pi) / inside
     at_high = at_low * ratio
     g = at_low - at_high
-    return np.where(flip, -g, g), np.clip(g * g + high * at_high - low * at_low, 0, 1 - 1e-9)
+    H = np.clip(g * g + high * at_high - low * at_low, 0, 1 - 1e-9)
+    return np.log(inside / 2) - low**2 / 2, np.copysign(g, a + b), H
 
 
 def jerk_density(basis: Basis, c: Array, Z: Array, density: Array) -> Array:
     """MacKay's rule in windows of time, the whole record counting as OF_RECORD determined jerks;
-    shape (n, M).
+    shape (M,).
     """
     squares, determined = (
         basis.jerk(c) ** 2 * basis.h,
         np.maximum(1 - basis.jerk_variances(Z) * basis.h / density, 1e-9),
     )
-    whole = squares.mean(axis=1, keepdims=True) / determined.mean(axis=1, keepdims=True)
+    whole = squares.mean() / determined.mean()
     size = max(1, round(WINDOW / basis.h))
     squares, determined = (
-        size * uniform_filter1d(x, size, axis=1, mode="nearest") for x in (squares, determined)
+        size * uniform_filter1d(x, size, mode="nearest") for x in (squares, determined)
     )
-    least = np.maximum(RANGE * whole, basis.least_density)
+    least = max(RANGE * whole, basis.least_density)
     return np.asarray(np.maximum((squares + OF_RECORD * whole) / (determined + OF_RECORD), least))

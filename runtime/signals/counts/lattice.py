@@ -35,13 +35,13 @@ UNEQUAL = 1.01
 """Ratio of the steps of two encoders above which they are not the same kind."""
 JUMP = 30
 """A change of the count this many times its neighbours is none of a motion."""
-SHAKEN = 0.01
+SHAKEN = 0.009
 """Share of the changes of an encoder that cross a line the third time in a row, from which its
 motion counts as shaken.
 """
 FEWEST = 1000
-"""Changes from which a share is one: ten such passages at least, since a coarse encoder sees one or
-two where a joint turns back near a line.
+"""Changes from which a share is one: nine such passages at least, since a coarse encoder sees one
+or two where a joint turns back near a line.
 """
 
 
@@ -130,9 +130,9 @@ def lattice(
         findings.append(
             f"encoder {np.argmax(shares) + 1}: {100 * shares.max():.0f} % of its changes cross one "
             "line to and fro; the motion shakes, as under a controller "
-            "that answers single counts. Counts are read as positions within one step, and stated "
-            "deviations are those of the smooth motion alone: "
-            "do not trust those of velocities and accelerations"
+            "that answers single counts. Counts do not show that: what is read, and its stated "
+            "deviations, are those of the smooth motion alone. Compare with signals: "
+            "{reader: lowpass}, whose cutoff: auto was several times nearer to the truth there"
         )
     if step is None:
         unequal = (

@@ -23,7 +23,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrs
 from scipy.sparse import csr_array, diags_array
 
 from runtime.signals.counts.spline import Basis, Factor
@@ -49,30 +48,6 @@ COLUMNS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Changes:
-    """Changes of the count of one encoder: sample before, sample after, position of the line less
-    its number's shift, number of the line, direction.
-    """
-
-    before: Array
-    after: Array
-    line: Array
-    number: Array
-    up: Array
-
-    @classmethod
-    def of(cls, y: Array, known: Array, near: int) -> Changes:
-        """Changes by one count, of y, at most `near` missing samples apart; known : samples that
-        have a count.
-        """
-        step = np.diff(y[known])
-        e = np.flatnonzero((np.abs(step) == 1) & (np.diff(known) <= near + 1))
-        before, after = known[e], known[e + 1]
-        line = (y[before] + y[after]) / 2
-        return cls(before, after, line, np.floor(line).astype(int), step[e] > 0)
-
-
-@dataclass(frozen=True, eq=False)
 class LineErrors:
     """Of one encoder: shift of the lines first, first + 1 ..., steps; what is left of their
     deviation; a sentence.
@@ -90,15 +65,6 @@ class LineErrors:
         return np.where(inside, self.shift[np.clip(place, 0, len(self.shift) - 1)], 0.0)
 
 
-def _weights(changes: Changes, speed: Array, e: Array | float) -> tuple[Array, Array]:
-    """w_e and the position at the sample before the change, of every change; speed, shape (m M,),
-    steps a sample.
-    """
-    s = speed[changes.before]
-    w = 1 / ((s * (changes.after - changes.before)) ** 2 / 12 + np.square(e))
-    return w, changes.line + (changes.before - changes.after) / 2 * s
-
-
 def estimated_lines(
     basis: Basis,
     y: Array,
@@ -113,14 +79,57 @@ def estimated_lines(
     y, known, rest : counts, samples that have one, precision of the others.
     c, density : the motion with bounds widened by the deviation.
     """
-    changes = Changes.of(y, known, basis.m)
-    weak = rest.copy()
-    weak[known] = WEAK
-    speed = basis.at_samples(c, 1)[0] * basis.Ts
-    first, shift, left, period, single = _shifts(
-        basis, changes, (weak[None], WEAK * y[None]), speed, density, deviation
-    )
-    return LineErrors(first, shift, left, _text(deviation, left, period, single))
+    change = np.diff(y[known])
+    e = np.flatnonzero((np.abs(change) == 1) & (np.diff(known) <= basis.m + 1))
+    before, after, up = known[e], known[e + 1], change[e] > 0
+    line = (y[before] + y[after]) / 2
+    first = int(np.floor(line.min()))
+    place = np.floor(line).astype(int) - first
+    size = int(place.max()) + 1
+    ups, downs = (np.bincount(place[way], minlength=size) for way in (up, ~up))
+    own = np.flatnonzero((ups + downs >= CROSSINGS) & (ups > 0) & (downs > 0))[:MOST]
+    own = own if len(own) >= ENOUGH else own[:0]
+    classes = np.full(size, -1)
+    classes[own] = np.arange(len(own))
+    # lines of no class of their own keep e in their weight; those of a class have time alone
+    of, count, e = classes[place], len(own) + 4, np.arange(len(place))
+    classed = np.flatnonzero(of >= 0)
+    pairs = np.append(classed, e), np.append(of[classed], len(own) + place % 4)
+    E = csr_array((np.ones(len(pairs[0])), pairs), (len(e), count))  # classes of a change
+    V = basis.rows(before)
+    moved = basis.at_samples(c, 1)[before] * basis.Ts * (after - before)
+    time, value = moved**2 / 12 + EVEN**2, line - moved / 2  # at the sample before the change
+    variance_own = variance_period = deviation**2 / 2
+    for _ in range(4):
+        w = 1 / (time + np.where(of >= 0, 0.0, variance_own))
+        tau = rest.copy()
+        tau[known] = WEAK
+        nu = WEAK * y
+        np.add.at(tau, before, w)
+        np.add.at(nu, before, w * value)
+        factor = Factor.of(basis.precision(tau, density))
+        g = basis.gradient(nu, density, np.zeros(basis.P))
+        weighted = diags_array(w) @ E
+        B = (V.T @ weighted).tocsc()
+        S = (E.T @ weighted).toarray()
+        for a in range(0, count, COLUMNS_AT_ONCE):
+            part = B[:, a : a + COLUMNS_AT_ONCE].toarray(order="F")
+            S[:, a : a + COLUMNS_AT_ONCE] -= B.T @ factor.solve(part)
+        prior = np.concatenate(
+            [np.full(len(own), 1 / variance_own), np.full(4, 1 / variance_period)]
+        )
+        C = np.linalg.inv(S + np.diag(prior))
+        delta = C @ (B.T @ factor.solve(g) - weighted.T @ value)
+        if len(own):
+            variance_own = float(np.mean(delta[: len(own)] ** 2 + np.diag(C)[: len(own)]))
+        variance_period = float(np.mean(delta[len(own) :] ** 2 + np.diag(C)[len(own) :]))
+    shift = delta[len(own) :][np.arange(size) % 4]
+    shift[own] += delta[: len(own)]
+    unknown = np.ones(len(place)) * variance_own
+    unknown[of >= 0] = np.diag(C)[of[of >= 0]]
+    left = max(float(np.sqrt(np.mean(unknown))), EVEN)
+    period = float(np.sqrt(np.mean(delta[len(own) :] ** 2)))
+    return LineErrors(first, shift, left, _text(deviation, left, period, len(own)))
 
 
 def _text(deviation: float, left: float, period: float, single: int) -> str:
@@ -136,73 +145,4 @@ def _text(deviation: float, left: float, period: float, single: int) -> str:
     return (
         f"{size}, {period:.2g} of it repeat every four lines; {single} single lines estimated, "
         f"bounds widened by the {left:.2g} steps left"
-    )
-
-
-def _shifts(
-    basis: Basis,
-    changes: Changes,
-    weak: tuple[Array, Array],
-    speed: Array,
-    density: Array,
-    deviation: float,
-) -> tuple[int, Array, float, float, int]:
-    """Shifts of all lines from the first one crossed on, the deviation left, that of period four,
-    and how many lines have a shift of their own.
-    """
-    first, last = int(changes.number.min()), int(changes.number.max())
-    place = changes.number - first
-    size = last - first + 1
-    ups, downs = (
-        np.bincount(place[changes.up], minlength=size),
-        np.bincount(place[~changes.up], minlength=size),
-    )
-    own = np.flatnonzero((ups + downs >= CROSSINGS) & (ups > 0) & (downs > 0))[:MOST]
-    own = own if len(own) >= ENOUGH else own[:0]
-    classes = np.full(size, -1)
-    classes[own] = np.arange(len(own))
-    shift, left = np.zeros(size), deviation
-    # lines of no class of their own keep e in their weight; those of a class have time alone
-    of, count, e = classes[place], len(own) + 4, np.arange(len(place))
-    classed = np.flatnonzero(of >= 0)
-    pairs = np.append(classed, e), np.append(of[classed], len(own) + place % 4)
-    E = csr_array((np.ones(len(pairs[0])), pairs), (len(e), count))  # classes of a change
-    interval, u = np.divmod(changes.before, basis.m)
-    columns = (interval[:, None] + np.arange(4)).ravel()
-    V = csr_array((basis.values[0][u].ravel(), (np.repeat(e, 4), columns)), (len(e), basis.P))
-    w, value = _weights(changes, speed, EVEN)
-    time = 1 / w
-    variance_own = variance_period = deviation**2 / 2
-    for _ in range(4):
-        w = 1 / (time + np.where(of >= 0, 0.0, variance_own))
-        tau, nu = weak[0].copy(), weak[1].copy()
-        np.add.at(tau[0], changes.before, w)
-        np.add.at(nu[0], changes.before, w * value)
-        factor = Factor.of(basis.precision(tau, density))
-        g = basis.gradient(nu, density, np.zeros((1, basis.P)))
-        weighted = diags_array(w) @ E
-        B = (V.T @ weighted).tocsc()
-        S = (E.T @ weighted).toarray()
-        for a in range(0, count, COLUMNS_AT_ONCE):
-            part = B[:, a : a + COLUMNS_AT_ONCE].toarray(order="F")
-            S[:, a : a + COLUMNS_AT_ONCE] -= B.T @ dpbtrs(factor.L, part, lower=1)[0]
-        prior = np.concatenate(
-            [np.full(len(own), 1 / variance_own), np.full(4, 1 / variance_period)]
-        )
-        C = np.linalg.inv(S + np.diag(prior))
-        delta = C @ (B.T @ factor.solve(g)[0] - weighted.T @ value)
-        if len(own):
-            variance_own = float(np.mean(delta[: len(own)] ** 2 + np.diag(C)[: len(own)]))
-        variance_period = float(np.mean(delta[len(own) :] ** 2 + np.diag(C)[len(own) :]))
-    shift = delta[len(own) :][np.arange(size) % 4]
-    shift[own] += delta[: len(own)]
-    unknown = np.ones(len(place)) * variance_own
-    unknown[of >= 0] = np.diag(C)[of[of >= 0]]
-    left = float(np.sqrt(np.mean(unknown)))
-    return (
-        first,
-        shift,
-        max(left, EVEN),
-        float(np.sqrt(np.mean(delta[len(own) :] ** 2))),
-        len(own),
     )

@@ -48,6 +48,11 @@ REACH = 0.02
 """Time ahead of an unknown state and behind it that filters bring it to, s: a period of usual
 cut-offs.
 """
+STANDS, LONG = 0.1, 2.0
+"""Time without a change of the count in which a joint may stand, s, and how many times the longest
+turn between two lines at its usual acceleration a it must be, sqrt(8/a): no direction is known
+there.
+"""
 RESTS = 0.05
 """Longest gap, s, in which an encoder whose count never changes is taken as at rest."""
 
@@ -253,9 +258,11 @@ def _moved(k: Array, moving: Array, states: Sequence[Array], rate: float, lines:
     for order in range(3):
         for j, each in zip(moving, channels, strict=True):
             states[order][:, j], states[order + 3][:, j] = each.state(order)
-    for j, at in zip(moving, known, strict=True) if shaken else ():
-        turned = np.zeros(N, dtype=bool)
-        for a, b in at[to_and_fro(k[j, at])]:
+    for j, at in zip(moving, known, strict=True):
+        between = np.diff(at[1:][np.diff(k[j, at]) != 0], prepend=0, append=N)
+        turn = np.sqrt(8 / np.sqrt(np.mean(states[2][:, j] ** 2)))
+        turned = np.repeat(between > max(STANDS, LONG * turn) * rate, between)
+        for a, b in at[to_and_fro(k[j, at])] if shaken else ():
             turned[max(a - round(TURNED * rate), 0) : b + round(TURNED * rate)] = True
         deviation = 3 * np.abs(
             states[1][turned, j]

@@ -23,6 +23,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.signals.counts.boxes import (
+    CLEAR,
     CLOCK_ERRORS,
     COUNT_ERRORS,
     Boxes,
@@ -37,32 +38,30 @@ from runtime.signals.counts.spline import Basis, Factor, next_density
 Array = np.ndarray
 Lines = Literal["detected", "estimated"] | float
 
-KNOTS = 2e-3
-"""Least distance of knots, s, or of samples where that is larger."""
-RESOLVED, FARTHEST = 0.1, 0.064
-"""Distance of knots in units of the time r^(-1/5) in which white jerk of density r crosses an
-interval, and the largest one, s.
+KNOTS, RESOLVED, FARTHEST = 2e-3, 0.1, 0.064
+"""Least distance of knots, s, or of samples where that is larger; the distance in units of the time
+r^(-1/5) in which white jerk of density r crosses an interval; the largest one, s.
 """
-LIVELIEST = 8192
-"""Samples of a long record that tell the errors of its counts."""
-WIDE = 0.12
-"""Error of a count from which the comparison starts, steps."""
-BESIDE = 2048
-"""Samples on either side of a jump that tell it."""
-JUMPS, MOST_LOST, LIKELIER = 8, 30, 30.0
-"""Most jumps of the counts of an encoder, the counts lost in one that is looked for, and the rise
-of the evidence, nats, that tells one.
+LIVELIEST, WIDE = 4096, 0.12
+"""Samples of a long record that tell the errors of its counts, and the error of a count from which
+the comparison starts, steps.
+"""
+JUMPS, LIKELIER, LEAST_LOST, MOST_LOST, SPIKE = 8, 30.0, 0.3, 30, 20.0
+"""Most jumps of the counts of an encoder; the rise of the evidence, nats, that tells one; the least
+number of counts, to second order, that one is looked for by, and the largest; the density of the
+jerk over its mean that is none of a motion: up to 11 on the measured TX40, 220 at a jump unseen.
 """
 LEAP, NEIGHBOURS = 5.0, 10
-"""A change of the count so many times all changes of so many samples on either side is none of a
-motion.
+"""A change of the count so many times as far off the parabola through those of so many samples on
+either side as these are, or as half a count, is none of a motion.
 """
 FEWEST = 150
 """Bounds from which an error of the counts is told: fewer do not tell it from an unusual motion."""
-FIRST = 30
-"""Most passes over the changes alone, ahead of those over the sites."""
-SETTLED = 0.1
-"""Relative change of the jerk density at which the passes over the changes end."""
+FIRST, SETTLED, FIRST_DENSITY = 30, 0.1, 1e8
+"""Most passes over the changes alone, ahead of those over the sites; the relative change of the
+jerk density at which they end; the density that they start from, above any that a record asks for,
+ranges of the counts^2/s^5.
+"""
 GAP = 10.0
 """Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long
 gap remains one that Cholesky factors.
@@ -95,14 +94,14 @@ class Smoothed:
         each.
         """
         N = self.basis.N
-        mean = self.basis.at_samples(self.read.c, order)[0, :N]
-        variance = self.basis.variances(self.read.Z, order)[0, :N]
+        mean = self.basis.at_samples(self.read.c, order)[:N]
+        variance = self.basis.variances(self.read.Z, order)[:N]
         return mean + self.origin * (order == 0), np.sqrt(np.maximum(variance, 0))
 
     def draw(self, rng: np.random.Generator) -> Array:
         """Positions drawn from the posterior, shape (N,)."""
         drawn = self.basis.at_samples(self.read.c + self.read.factor.draw(rng))
-        return np.asarray(drawn[0, : self.basis.N] + self.origin)
+        return np.asarray(drawn[: self.basis.N] + self.origin)
 
 
 def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed:
@@ -123,11 +122,11 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     sizes: tuple[float, ...] = COUNT_ERRORS
     if not isinstance(lines, str):
         sizes = (max(lines, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > lines))
-    jumps = _leaps(y, known)
+    jumps = given.leaps()
     for leap in jumps:
         given = given.without(*leap)
     boxes, read = given.read(sizes)
-    while len(jumps) < JUMPS and (jump := _jump(given, boxes, read)):
+    while len(jumps) < JUMPS and (jump := given.jump(boxes, read)):
         jumps.append(jump)
         given = given.without(*jump)
         boxes, read = given.read(sizes)
@@ -161,13 +160,10 @@ class Counts:
         it agrees with every count. Errors of a long record are those of its liveliest part, or
         wider ones that make the whole more likely.
         """
-        if len(self.y) > 2 * LIVELIEST:
+        if len(self.y) > 4 * LIVELIEST:
             boxes, read = self.first(self.liveliest().searched(sizes)[1].errors)
-            for wider in (x for x in sizes if x > read.errors.count):
-                wide = boxes.again(replace(read.errors, count=wider), read)
-                if wide.evidence < read.evidence:
-                    break
-                read = wide
+            if read.settled:
+                read = of_most_evidence(boxes, sizes, read, moves=[(1, 0)])
             if boxes.agrees(read):
                 return boxes, read
         boxes, read = self.searched(sizes)
@@ -188,12 +184,9 @@ class Counts:
         changed[self.measured[1:]] = np.diff(self.y[self.measured]) != 0
         total = np.cumsum(changed)
         begin = int(np.argmax(total[LIVELIEST:] - total[:-LIVELIEST])) + 1
-        return self.part(begin, begin + LIVELIEST)
-
-    def part(self, begin: int, end: int) -> Counts:
-        """The samples from `begin` up to `end`."""
-        inside = self.measured[(self.measured >= begin) & (self.measured < end)]
-        return Counts(self.y[begin:end], inside - begin, self.rest[begin:end], self.Ts)
+        part, inside = slice(begin, begin + LIVELIEST), self.measured - begin
+        inside = inside[(inside >= 0) & (inside < LIVELIEST)]
+        return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
         """The motion with the errors of most evidence; a jittering clock is thought of where errors
@@ -214,19 +207,61 @@ class Counts:
 
         Knots are as far apart as the motion allows that passes near the changes.
         """
-        y, N, least = self.y, len(self.y), max(1, round(KNOTS / self.Ts))
-        basis = Basis(N, 1, least, self.Ts)
-        tau, nu = _from_changes(y, self.measured, self.rest, errors, least)
-        _, density = _passed(basis, tau, nu, _first_density(y))
+        N, least = len(self.y), max(1, round(KNOTS / self.Ts))
+        basis = Basis(N, least, self.Ts)
+        tau, nu = self.from_changes(errors)
+        c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
         h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
-        basis = Basis(N, 1, max(1, round(h / self.Ts)), self.Ts)
-        c, density = _passed(basis, tau, nu, density.max(axis=1))
-        sites = _sites(y, self.measured, density.mean(), self.Ts)
-        bounds = y[sites] - 0.5, y[sites] + 0.5
-        boxes = Boxes(
-            basis, basis.filled(y), self.measured, sites, *bounds, basis.filled(self.rest)
-        )
+        if (m := max(1, round(h / self.Ts))) > least:
+            basis = Basis(N, m, self.Ts)
+            c, density = _passed(basis, tau, nu, float(density.max()))
+        sites = self.sites(density.mean())
+        bounds = self.y[sites] - 0.5, self.y[sites] + 0.5
+        y, rest = basis.filled(self.y), basis.filled(self.rest)
+        boxes = Boxes(basis, y, self.measured, sites, *bounds, rest)
         return boxes, boxes.posterior(errors, c, density, tau[sites], nu[sites])
+
+    def sites(self, density: float) -> Array:
+        """Samples whose bounds count: both sides of every change and gap, and in between as often
+        as the motion forgets; ascending.
+
+        Bounds of samples close together are one bound. Taken as many, each would see the others as
+        independent knowledge.
+        """
+        known = self.measured
+        change = np.flatnonzero((np.diff(self.y[known]) != 0) | (np.diff(known) > 1))
+        ends = np.concatenate([[0], np.repeat(change, 2), [len(known) - 1]]).reshape(-1, 2)
+        ends[1:, 0] += 1
+        length = ends[:, 1] - ends[:, 0]
+        parts = (length * self.Ts / (SPACING * density**-0.2)).astype(int)  # between two changes
+        which = np.repeat(np.arange(len(ends)), parts)
+        number = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
+        between = ends[which, 0] + number * (length / np.maximum(parts, 1))[which]
+        return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
+
+    def from_changes(self, errors: Errors) -> tuple[Array, Array]:
+        """First sites, precision and its product with the mean: at the two samples around a change
+        of the count, at most KNOTS of missing samples apart; a hundredth of an interval at every
+        other sample, `rest` where it is missing.
+        """
+        y, known, near = self.y, self.measured, max(1, round(KNOTS / self.Ts))
+        tau = self.rest.copy()
+        tau[known] = 0.06
+        nu = tau * y
+        e = np.flatnonzero((np.diff(y[known]) != 0) & (np.diff(known) <= near + 1))
+        if len(e) < 2:
+            return tau, nu
+        before, after = known[e], known[e + 1]
+        t, line = (before + after) / 2, (y[before] + y[after]) / 2
+        slope = np.diff(line) / np.diff(t)  # steps a sample, from change to change
+        slopes = np.array([np.append(slope[:1], slope), np.append(slope, slope[-1:])])
+        speed = slopes.mean(axis=0)
+        time = np.clip(np.abs(slopes).max(axis=0) * (after - before), 0.02, 1)
+        weight = 6 / (time**2 + 12 * errors.variance(speed))
+        for samples in (before, after):
+            np.add.at(tau, samples, weight)
+            np.add.at(nu, samples, weight * (line + (samples - t) * speed))
+        return tau, nu
 
     def without(self, at: int, jump: int) -> Counts:
         """These counts without a jump at a sample."""
@@ -234,41 +269,47 @@ class Counts:
         y[self.measured[self.measured >= at]] -= jump
         return replace(self, y=y)
 
+    def leaps(self) -> list[tuple[int, int]]:
+        """Samples at which a change of the count is off the parabola through its neighbours by LEAP
+        times what these are, and by how many counts.
+        """
+        y, known = self.y, self.measured
+        change = np.diff(y[known])
+        bent = np.abs(change[1:-1] - (change[2:] + change[:-2]) / 2) > LEAP / 2
+        bent &= np.diff(known)[1:-1] == 1  # across a gap any change is one of a motion
+        at = 1 + np.flatnonzero(bent)
+        place = np.delete(np.arange(-NEIGHBOURS, NEIGHBOURS + 1), NEIGHBOURS)
+        parabola = np.linalg.pinv(np.vander(place, 3)).T @ np.vander([*place, 0], 3).T
+        beside = np.pad(change, NEIGHBOURS, mode="reflect")[at[:, None] + NEIGHBOURS + place]
+        smooth = beside @ parabola
+        off, others = change[at] - smooth[:, -1], np.abs(beside - smooth[:, :-1]).max(axis=1)
+        leap = np.flatnonzero(np.abs(off) > LEAP * np.maximum(others, 0.5))[:JUMPS]
+        return [(int(known[at[i] + 1]), round(off[i])) for i in leap]
 
-def _leaps(y: Array, known: Array) -> list[tuple[int, int]]:
-    """Samples at which counts change by LEAP times their neighbours, and by how many they jump."""
-    change = np.diff(y[known], prepend=y[known[0]], append=y[known[-1]])
-    beside = np.lib.stride_tricks.sliding_window_view(
-        np.pad(change, NEIGHBOURS, mode="reflect"), 2 * NEIGHBOURS + 1, axis=0
-    )[: len(known)]
-    others = np.delete(beside, NEIGHBOURS, axis=1)
-    leap = np.abs(change[: len(known)]) > LEAP * np.maximum(np.abs(others).max(axis=1), 1)
-    leap &= np.diff(known, prepend=known[0]) == 1  # across a gap any change is one of a motion
-    jump = np.round(change[: len(known)] - np.median(others, axis=1))
-    return [(int(known[i]), int(jump[i])) for i in np.flatnonzero(leap)[:JUMPS]]
-
-
-def _jump(given: Counts, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
-    """Sample at which counts jump, and by how many, if the record around it is more likely without
-    by LIKELIER nats; not asked where counts have the least errors.
-    """
-    if read.errors.count <= COUNT_ERRORS[0] or len(boxes.sites) < FEWEST:
-        return None
-    for middle in boxes.suspects(read):
-        begin = max(0, int(middle) - BESIDE)
-        part = given.part(begin, int(middle) + BESIDE)
-        if len(np.unique(part.y[part.measured])) < 2:
-            continue
-        there, alone = part.first(read.errors)
-        at, most_likely, gain = there.jump(int(middle) - begin, alone)
-        if not gain > LIKELIER / 6:
-            continue
-        away = 1 if most_likely > 0 else -1
-        near = round(np.clip(most_likely, -MOST_LOST, MOST_LOST))
-        for jump in dict.fromkeys((near, near + away, near - away, away, 2 * away, 3 * away)):
-            if there.later(at, -jump, alone).evidence > alone.evidence + LIKELIER:
+    def jump(self, boxes: Boxes, read: Posterior) -> tuple[int, int] | None:
+        """Sample at which counts jump, and by how many, if the record around it is more likely
+        without by LIKELIER nats; not asked where counts have the least errors and the jerk is
+        nowhere SPIKE times as dense as in the mean.
+        """
+        spikes = read.density.max() > SPIKE * read.density.mean()
+        if len(boxes.sites) < FEWEST or not (spikes or read.errors.count > COUNT_ERRORS[0]):
+            return None
+        for middle in boxes.suspects(read):
+            begin, there, alone = boxes.around(int(middle), read)
+            at, number, gain = there.jump(int(middle) - begin, alone)
+            if not (gain > LIKELIER / 6 and abs(number) > LEAST_LOST):
+                continue
+            jump, likely, least = 0, alone.evidence + LIKELIER, max(1, round(abs(number)))
+            for lost in range(least, MOST_LOST + 1):
+                trial = lost if number > 0 else -lost
+                bounds, without = there.later(at, jump - trial, alone)
+                if without.evidence > likely + CLEAR:
+                    there, alone, likely, jump = bounds, without, without.evidence, trial
+                elif jump or lost > least + 1:
+                    break
+            if jump:
                 return begin + at, jump
-    return None
+        return None
 
 
 def _told(errors: Errors, least: float, sites: int) -> list[str]:
@@ -290,71 +331,21 @@ def _told(errors: Errors, least: float, sites: int) -> list[str]:
     return said
 
 
-def _passed(basis: Basis, tau: Array, nu: Array, density: Array) -> tuple[Array, Array]:
-    """The spline through Gaussian sites, and the jerk density that goes with it, shape (n, M),
-    after at most FIRST passes from `density`, (n,).
+def _passed(basis: Basis, tau: Array, nu: Array, density: float) -> tuple[Array, Array]:
+    """The spline through Gaussian sites, and the jerk density that goes with it, shape (M,), after
+    at most FIRST passes from `density`.
     """
-    tau, nu = basis.filled(tau)[None], basis.filled(nu)[None]
-    samples, unit = basis.of_samples(tau), basis.of_prior(np.ones((basis.n, basis.M)))
-    g = basis.gradient(nu, np.ones((basis.n, basis.M)), np.zeros((basis.n, basis.P)))
+    tau, nu, ones = basis.filled(tau), basis.filled(nu), np.ones(basis.M)
+    samples, unit, c = basis.of_samples(tau), basis.of_prior(ones), np.zeros(basis.P)
+    g = basis.gradient(nu, ones, c)
     for _ in range(FIRST):
         before, density = density, next_density(basis, samples, unit, g, density)
-        if (np.abs(density / before - 1) < SETTLED).all():
+        if abs(density / before - 1) < SETTLED:
             break
-    of_windows, c = np.repeat(density[:, None], basis.M, axis=1), np.zeros((basis.n, basis.P))
+    of_windows = np.repeat(density, basis.M)
     for _ in range(2):
         factor = Factor.of(samples + basis.of_prior(of_windows))
         for _ in range(2):
             c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), of_windows, c))
         of_windows = jerk_density(basis, c, factor.inverse(), of_windows)
     return c, of_windows
-
-
-def _sites(y: Array, known: Array, density: float, Ts: float) -> Array:
-    """Samples whose bounds count: both sides of every change and gap, and in between as often as
-    the motion forgets; ascending, some of the samples `known`.
-
-    Bounds of samples close together are one bound. Taken as many, each would see the others as
-    independent knowledge.
-    """
-    change = np.flatnonzero((np.diff(y[known]) != 0) | (np.diff(known) > 1))
-    ends = np.concatenate([[0], np.repeat(change, 2), [len(known) - 1]]).reshape(-1, 2)
-    ends[1:, 0] += 1
-    length = ends[:, 1] - ends[:, 0]
-    parts = (length * Ts / (SPACING * density**-0.2)).astype(int)  # between two changes
-    which = np.repeat(np.arange(len(ends)), parts)
-    number = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
-    between = ends[which, 0] + number * (length / np.maximum(parts, 1))[which]
-    return np.asarray(known[np.unique(np.concatenate([ends.ravel(), between.astype(int)]))])
-
-
-def _first_density(y: Array) -> Array:
-    """A density above any that the record asks for, from which MacKay's rule takes few passes,
-    shape (1,): root 1e4 s^(-5/2) times the range.
-    """
-    return np.array([(np.ptp(y) + 1) ** 2 * 1e8])
-
-
-def _from_changes(
-    y: Array, known: Array, rest: Array, errors: Errors, near: int
-) -> tuple[Array, Array]:
-    """First sites: at the two samples around a change of the count, at most `near` missing samples
-    apart; a hundredth of an interval at every other sample, `rest` where it is missing.
-    """
-    tau = rest.copy()
-    tau[known] = 0.06
-    nu = tau * y
-    e = np.flatnonzero((np.diff(y[known]) != 0) & (np.diff(known) <= near + 1))
-    if len(e) < 2:
-        return tau, nu
-    before, after = known[e], known[e + 1]
-    t, line = (before + after) / 2, (y[before] + y[after]) / 2
-    slope = np.diff(line) / np.diff(t)  # steps a sample, from change to change
-    slopes = np.array([np.append(slope[:1], slope), np.append(slope, slope[-1:])])
-    speed = slopes.mean(axis=0)
-    time = np.clip(np.abs(slopes).max(axis=0) * (after - before), 0.02, 1)
-    weight = 6 / (time**2 + 12 * errors.variance(speed))
-    for samples in (before, after):
-        np.add.at(tau, samples, weight)
-        np.add.at(nu, samples, weight * (line + (samples - t) * speed))
-    return tau, nu

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs, dtbtrs
+from scipy.sparse import csr_array
 
 Array = np.ndarray
 
@@ -32,20 +33,23 @@ PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
 JERK = np.array([-1.0, 3.0, -3.0, 1.0])
 SLOPE = 1e-3
 """Difference of log r by which log |A| is differentiated."""
+LENGTH = 0.5
+"""Coefficients of a stretch that is passed side by side with others, in roots of their number: a
+step of the joining costs a quarter of one of the passing.
+"""
 CONDITION = 1e-9
 """Least density that a Cholesky factor resolves, by h^5."""
 
 
 class Basis:
-    """Splines of n channels over N samples of period Ts, with a knot every m samples.
+    """Splines over N samples of period Ts, with a knot every m samples.
 
     Samples are padded to whole intervals: M intervals, m M samples, P = M + 3 coefficients. values
-    : (B, B', B'') at the m samples of an
-    interval, shape (m, 4) each.
+    : (B, B', B'') at the m samples of an interval, shape (m, 4) each.
     """
 
-    def __init__(self, N: int, n: int, m: int, Ts: float) -> None:
-        self.N, self.n, self.m, self.M, self.Ts, self.h = N, n, m, -(-N // m), Ts, m * Ts
+    def __init__(self, N: int, m: int, Ts: float) -> None:
+        self.N, self.m, self.M, self.Ts, self.h = N, m, -(-N // m), Ts, m * Ts
         self.P = self.M + 3
         u = np.arange(m) / m
         one = np.ones(m)
@@ -75,105 +79,105 @@ class Basis:
         return CONDITION / (self.h**5 * self.m)
 
     def at_samples(self, c: Array, order: int = 0) -> Array:
-        """The spline, or its derivative of that order, shape (n, m M), of coefficients (n, P)."""
-        windows = np.lib.stride_tricks.sliding_window_view(c, 4, axis=1)
-        return np.asarray((windows @ self.values[order].T).reshape(self.n, -1))
+        """The spline, or its derivative of that order, shape (m M,), of coefficients (P,)."""
+        windows = np.lib.stride_tricks.sliding_window_view(c, 4)
+        return np.asarray((windows @ self.values[order].T).ravel())
+
+    def rows(self, samples: Array) -> csr_array:
+        """b_k of some samples, shape (S, P)."""
+        interval, u = np.divmod(samples, self.m)
+        columns = (interval[:, None] + np.arange(4)).ravel()
+        ends = np.arange(0, len(columns) + 1, 4)
+        return csr_array((self.values[0][u].ravel(), columns, ends), shape=(len(samples), self.P))
 
     def variances(self, Z: Array, order: int = 0) -> Array:
-        """Variances of the same, shape (n, m M); Z, shape (4, n, P)."""
+        """Variances of the same, shape (m M,); Z, shape (4, P)."""
         b = self.values[order]
         squares = np.stack([(1 if i == j else 2) * b[:, i] * b[:, j] for i, j in PAIRS])
-        pairs = np.stack([Z[j - i][:, i : i + self.M] for i, j in PAIRS]).reshape(len(PAIRS), -1)
-        return np.asarray((pairs.T @ squares).reshape(self.n, -1))
+        pairs = np.stack([Z[j - i, i : i + self.M] for i, j in PAIRS])
+        return np.asarray((pairs.T @ squares).ravel())
 
     def jerk(self, c: Array) -> Array:
-        """Jerk of every interval, shape (n, M)."""
+        """Jerk of every interval, shape (M,)."""
         return third_differences(c) / self.h**3
 
     def jerk_variances(self, Z: Array) -> Array:
         """Its variances."""
-        total = np.zeros((self.n, self.M))
+        total = np.zeros(self.M)
         for i, j in PAIRS:
-            total += (1 if i == j else 2) * JERK[i] * JERK[j] * Z[j - i][:, i : i + self.M]
+            total += (1 if i == j else 2) * JERK[i] * JERK[j] * Z[j - i, i : i + self.M]
         return np.asarray(total / self.h**6)
 
     def precision(self, tau: Array, density: Array) -> Array:
-        """A by its diagonals, shape (4, n, P); tau, shape (n, m M), density r, shape (n, M)."""
+        """A by its diagonals, shape (4, P); tau, shape (m M,), density r, shape (M,)."""
         return np.asarray(self.of_samples(tau) + self.of_prior(density))
 
     def of_samples(self, tau: Array) -> Array:
         """The share of A that sites of precision tau have, sum_k tau_k b_k b_k'."""
-        samples = (self.products.T @ tau.reshape(-1, self.m).T).reshape(len(PAIRS), self.n, self.M)
-        A = np.zeros((4, self.n, self.P))
+        samples = self.products.T @ tau.reshape(-1, self.m).T
+        A = np.zeros((4, self.P))
         for (i, j), of_pair in zip(PAIRS, samples, strict=True):
-            A[j - i][:, i : i + self.M] += of_pair
+            A[j - i, i : i + self.M] += of_pair
         return A
 
     def of_prior(self, density: Array) -> Array:
         """The share of A that the prior has, sum_i (h/r_i) d_i d_i'."""
         prior = 1 / (self.h**5 * density)
-        A = np.zeros((4, self.n, self.P))
+        A = np.zeros((4, self.P))
         for i, j in PAIRS:
-            A[j - i][:, i : i + self.M] += JERK[i] * JERK[j] * prior
+            A[j - i, i : i + self.M] += JERK[i] * JERK[j] * prior
         return A
 
     def gradient(self, pull: Array, density: Array, c: Array) -> Array:
-        """Slope of the log posterior at c, shape (n, P); pull = nu - tau x(c), shape (n, m M)."""
-        samples = (self.values[0].T @ pull.reshape(-1, self.m).T).reshape(4, self.n, self.M)
+        """Slope of the log posterior at c, shape (P,); pull = nu - tau x(c), shape (m M,)."""
+        samples = self.values[0].T @ pull.reshape(-1, self.m).T
         prior = third_differences(c) / (self.h**5 * density)
-        g = np.zeros((self.n, self.P))
+        g = np.zeros(self.P)
         for i in range(4):
-            g[:, i : i + self.M] += samples[i] - JERK[i] * prior
+            g[i : i + self.M] += samples[i] - JERK[i] * prior
         return g
 
 
 def third_differences(c: Array) -> Array:
-    """c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of coefficients (n, P), shape (n, M)."""
-    return np.asarray(c[:, 3:] - c[:, :-3] + 3 * (c[:, 1:-2] - c[:, 2:-1]))
+    """c_(i+3) - 3 c_(i+2) + 3 c_(i+1) - c_i of coefficients (P,), shape (M,)."""
+    return np.asarray(c[3:] - c[:-3] + 3 * (c[1:-2] - c[2:-1]))
 
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Cholesky factor of A, one channel after the other: L by its diagonals, shape (4, n P)."""
+    """Cholesky factor of A: L by its diagonals, shape (4, P)."""
 
     L: Array
-    n: int
 
     @classmethod
     def of(cls, A: Array) -> Factor:
-        """Factor of A, shape (4, n, P); where rounding made it indefinite, of A with a diagonal
-        larger by the least share that helps.
+        """Factor of A, shape (4, P); where rounding made it indefinite, of A with a diagonal larger
+        by the least share that helps.
         """
-        n = A.shape[1]
-        A = A.reshape(4, -1)
         for share in (0.0, 1e-13, 1e-11, 1e-9):
             L, info = dpbtrf(np.vstack([A[:1] * (1 + share), A[1:]]), lower=1)
             if not info:
-                return cls(L, n)
+                return cls(L)
         raise np.linalg.LinAlgError(f"the precision of coefficient {info} is not positive")
 
     @property
-    def log_determinants(self) -> Array:
-        """log |A| of every channel, shape (n,)."""
-        return np.asarray(2 * np.log(self.L[0]).reshape(self.n, -1).sum(axis=1))
+    def log_determinant(self) -> float:
+        """log |A|."""
+        return float(2 * np.log(self.L[0]).sum())
 
     def solve(self, g: Array) -> Array:
-        """A^-1 g, shape (n, P)."""
-        return np.asarray(dpbtrs(self.L, g.reshape(-1, 1), lower=1)[0].reshape(g.shape))
-
-    def solve_each(self, g: Array) -> Array:
-        """A^-1 g of one channel for every row of g, shape (k, P)."""
-        return np.asarray(dpbtrs(self.L, np.asfortranarray(g.T), lower=1)[0].T)
+        """A^-1 g, of the shape of g, (P,) or (P, k)."""
+        return np.asarray(dpbtrs(self.L, g, lower=1)[0].reshape(g.shape))
 
     def draw(self, rng: np.random.Generator) -> Array:
-        """A draw of N(0, A^-1), shape (n, P)."""
+        """A draw of N(0, A^-1), shape (P,)."""
         z = rng.standard_normal((self.L.shape[1], 1))
-        return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].reshape(self.n, -1))
+        return np.asarray(dtbtrs(self.L, z, uplo="L", trans="T")[0].ravel())
 
     def inverse(self) -> Array:
-        """Z_(i, i + lag) of lags 0 to 3, shape (4, n, P)."""
+        """Z_(i, i + lag) of lags 0 to 3, shape (4, P)."""
         T = self.L.shape[1]
-        length = max(8, int(np.sqrt(T)))
+        length = max(8, int(LENGTH * np.sqrt(T)))
         stretches = -(-T // length)
         l, d = np.zeros((3, stretches * length)), np.ones(stretches * length)
         l[:, :T], d[:T] = -self.L[1:] / self.L[0], 1 / self.L[0] ** 2
@@ -201,12 +205,12 @@ class Factor:
             Z[lag] = (
                 z[:, lag] + np.einsum("iaw,iaw->iw", f[:length], weighted[lag : lag + length])
             ).T
-        return Z.reshape(4, -1)[:, :T].reshape(4, self.n, -1)
+        return Z.reshape(4, -1)[:, :T]
 
 
-def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: Array) -> Array:
-    """MacKay's rule for one density r of the jerk by channel, shape (n,): squares of the jerk over
-    the number of jerks that sites determine.
+def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) -> float:
+    """MacKay's rule for one density r of the jerk: squares of the jerk over the number of jerks
+    that sites determine.
 
     samples, unit : shares of A that sites have, and the prior of density one.
     g : slope at c = 0.
@@ -216,12 +220,10 @@ def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: Array) 
     basis.least_density: where counts tell no jerk, the
     rule has no other fixed point than zero.
     """
-    factor, beside = (Factor.of(samples + unit / x[:, None]) for x in (r, r * np.exp(SLOPE)))
-    determined = basis.M - (factor.log_determinants - beside.log_determinants) / SLOPE
-    squares = (basis.jerk(factor.solve(g)) ** 2).sum(axis=1) * basis.h
-    return np.asarray(
-        np.maximum(squares / np.maximum(determined, 1e-9 * basis.M), basis.least_density)
-    )
+    factor, beside = (Factor.of(samples + unit / x) for x in (r, r * np.exp(SLOPE)))
+    determined = basis.M - (factor.log_determinant - beside.log_determinant) / SLOPE
+    squares = (basis.jerk(factor.solve(g)) ** 2).sum() * basis.h
+    return float(max(squares / max(determined, 1e-9 * basis.M), basis.least_density))
 
 
 def _joined(first: Array, through: Array) -> Array:
@@ -232,6 +234,6 @@ def _joined(first: Array, through: Array) -> Array:
     """
     ends, S = np.empty_like(first), np.zeros((3, 3))
     for w in range(len(first) - 1, -1, -1):
-        ends[w] = S
-        S = first[w] + through[w] @ S @ through[w].T
+        ends[w], T = S, through[w]
+        S = first[w] + T.dot(S).dot(T.T)
     return np.ascontiguousarray(ends.transpose(1, 2, 0))

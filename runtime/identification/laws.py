@@ -1,0 +1,264 @@
+"""Scalars inside the laws of columns, as a record gives them (`runtime.estimators.projection`).
+
+Minima that differ are told. Deviations are joint ones: those of the linear problem with the columns
+[W, (dW/da) X], by blocks of time. Whether a law earns its scalars is asked of blocks of time that
+did not fit it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.estimators.block_covariance import block_covariance
+from runtime.estimators.linear import percent
+from runtime.estimators.projection import LawProblem, Projection, basis
+from runtime.identification.friction_laws import p_value
+from runtime.identification.residuals import correlation_time, residual_correlation
+from runtime.markup import number
+from runtime.model.generated import GeneratedModel
+from runtime.rows.observation import split_rows
+from runtime.rows.prepared import Prepared
+from runtime.table import Table
+
+Array = np.ndarray
+
+SURE = 0.01  # p of the F-test above which a record does not show a law
+LOOSE = 0.5  # deviation of log(a), or share of the bounds, above which a is not determined
+
+
+@dataclass(frozen=True)
+class FittedScalar:
+    """One scalar of a law.
+
+    Attributes
+    ----------
+    name : str
+        Constant of the module.
+    parameter : str
+        The parameter whose law it is in.
+    value, sigma : float
+        Estimate and its deviation, jointly with X.
+    minima : tuple of float
+        Other local minima, the best first.
+    doubt : str
+        Why it is not determined; empty where it is.
+    """
+
+    name: str
+    parameter: str
+    value: float
+    sigma: float
+    minima: tuple[float, ...]
+    doubt: str
+
+
+@dataclass(frozen=True)
+class LawTest:
+    """Whether a law earns its column and scalars.
+
+    Attributes
+    ----------
+    parameter : str
+    value, sigma : float
+        Of the parameter, the deviation jointly with the scalars.
+    p_value : float
+        Of the F-test of law and scalars on all rows.
+    without, with_law : float, %
+        Errors of blocks of time that did not fit, without the law and with it.
+    """
+
+    parameter: str
+    value: float
+    sigma: float
+    p_value: float
+    without: float
+    with_law: float
+
+    @property
+    def earned(self) -> bool:
+        """Whether the record shows the law and it predicts better."""
+        return self.p_value < SURE and self.with_law < self.without
+
+
+@dataclass(frozen=True)
+class FittedLaws:
+    """The scalars of the laws of a model, fitted to records."""
+
+    scalars: tuple[FittedScalar, ...]
+    tests: tuple[LawTest, ...]
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """{scalar: value}."""
+        return {s.name: s.value for s in self.scalars}
+
+    def tables(self) -> list[Table]:
+        """Scalars, and what the laws are worth on unseen data."""
+        said = [
+            (s.name, s.parameter, s.doubt, "")
+            if s.doubt
+            else (
+                s.name,
+                s.parameter,
+                f"{s.value:.4g} ± {s.sigma:.2g}",
+                ", ".join(f"{x:.4g}" for x in s.minima),
+            )
+            for s in self.scalars
+        ]
+        tests = [
+            (
+                *(t.parameter, f"{t.value:.4g} ± {t.sigma:.2g}", f"{t.p_value:.2g}"),
+                *(number(t.without, ".3f"), number(t.with_law, ".3f")),
+                "yes" if t.earned else "no",
+            )
+            for t in self.tests
+        ]
+        return [
+            Table("Scalars of laws", ("scalar", "law of", "value, SI", "other minima"), said),
+            Table(
+                "What the laws are worth",
+                ("law of", "value", "p", "unseen without %", "unseen with %", "earned"),
+                tests,
+            ),
+        ]
+
+    def to_table(self) -> str:
+        """Both tables."""
+        return "\n\n".join(table.to_text() for table in self.tables())
+
+    @property
+    def line(self) -> str:
+        """The scalars in a line."""
+        said = [f"{s.name} {s.doubt or f'{s.value:.4g} ± {s.sigma:.2g}'}" for s in self.scalars]
+        idle = [t.parameter for t in self.tests if not t.earned]
+        worth = f"; not worth their scalars on unseen data: {', '.join(idle)}" if idle else ""
+        return f"Scalars of laws: {', '.join(said)}{worth}"
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"scalars": self.scalars, "tests": self.tests}
+
+
+def fit_laws(
+    model: GeneratedModel,
+    records: Sequence[Prepared],
+    columns: Sequence[str] | None = None,
+    *,
+    weights: bool = False,
+) -> FittedLaws:
+    """The scalars of the laws of a model from records.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        A module with the table FIT.
+    records : sequence of Prepared
+        Joint side, SI.
+    columns : sequence of str, optional
+        Base parameters that are fitted; default: all.
+    weights : bool
+        Rows of each joint divided by the deviation of its residual.
+    """
+    return fitted_laws(LawProblem(model, records, columns or model.BASE_PARAMETERS), weights)
+
+
+def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
+    """The same of rows that are there."""
+    every, scale = np.ones(len(problem.Y), dtype=bool), np.ones(len(problem.Y))
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(problem.scalars):
+        groups.setdefault(str(problem.table[name][2]), []).append(k)
+    members = list(groups.values())
+    projection = Projection(problem, every, scale)
+    if weights:
+        r = projection.residual(problem.start)
+        by_joint = [np.sqrt(np.mean(r[problem.joint == j] ** 2)) for j in np.unique(problem.joint)]
+        scale = np.array(by_joint)[problem.joint]
+        projection = Projection(problem, every, scale)
+    u, cost, others = projection.fitted(members)
+    A, X, sigma = _joint_deviations(problem, u, scale)
+    r = problem.Y - A @ X
+    count = len(r) / correlation_time(residual_correlation(r))
+    b = len(problem.names)
+    even = problem.block % 2 == 0
+    halves = [(rows, _half(problem, rows, scale, members, u)) for rows in (even, ~even)]
+    tests, scalars = [], []
+    for g, (parameter, group) in enumerate(groups.items()):
+        own = sorted({c for k in group for c in problem.varying[k]})
+        rest = [c for c in range(b) if c not in own]
+        squares = _squares(A[:, rest], problem.Y, scale)
+        p = p_value(squares, cost, b - len(own), b + len(group), count)
+        errors = [_unseen(problem, halves, without, scale) for without in (own, [])]
+        c = own[0] if own else 0
+        test = LawTest(parameter, float(X[c]), float(sigma[c]), p, *errors)
+        tests.append(test)
+        for k in group:
+            scalars.append(_scalar(problem, k, u, float(sigma[b + k]), others.get(g, []), test))
+    return FittedLaws(tuple(scalars), tuple(tests))
+
+
+def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
+    """W, X, and deviations of X and u by blocks of time."""
+    A = problem.W.copy()
+    for c in problem.moving:
+        A[:, c] = problem.column(c, u)
+    X = np.linalg.lstsq(A / scale[:, None], problem.Y / scale, rcond=1e-10)[0]
+    S = np.column_stack([problem.slope(k, u, X) for k in range(len(u))])
+    whole = np.column_stack([A, S]) / scale[:, None]
+    residual = (problem.Y - A @ X) / scale
+    T = np.linalg.pinv(np.linalg.qr(whole, mode="r"), rcond=1e-10)
+    blocks = split_rows(np.column_stack([whole, residual]), problem.block)
+    C = block_covariance(blocks, np.zeros(whole.shape[1]), T)
+    return A, X, np.sqrt(np.diag(C))
+
+
+def _half(
+    problem: LawProblem, rows: Array, scale: Array, members: Sequence[Sequence[int]], u: Array
+) -> Array:
+    """The scalars from some rows alone."""
+    return Projection(problem, rows, scale).polished(u)[0]
+
+
+def _squares(A: Array, Y: Array, scale: Array) -> float:
+    Q, y = basis(A / scale[:, None]), Y / scale
+    r = y - Q @ (Q.T @ y)
+    return float(r @ r)
+
+
+def _unseen(
+    problem: LawProblem, halves: Sequence[tuple[Array, Array]], without: Sequence[int], scale: Array
+) -> float:
+    """Error in % of the rows of each half, predicted by the other one, without some columns."""
+    kept = [c for c in range(len(problem.names)) if c not in without]
+    residual = np.zeros(len(problem.Y))
+    for rows, u in halves:
+        A = problem.W.copy()
+        for c in problem.moving:
+            A[:, c] = problem.column(c, u)
+        A = A[:, kept]
+        X = np.linalg.lstsq(A[rows] / scale[rows, None], problem.Y[rows] / scale[rows], rcond=1e-10)
+        residual[~rows] = (problem.Y - A @ X[0])[~rows]
+    return percent(residual, problem.Y)
+
+
+def _scalar(
+    problem: LawProblem, k: int, u: Array, sigma: float, others: Sequence[Array], test: LawTest
+) -> FittedScalar:
+    name, a = problem.scalars[k], float(problem.values(u)[k])
+    width = problem.upper[k] - problem.lower[k]
+    end = min(u[k] - problem.lower[k], problem.upper[k] - u[k]) < 1e-3 * width
+    loose = sigma if problem.log[k] else sigma / width
+    doubt = ""
+    if test.p_value > SURE:
+        doubt = f"not determined: the record does not show the law (p = {test.p_value:.2g})"
+    elif not loose < LOOSE:
+        doubt = "not determined: its deviation is as large as itself"
+    elif end:
+        doubt = f"not determined: it ends at its bound, {a:.3g}"
+    minima = tuple(float(problem.values(o)[k]) for o in others)
+    sigma *= a if problem.log[k] else 1.0
+    return FittedScalar(name, test.parameter, a, sigma, minima, doubt)

@@ -1,0 +1,133 @@
+"""The torque of a controller's law, for records that hold no torque: many legged robots log q, the
+reference and the gains alone.
+
+    tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
+
+P, Vr, Vm of `runtime.settings.controller.Law`, joint side, SI; qd as recorded, else differences
+q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is clipped; kd
+is found with the parameters (`runtime.identification.torque_law`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from runtime.errors import SettingsError
+from runtime.settings.controller import Controller
+from runtime.settings.record import RecordSettings
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueLaw:
+    """The law of n joints.
+
+    Attributes
+    ----------
+    P, Vr, Vm : ndarray, shape (n,)
+        Gains of position, reference velocity and velocity.
+    saturation : ndarray, shape (n,), N m or N
+        Largest torque; inf where none is given.
+    fit : bool
+        Whether kd is to be found.
+    delay : float, s
+        From the logged signals to the torque.
+    """
+
+    P: Array
+    Vr: Array
+    Vm: Array
+    saturation: Array
+    fit: bool = False
+    delay: float = 0.0
+
+    def signals(self, t: Array, own: Mapping[str, Array], rate: float) -> dict[str, Array]:
+        """Signals of a whole record, by name, with the torque of the law and law_v, qd_ref - qd,
+        both late by the delay.
+        """
+        v = own.get("qd_ref", 0.0) - velocity(own["q"], own, rate)
+        made = {"tau": self.torque(own["q"], own, rate), "law_v": v}
+        return {**own, **{key: late(t, x, self.delay) for key, x in made.items()}}
+
+    def torque(
+        self, q: Array, channels: Mapping[str, Array], rate: float, before: Array | None = None
+    ) -> Array:
+        """Torques of the law, shape (N, n), N m or N.
+
+        Parameters
+        ----------
+        q : ndarray, shape (N, n), rad or m
+            Joint positions.
+        channels : mapping
+            q_r; qd, qd_ref and tau_ff where they were recorded, shape (N, n).
+        rate : float, Hz
+            Sampling rate.
+        before : ndarray, shape (n,), optional
+            Positions one sample ahead; default: those of the first sample.
+        """
+        tau = self.P * (channels["q_r"] - q) + channels.get("tau_ff", 0.0)
+        if np.any(self.Vr) or np.any(self.Vm):
+            qd = velocity(q, channels, rate, before) if np.any(self.Vm) else 0.0
+            tau = tau + self.Vr * channels.get("qd_ref", 0.0) - self.Vm * qd
+        return np.asarray(np.clip(tau, -self.saturation, self.saturation))
+
+
+def velocity(
+    q: Array, channels: Mapping[str, Array], rate: float, before: Array | None = None
+) -> Array:
+    """Velocities that the law takes, shape (N, n): as recorded, else differences backward."""
+    if "qd" in channels:
+        return channels["qd"]
+    return np.asarray(np.diff(q, axis=0, prepend=q[:1] if before is None else before[None]) * rate)
+
+
+def late(t: Array, x: Array, delay: float) -> Array:
+    """x, shape (N, n), later by `delay` s, between samples by a cubic spline; ends repeat."""
+    if not delay:
+        return x
+    return np.asarray(CubicSpline(t, x)(np.clip(t - delay, t[0], t[-1])))
+
+
+def require_found(settings: Sequence[RecordSettings], records: Iterable[frozenset[str]]) -> None:
+    """SettingsError where a law is to be found that is not yet; records : names of the channels of
+    each, in which law_v stands until then.
+    """
+    laws = [one.controller.law for one in settings if one.controller is not None]
+    if any("fit" in (law.kd, law.delay) for law in laws) and any("law_v" in x for x in records):
+        raise SettingsError(
+            "fit; identify finds it: say here the number that it gives", path=("controller", "law")
+        )
+
+
+def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:
+    """The law of a controller for n joints with these LIMITS; SettingsError where it has a memory,
+    or is none.
+    """
+    law = (controller or Controller()).law
+    gains = law.gains(n)
+    if np.any(gains["K"]):
+        raise SettingsError(
+            f"{law.ki}; an integral is not in a record, the law of a torque has kp and kd alone",
+            path=("controller", "law", "ki"),
+        )
+    if np.any(law.ca):
+        raise SettingsError(
+            f"{law.ca}; name this feed-forward as record.columns.tau_ff",
+            path=("controller", "law", "ca"),
+        )
+    largest = None if controller is None else controller.torque.largest(limits)
+    bound = np.atleast_1d(np.asarray(np.inf if largest is None else largest, dtype=float))
+    if len(bound) not in (1, n):
+        raise SettingsError(
+            f"{len(bound)} values; expected one or {n}", path=("controller", "torque", "saturation")
+        )
+    saturation = np.broadcast_to(bound, (n,)).copy()
+    fit, delay = law.kd == "fit", 0.0 if law.delay == "fit" else float(law.delay)
+    bound = np.full(n, np.inf) if fit else saturation
+    return TorqueLaw(gains["P"], gains["Vr"], gains["Vm"], bound, fit, delay)

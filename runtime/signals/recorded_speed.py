@@ -1,0 +1,100 @@
+"""Velocities that were recorded beside the positions, with the noise that each of them has.
+
+    qd = v + L (dq/dt - v)          L = 1/(1 + (f/f_c)^2), zero phase
+    2 pi f_c = sigma_v/sigma_q      deviations of the white noise of v and of q
+
+Noise of a difference grows with the frequency, that of v does not: below f_c differences of q are
+quieter, above it v. L is the weight of least variance at every frequency, a Butterworth of first
+order forward and backward.
+
+A drive's velocity may be filtered, late, or in another unit. On the motion itself,
+
+    v = gain dq/dt - lag d2q/dt2 + rest,
+
+and v of a joint is left alone where gain and lag take more than LIMIT.SPEED_DISAGREES of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.settings.study import Signals
+from runtime.signals.cutoff import white_noise
+from runtime.signals.filters import filtered_states, lowpass_filtered, median_filtered
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedAgreement:
+    """Recorded velocities beside differences of the positions, by joint, shape (n,).
+
+    Attributes
+    ----------
+    gain : ndarray
+        Of the differences in the recorded velocity.
+    lag : ndarray, s
+        By which the recorded velocity is late.
+    share : ndarray
+        What gain and lag take, of the rms of the velocity.
+    crossing : ndarray, Hz
+        f_c by the noise of both.
+    """
+
+    gain: Array
+    lag: Array
+    share: Array
+    crossing: Array
+
+    @property
+    def agrees(self) -> Array:
+        """Joints whose recorded velocity is used, bool, shape (n,)."""
+        return np.asarray(self.share <= LIMIT.SPEED_DISAGREES)
+
+
+def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreement:
+    """Of positions q and velocities v, shape (N, n), with the low-pass of the study."""
+    states = filtered_states(q, rate, signals)
+    v_f, low = median_filtered(v, signals.median), signals.lowpass
+    if low is not None:
+        for _ in {*low.on}:
+            v_f = lowpass_filtered(v_f, rate, low)
+    inner = slice(len(q) // 20, len(q) - len(q) // 20)
+    found = np.array(
+        [
+            np.linalg.lstsq(np.column_stack([s, -a]), y, rcond=None)[0]
+            for s, a, y in zip(states.qd[inner].T, states.qdd[inner].T, v_f[inner].T, strict=True)
+        ]
+    )
+    gain, lag = found.T
+    speed, rise = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (states.qd, states.qdd))
+    share = np.hypot(gain - 1, lag * rise / np.where(speed > 0, speed, 1.0))
+    noise_q, noise_v = (np.sqrt(white_noise(x, rate, signals.median)) for x in (q, v))
+    crossing = noise_v / (2 * np.pi * np.where(noise_q > 0, noise_q, np.inf))
+    return SpeedAgreement(gain, lag, np.where(speed > 0, share, np.inf), crossing)
+
+
+def crossings(
+    records: Sequence[tuple[Array, Mapping[str, Array], float]], signals: Signals
+) -> tuple[tuple[float, ...], str]:
+    """signals.velocity of records that are fitted together, Hz by joint, and what it is, in words;
+    half the rate of the slowest record where v of a joint is not used.
+
+    records : positions, channels with qd, and rate of each.
+    """
+    parts = [agreement(q, channels["qd"], rate, signals) for q, channels, rate in records]
+    agrees = np.all([part.agrees for part in parts], axis=0)
+    longest = max(range(len(parts)), key=lambda k: len(records[k][0]))
+    most = min(rate for *_, rate in records) / 2
+    low = most / len(records[longest][0])
+    found = np.where(agrees, np.clip(parts[longest].crossing, low, most), most)
+    hertz = tuple(float(f"{x:.3g}") for x in found)
+    used = ", ".join(f"{x:g}" for x, yes in zip(hertz, agrees, strict=True) if yes)
+    text = f"Recorded velocities take over above {used} Hz" if used else ""
+    off = ", ".join(str(j) for j, yes in enumerate(agrees, 1) if not yes)
+    left = f"recorded velocities of joint {off} disagree with the positions and are not used"
+    return hertz, "; ".join(part for part in (text, left if off else "") if part) + "."

@@ -1,0 +1,78 @@
+"""What functions on request have to give, from the regressor and the energies of Lagrange alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symgen.derive.exact import Array
+from symgen.description.robot import Element, Robot, parameter
+from symgen.regroup.regrouping import Regrouping
+
+if TYPE_CHECKING:
+    from symgen.derive.lagrange import Lagrange
+
+ANGLE_STEP = 1e-2  # rad or m
+SIX_POINTS = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}  # central differences of sixth order
+
+
+States = tuple[Array, Array, Array]
+
+
+def requested_values(
+    model: Lagrange, regrouping: Regrouping, chi: Array, states: States, tree: States, qddr: Array
+) -> dict[str, Callable[[], Array]]:
+    """{model: its values, (N, ...)}.
+
+    states : q, qd, qdd of the actuated joints, (N, n); qdd is qdr too. tree : those of all moving
+    joints. qddr : reference accelerations.
+    """
+    robot, (q, qd, qdr), zero = regrouping.robot, states, 0 * states[0]
+    own = [robot.parameters.index(name) for name in regrouping.own]
+    rubs = of_elements(robot, lambda e: e.is_friction)[own]
+
+    def columns(q: Array, qd: Array, qdd: Array) -> Array:
+        return np.asarray(model.actuated_regressor(q, qd, qdd)[..., own])
+
+    def friction() -> Array:
+        return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
+
+    def slotine_li() -> Array:
+        """A qddr + Q + friction, and C qdr, a difference of squares."""
+        h = [columns(q, u, zero) for u in (qd + qdr, qd, qdr, zero)]
+        C = (h[0] - h[1] - h[2] + h[3]) / 2 * ~rubs
+        return np.asarray(columns(q, zero, qddr) + C + friction())
+
+    def momentum(q: Array) -> Array:
+        return np.asarray(columns(q, zero, qd) - columns(q, zero, zero))
+
+    def momentum_rate() -> Array:
+        """d(qd' p)/dq / 2 - Q - friction."""
+        slope = np.zeros((*q.shape, len(own)))
+        for i, e in enumerate(np.eye(q.shape[1])):
+            for m, c in SIX_POINTS.items():
+                p = [momentum(q + s * m * ANGLE_STEP * e) for s in (1, -1)]
+                slope[:, i] += c / ANGLE_STEP * np.einsum("ti,tik->tk", qd, p[0] - p[1]) / 2
+        return np.asarray(slope - columns(q, zero, zero) - friction())
+
+    def energies() -> Array:
+        kinetic = np.einsum("ti,tik->tk", qd, momentum(q)) / 2
+        units = np.eye(len(chi))[own]
+        potential = [model.potential_energy(tree[0], unit) for unit in units]
+        return np.stack([kinetic, np.stack(potential, axis=-1)], axis=1)
+
+    return {
+        "slotine_li_regressor": slotine_li,
+        "momentum_regressor": lambda: momentum(q),
+        "momentum_rate_regressor": momentum_rate,
+        "energy_regressor": energies,
+        "base_wrench_regressor": lambda: model.base_regressor(*tree),
+    }
+
+
+def of_elements(robot: Robot, which: Callable[[Element], bool]) -> Array:
+    """Whether each standard parameter is one of such elements."""
+    own = {parameter(e.family, j) for e in robot.elements if which(e) for j in e.keys}
+    return np.array([name in own for name in robot.parameters])

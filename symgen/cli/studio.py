@@ -1,0 +1,51 @@
+"""`symgen studio [ROBOT] [RECORD]`: a local page on which one works."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from symgen.cli.session import fail, reported_errors
+
+WATCHED = "from symgen.studio.child import watched; watched(); "
+PROGRAMS = {
+    "symgen": "from symgen.cli.main import main; main()",
+    "check": "from symgen.studio.views import check; check()",
+}
+
+
+def studio(
+    robot: Annotated[
+        str | None, typer.Argument(help="Packaged robot or robot file to begin with.")
+    ] = None,
+    record: Annotated[
+        str | None, typer.Argument(help="Dataset, study file or measured file to begin with.")
+    ] = None,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Work folder: ordinary files; opens again.")
+    ] = Path("symgen-studio"),
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of this machine. Default: a free one.")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
+) -> None:
+    """Serve a page for robot, record, check, solve and results, on this machine alone.
+
+    It ends with Ctrl-C, with the terminal, or ten minutes after its last page was closed.
+    """
+    with reported_errors():
+        try:
+            from symgen.studio.serving import serve
+        except ImportError as e:
+            fail(f"the studio needs {e.name}: pip install symgen[studio]")
+        programs = {
+            name: [sys.executable, "-P", "-c", WATCHED + text] for name, text in PROGRAMS.items()
+        }
+        say = partial(typer.echo, err=True)
+        serve(output, programs, say, robot=robot, record=record, port=port, browser=browser)

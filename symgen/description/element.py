@@ -1,0 +1,251 @@
+"""Elements on the joints: what acts on them besides links, columns of the user's among it.
+
+    along {j: G}:  s = G q,  Gamma += G' c law(s, sd, sdd)
+    form  {j: B}:  Gamma += c B qdd | c B qd | c B q
+
+The laws are the expressions of KINDS, in which q, qd, qdd stand for s, sd, sdd; a column of the
+user's has its own, over s, sd, q1, qd1 ... of any joints, constants and scalars, as a torque or as
+an energy, Gamma += c dU/dq. Forms are for laws that are qdd, qd or q. With `when`, viscous and
+coulomb elements act in motion along s in this direction only. Parameter c is called family + key.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from symgen.description.expression import ZERO, Expression
+from symgen.description.fields import CONFIG, UNWRITTEN, Numeric, Path, Text, Whole, Written
+from symgen.description.grammar import LAWS, parse
+from symgen.description.kinds import KINDS, OWN_LAWS, STATE, USUAL_KINDS
+from symgen.description.parts import DIRECTIONS, Form, Row, form_of, parameter, reduced, rows
+from symgen.errors import DescriptionError, ExpressionError
+
+
+@dataclass(frozen=True, config=CONFIG)
+class LawScalar:
+    """A number inside a law that enters it nonlinearly; fixed where the bounds are equal."""
+
+    bounds: Annotated[
+        tuple[float, float],
+        Written(Annotated[list[Numeric], Field(min_length=2, max_length=2)], lambda x, _: tuple(x)),
+        Field(description="[lower, upper]"),
+    ]
+    start: Annotated[
+        float | None,
+        Written(Numeric | None),
+        Field(description="value before a fit; default: the middle of the bounds"),
+    ] = None
+    grid: Annotated[Whole, Field(description="starts of a fit within the bounds")] = 5
+
+    @property
+    def value(self) -> float:
+        """Its value before a fit."""
+        lower, upper = self.bounds
+        middle = (lower * upper) ** 0.5 if lower > 0 else (lower + upper) / 2
+        return middle if self.start is None else self.start
+
+    @property
+    def fixed(self) -> bool:
+        return self.bounds[0] == self.bounds[1]
+
+
+def _scalars(table: Mapping[str, Any], declared: Any) -> dict[str, LawScalar]:
+    """A number alone is fixed."""
+    return {
+        name: x if isinstance(x, LawScalar) else LawScalar((float(x), float(x)))
+        for name, x in table.items()
+    }
+
+
+def _law(text: str | None, declared: Any) -> Expression | None:
+    """The law of a column; `checks` refuses the names that it may not have."""
+    try:
+        return None if text is None else parse(text, None, LAWS)
+    except ExpressionError as error:
+        raise DescriptionError(str(error)) from error
+
+
+def _scalar(name: str, given: Any) -> LawScalar:
+    """A scalar of KINDS."""
+    if not isinstance(given, Mapping):
+        return LawScalar((float(given), float(given)))
+    lower, upper = map(float, given["bounds"])
+    return LawScalar((lower, upper), given["start"])
+
+
+@dataclass(frozen=True, config=CONFIG)
+class Element:
+    """Inertia, friction, offset, spring, or a column of the user's on the joint coordinates."""
+
+    family: Annotated[str, *UNWRITTEN]
+    kind: Annotated[
+        str,
+        Field(
+            default="column",
+            description=f"one of {', '.join(KINDS)}; of columns: default column",
+            json_schema_extra={"enum": list(KINDS)},
+        ),
+    ]
+    along: Annotated[
+        Mapping[int, Row],
+        Written(Literal["all"] | Whole | list[Whole] | dict[Whole, Text], rows),
+        Field(
+            default={},
+            description=(
+                "{6: q5 + q6} (6, a frame, numbers the parameter), joints 2 or [2, 3], or all: "
+                "every actuated joint"
+            ),
+        ),
+    ]
+    form: Annotated[
+        Mapping[int, Form],
+        Written(dict[Whole, Text], partial(reduced, form_of)),
+        Field(default={}, description="quadratic forms: {6: q6**2 + 2*q5*q6}"),
+    ]
+    when: Annotated[
+        str | None,
+        Field(
+            description="direction of motion: positive or negative",
+            json_schema_extra={"enum": [*DIRECTIONS, None]},
+        ),
+    ] = None
+    torque: Annotated[
+        Expression | None,
+        Written(Text | None, _law),
+        Field(description="law of a column: tanh(qd/vs), q2*cos(q); q, qd are those along it"),
+    ] = None
+    energy: Annotated[
+        Expression | None,
+        Written(Text | None, _law),
+        Field(description="its energy in the place of a torque: (q - qs)**2/2"),
+    ] = None
+    unit: Annotated[str, Field(description="of the parameter of a column: N*m")] = ""
+    fit: Annotated[
+        Mapping[str, LawScalar],
+        Written(dict[str, Numeric | LawScalar], _scalars),
+        Field(description="scalars of the law: {vs: {bounds: [0.01, 1]}}; a number is fixed"),
+    ] = Field(default={})
+
+    @property
+    def scalars(self) -> dict[str, LawScalar]:
+        """LawScalars of its law: those of the kind, and those of the file in their place."""
+        kind = KINDS.get(self.kind)
+        return {name: _scalar(name, x) for name, x in (kind.fit if kind else {}).items()} | {
+            **self.fit
+        }
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """Names and values of its scalars that are fitted: one of each key, vs3."""
+        free = {name: x for name, x in self.scalars.items() if not x.fixed}
+        return {parameter(name, j): x.value for name, x in free.items() for j in self.keys}
+
+    def _of_key(self, law: Expression, j: int) -> Expression:
+        """A law with the scalars of a key: symbols, and numbers where they are fixed."""
+        return law.substitute(
+            {
+                name: Expression.number(repr(x.value))
+                if x.fixed
+                else Expression.symbol(parameter(name, j))
+                for name, x in self.scalars.items()
+            }
+        )
+
+    def law(self, j: int) -> Expression:
+        """Torque along s of key j for parameter 1; zero where it is that of an energy."""
+        return self._of_key(self.torque or KINDS[self.kind].torque, j)
+
+    def potential(self, j: int) -> Expression:
+        """Energy of key j for parameter 1; zero where the file gives a torque."""
+        return self._of_key(self.energy or ZERO, j)
+
+    def laws(self, j: int) -> tuple[Expression, dict[int, Expression]]:
+        """Torque of key j along s for parameter 1, and of its energy at the joints that it names:
+        Gamma = G' x + dU/dq_i.
+        """
+        law, U = self.law(j), self.potential(j)
+        joints = sorted(int(match[2]) for n in U.symbols if (match := STATE.match(n)) and match[2])
+        return law + U.derivative("q"), {i: U.derivative(f"q{i}") for i in joints}
+
+    @property
+    def is_own(self) -> bool:
+        """Whether its law is one beyond inertia, linear friction, offset and spring."""
+        return (
+            bool(self.torque or self.energy or self.scalars)
+            or self.kind not in USUAL_KINDS.values()
+        )
+
+    @property
+    def acts_as(self) -> str:
+        """Its kind in emitted modules, which know of other laws only whether they dissipate."""
+        return OWN_LAWS[KINDS[self.kind].dissipative] if self.is_own else self.kind
+
+    @property
+    def symbols(self) -> set[str]:
+        """Symbols of its law or energy."""
+        return set().union(*((self.law(j) + self.potential(j)).symbols for j in self.keys))
+
+    @property
+    def is_friction(self) -> bool:
+        """Whether its torque is one of velocities."""
+        return any((match := STATE.match(name)) and match[1] == "qd" for name in self.symbols)
+
+    @property
+    def keys(self) -> tuple[int, ...]:
+        """Keys of both tables in order."""
+        return tuple(sorted({*self.along, *self.form}))
+
+
+def check_law(e: Element, robot: Any) -> None:
+    """The names of a law, its scalars, and that it is finite at rest and in motion."""
+    where: Path = ("elements", e.family)
+    states = [f"{state}{j}" for state in ("q", "qd") for j in ("", *robot.moving)]
+    for name, x in e.scalars.items():
+        lower, upper = x.bounds
+        if not lower <= x.value <= upper or not 1 <= x.grid <= 50:
+            raise DescriptionError(
+                f"{e.family}: fit.{name}: start {x.value:g}, bounds [{lower:g}, {upper:g}], grid "
+                f"{x.grid}; expected the start within the bounds and 1 to 50 starts",
+                path=(*where, "fit", name),
+            )
+    law = e.energy if e.energy is not None else e.torque
+    key = "energy" if e.energy is not None else "torque"
+    if law is None:
+        law = KINDS[e.kind].torque
+    for name in e.scalars:
+        if name not in law.symbols or name in states:
+            raise DescriptionError(
+                f"{e.family}: fit.{name} is no scalar of {law}", path=(*where, "fit", name)
+            )
+    declared = [*states, *e.scalars, *robot.constants]
+    if e.energy is not None:
+        declared = [name for name in declared if not name.startswith("qd")]
+    if unknown := sorted(law.symbols - {*declared}):
+        raise DescriptionError(
+            f"{e.family}: {key}: {unknown[0]!r} is unknown there; expected q, qd, q1, qd1 ... of "
+            f"the joints{' (an energy: positions only)' * bool(e.energy)}, scalars of `fit`, "
+            f"constants ({', '.join(robot.constants) or 'none'})",
+            path=(*where, key),
+        )
+    for j in e.along:
+        for speed in (0.0, 1.0):
+            reason = ""
+            values = {name: speed if name.startswith("qd") else 0.7 for name in states}
+            try:
+                along, others = e.laws(j)
+                torque = [f.value({**values, **robot.constants}) for f in (along, *others.values())]
+                finite = all(map(math.isfinite, torque))
+            except (ArithmeticError, ValueError) as error:
+                finite, reason = False, f" ({error})"
+            if not finite:
+                raise DescriptionError(
+                    f"{e.family}: {law} is not finite at q = 0.7, qd = {speed:g} with the "
+                    f"constants of the file; a law is finite at rest and in motion{reason}",
+                    path=(*where, key),
+                )

@@ -1,0 +1,173 @@
+"""Why a standard parameter stands in a base parameter, and what an edit of the robot file does to
+the base parameters.
+
+The regressor columns of the standard parameters are combinations of those of the base,
+Gamma = sum_k D_k chi_k = sum_b D_b X_b, hence
+
+    D_k = sum_b K[b, k] D_b ,
+
+K[b, k] the coefficient of chi_k in the formula of X_b: YY2 is subtracted in XX2R because the
+columns of YY2 and XX2R are opposite. Which rule gave the relation is told by the step that moved
+the parameter: a general one (`rules`), or one of this robot alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from symgen.derive.columns import inertial_names
+from symgen.description.expression import ONE
+from symgen.description.fields import Path, dotted
+from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
+from symgen.description.yaml import flow, tables_of
+from symgen.regroup.formula import Formula
+from symgen.regroup.regrouping import Regrouping
+from symgen.regroup.rules import Transfer
+
+OF_REVOLUTE = {  # family: the relation of `rules`, in words
+    "YY": "link {j} turns about z{j} against {i}: equal XX{j} and YY{j} act as inertia of {i}",
+    "MZ": "z{j} is fixed in {i}: first moment along z{j} acts as first moment and inertia of {i}",
+    "M": "the origin of frame {j} is fixed in {i}: mass there acts as mass of {i}",
+}
+WITHOUT_EFFECT = ("symgen", "name", "title", "source", "drives", "limits", "values", "labels")
+
+
+@dataclass(frozen=True)
+class Absorption:
+    """Why a standard parameter stands in the formula of a base parameter.
+
+    Attributes
+    ----------
+    name : str
+        The standard parameter.
+    base : tuple of str
+        Base parameters that take it in.
+    columns : str
+        Its regressor column by those of the base, such as "the columns of YY2 and XX2R are
+        opposite".
+    rule : str
+        The relation that moved it, in words.
+    """
+
+    name: str
+    base: tuple[str, ...]
+    columns: str
+    rule: str
+
+
+@dataclass(frozen=True)
+class BaseDifference:
+    """What an edit of a robot does to its base parameters.
+
+    Attributes
+    ----------
+    edits : tuple of str
+        Keys of the robot file with their values before and after.
+    appeared, gone : tuple of str
+        Base parameters of one robot alone, by the standard parameter that they are called after.
+    changed : tuple of (str, str)
+        Formulas before and after of those of both, `XX2R = XX2 - YY2`.
+    """
+
+    edits: tuple[str, ...]
+    appeared: tuple[str, ...]
+    gone: tuple[str, ...]
+    changed: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        effects = [
+            *(
+                f"{', '.join(names)} {verb}{'s' * (len(names) == 1)}"
+                for verb, names in (("appear", self.appeared), ("disappear", self.gone))
+                if names
+            ),
+            *(f"{after} (was {before})" for before, after in self.changed),
+        ]
+        edits = ", ".join(self.edits) or "no edit that matters"
+        return f"{edits}: {'; '.join(effects) or 'the base parameters stay'}"
+
+
+def absorptions(regrouping: Regrouping) -> tuple[Absorption, ...]:
+    """Of every standard parameter that a base parameter takes in, where and why, in the order of
+    eq. (4).
+    """
+    own, particular = set(regrouping.own), set(Transfer(regrouping.robot).remaining)
+    into = {
+        name: {b.name: b.combination[name] for b in regrouping.base if name in b.combination}
+        for name in regrouping.robot.parameters
+        if name not in own
+    }
+    return tuple(
+        Absorption(
+            name,
+            tuple(into[name]),
+            _columns(name, into[name]),
+            f"a relation of this robot, {regrouping.method}"
+            if name in particular
+            else _rule(regrouping.robot, name),
+        )
+        for name in into
+        if into[name]
+    )
+
+
+def _columns(name: str, image: Mapping[str, Any]) -> str:
+    first, *others = image
+    if not others and image[first] in (ONE, -ONE):
+        what = "equal" if image[first] == ONE else "opposite"
+        return f"the columns of {name} and {first} are {what}"
+    by_column = {f"D_{base}": c for base, c in image.items()}
+    return f"of the columns, D_{name} = {Formula(by_column)}"
+
+
+def _rule(robot: Robot, name: str) -> str:
+    """The general relation that moved a parameter of a link."""
+    family, j = inertial_names(robot)[name]
+    frame = robot.frame(j)
+    i = f"link {frame.ant}" if frame.ant else "the base"
+    if frame.sigma == REVOLUTE:
+        return OF_REVOLUTE[family].format(i=i, j=j)
+    if frame.sigma == PRISMATIC:
+        return f"link {j} does not turn against {i}: its inertia tensor acts as inertia of {i}"
+    return f"frame {j} is fixed in {i}: its link is part of {i}"
+
+
+def base_difference(before: Regrouping, after: Regrouping) -> BaseDifference:
+    """What leads from one robot to another, and what becomes of the base parameters by it.
+
+    `str` of it is one line: alpha of frame 2: 0 -> pi/2: MX1R appears; ...
+    """
+    old, new = ({b.own: b for b in r.base} for r in (before, after))
+    texts = [
+        {own: own if b.name == own else f"{b.name} = {b.formula}" for own, b in base.items()}
+        for base in (old, new)
+    ]
+    return BaseDifference(
+        tuple(_edits(before.robot, after.robot)),
+        tuple(b.name for own, b in new.items() if own not in old),
+        tuple(b.name for own, b in old.items() if own not in new),
+        tuple(
+            (texts[0][own], texts[1][own])
+            for own in old
+            if own in new and texts[0][own] != texts[1][own]
+        ),
+    )
+
+
+def _edits(before: Robot, after: Robot) -> Iterator[str]:
+    old, new = (_leaves(tables_of(robot)) for robot in (before, after))
+    for path in {**old, **new}:
+        if old.get(path) != new.get(path) and path[0] not in WITHOUT_EFFECT:
+            of_frame = path[0] == "frames" and len(path) == 3
+            place = f"{path[2]} of frame {path[1]}" if of_frame else dotted(path)
+            yield f"{place}: {old.get(path, 'none')} -> {new.get(path, 'none')}"
+
+
+def _leaves(table: Any, path: Path = ()) -> dict[Path, str]:
+    """Text of each value by the keys that lead to it."""
+    if not isinstance(table, Mapping):
+        return {path: flow(table)}
+    parts = [_leaves(value, (*path, key)) for key, value in table.items()]
+    return {at: text for part in parts for at, text in part.items()}

@@ -1,0 +1,208 @@
+"""The work folder of the studio: ordinary files under names of our own, so that none comes from the
+browser.
+
+    robot.urdf, .xml, .par    the user's own file
+    robot.yaml                the table of frames, once it has been edited; it then is the robot
+    robot.draft.yaml          an edit that describes no robot yet
+    record.csv, validation.csv, ...    measured files
+    study.yaml                what the record means, and how it is evaluated
+    proof.json, check.json    the certificate and the findings
+    study-NN-name.yaml, runs/NN-name/    settings and results of one command
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from runtime.errors import InputError
+from runtime.records.formats.table import KINDS, is_measured
+from runtime.records.named import study_of
+from runtime.result_files import write_all
+from runtime.settings.files import study_from_text
+from runtime.settings.location import located, study_text
+from runtime.settings.study import to_mapping
+from runtime.settings.yaml import yaml_text, yaml_values
+from symgen.description import packaged_robots
+from symgen.description.files import content_of
+
+ROBOT_ENDINGS = (".yaml", ".urdf", ".xml", ".par")  # the first one that is there is the robot
+OTHER_ENDINGS = {".yml": ".yaml", ".mjcf": ".xml"}
+DRAFT = "robot.draft.yaml"
+RESULT_FILES = ("estimate.json", "cestac.json", "advice.json")  # of a run that is complete
+
+
+class WorkFolder:
+    """Files of one robot, its records and results.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is missing; what it holds is opened again.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder.resolve()
+        (self.path / "runs").mkdir(parents=True, exist_ok=True)
+        killed = [run for run in (self.path / "runs").iterdir() if not result_of(run)]
+        for left in (*killed, *self.path.glob("*.part"), self.path / ".tmp"):
+            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(True)
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """One file of ours, whole or not at all."""
+        write_all(self.path, {name: content})
+
+    def read(self, name: str) -> str:
+        """Text of a file of ours; "" where there is none."""
+        path = self.path / name
+        return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+    @property
+    def robot(self) -> Path | None:
+        """The robot file that commands take."""
+        return self.first(ROBOT_ENDINGS)
+
+    def first(self, endings: tuple[str, ...]) -> Path | None:
+        """The robot file with the first of these endings: of TREES, the user's own."""
+        found = (self.path / f"robot{ending}" for ending in endings)
+        return next((path for path in found if path.is_file()), None)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the robot file, or of its draft; "" without robot."""
+        path = self.path / DRAFT if self.read(DRAFT) else self.robot
+        return sha256(path.read_bytes()).hexdigest() if path else ""
+
+    def take_robot(self, name: str, content: bytes) -> None:
+        """A file that was dropped becomes the robot; results and record stay."""
+        ending = Path(name).suffix.lower()
+        ending = OTHER_ENDINGS.get(ending, ending)
+        if ending not in ROBOT_ENDINGS:
+            raise InputError(
+                f"{name[:80]}: expected a robot file that ends in {', '.join(ROBOT_ENDINGS)}"
+            )
+        for other in (DRAFT, *(f"robot{ending}" for ending in ROBOT_ENDINGS)):
+            (self.path / other).unlink(missing_ok=True)
+        self.write(f"robot{ending}", content)
+
+    def take_robot_of(self, source: str) -> None:
+        """A packaged robot, or the path of the command line."""
+        packaged = files("symgen.description") / "robots" / f"{source}.yaml"
+        if source in packaged_robots():
+            self.take_robot("robot.yaml", packaged.read_bytes())
+        else:
+            self.take_robot(source, content_of(Path(source)))
+
+    def edit_robot(self, text: str, *, draft: bool) -> None:
+        """A text of the table: a draft where it describes no robot, else the robot file."""
+        self.write(DRAFT if draft else "robot.yaml", text)
+        if not draft:
+            (self.path / DRAFT).unlink(missing_ok=True)
+
+    def measured(self, kind: str) -> Path | None:
+        """The file of the record, or of its validation."""
+        return next((p for p in sorted(self.path.glob(f"{kind}.*")) if is_measured(p)), None)
+
+    def measured_name(self, kind: str, name: str) -> str:
+        """Name here of a measured file that is called `name` by its owner."""
+        ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*KINDS, ".gz"))
+        if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in KINDS:
+            raise InputError(f"{name[:80]}: expected a measured file: {', '.join(KINDS)}, or .gz")
+        return kind + ending
+
+    def take_measured(self, kind: str, name: str, part: Path) -> None:
+        """A file that has arrived becomes the record or the validation; a record has a new
+        study.
+        """
+        target = self.path / self.measured_name(kind, name)
+        if (old := self.measured(kind)) is not None:
+            old.unlink()
+        part.replace(target)
+        if kind == "record":
+            (self.path / "study.yaml").unlink(missing_ok=True)
+
+    def take_record_of(self, source: str) -> None:
+        """A dataset, a study file or a measured file of the command line."""
+        study, base = study_of(source)
+        if is_measured(Path(source)) and Path(source).is_file():
+            part = self.path / "command.part"
+            shutil.copyfile(source, part)
+            self.take_measured("record", source, part)
+        else:
+            self.write("study.yaml", study_text(located(study, base.resolve()), self.path))
+
+    def study(self) -> dict[str, Any]:
+        """The plain values of study.yaml, {} where it holds none; InputError where it is no
+        YAML.
+        """
+        values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
+        return values if isinstance(values, dict) else {}
+
+    def save_study(self, given: Any, name: str = "study.yaml") -> None:
+        """A study by its text or its values, checked; InputError where it is none, or names a file
+        of another folder that study.yaml did not name before.
+        """
+        text = given if isinstance(given, str) else yaml_text(given)
+        study = to_mapping(study_from_text(text, file="study.yaml"))
+        outside = {file for file in files_named(study) if Path(file).name != file}
+        if alien := sorted(outside - {*files_named(self.study())}):
+            raise InputError(
+                f"{', '.join(alien)[:200]}: a study of the studio names files of its work folder; "
+                "drop the file on the page, or name it on the command line"
+            )
+        self.write(name, text)
+
+    def results(self) -> list[Path]:
+        """Folders of complete results, in their order."""
+        return sorted(path for path in (self.path / "runs").iterdir() if result_of(path))
+
+    def run(self, name: str) -> Path:
+        """The folder of that run; InputError where there is none."""
+        found = {path.name: path for path in self.results()}
+        if name not in found:
+            raise InputError("no such run; reload the page")
+        return found[name]
+
+
+def result_of(run: Path) -> str:
+    """Name of the result of a run; "" where it has not ended with one."""
+    return next((name for name in RESULT_FILES if (run / name).is_file()), "")
+
+
+def json_of(path: Path) -> dict[str, Any]:
+    """A mapping that was written as JSON; empty where there is none."""
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}
+
+
+def files_named(settings: Any, key: str = "") -> list[str]:
+    """Measured files that the settings of a study name, whatever their section."""
+    if isinstance(settings, str):
+        return [settings] if key in ("files", "also", "file") else []
+    parts = settings.items() if isinstance(settings, dict) else ()
+    items = [(key, x) for x in settings] if isinstance(settings, list | tuple) else parts
+    return [file for inner, x in items for file in files_named(x, inner)]
+
+
+def run_of(path: Path) -> dict[str, Any]:
+    """What pages say of one run."""
+    kind = result_of(path)
+    data = json_of(path / kind)
+    parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]
+    unseen = [p.get("relative_error") or 0.0 for p in parts if not p.get("fitted")]
+    return {
+        "name": path.name,
+        "kind": kind.removesuffix(".json"),
+        "method": data.get("method", "resolution"),
+        "error": data.get("relative_error"),
+        "unseen": max(unseen, default=None),
+        "checklist": data.get("checklist") or {},
+        "verdict": data.get("verdict", data.get("message", "")),
+        "files": sorted(p.name for p in path.iterdir() if p.is_file() and p.name[0] != "."),
+    }

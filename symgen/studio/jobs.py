@@ -1,0 +1,197 @@
+"""Commands of `symgen` in processes of their own, one at a time, the others in a queue.
+
+A command that is cancelled, or whose server ends, leaves no process and no file: its process group
+is interrupted, then killed; its folder of results goes unless it is complete.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shlex
+import shutil
+import signal
+import time
+from asyncio.subprocess import PIPE
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from runtime.blas import BLAS_THREADS
+from symgen.studio.folder import result_of
+
+GRACE = 3.0  # s, between the interrupt and the kill
+OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
+MOST_COMMANDS = 40  # commands in the queue
+WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
+
+
+@dataclass
+class Job:
+    """One command.
+
+    Attributes
+    ----------
+    number : int
+    title : str
+        What it does, for the eye.
+    words : tuple of str
+        The command line.
+    key : str
+        Of commands of one key only the last counts.
+    run : str
+        Name of its folder of results; "" without.
+    state : str
+        waiting, running, done, failed or cancelled.
+    code : int or None
+        Its exit code.
+    progress, output : str
+        What it said on the error stream, and what it printed.
+    started : float
+        When it was started.
+    """
+
+    number: int
+    title: str
+    words: tuple[str, ...]
+    key: str = ""
+    run: str = ""
+    state: str = WAITING
+    code: int | None = None
+    progress: str = ""
+    output: str = ""
+    started: float = 0.0
+    process: Any = None
+
+    @property
+    def command(self) -> str:
+        """The command line as a terminal takes it."""
+        return shlex.join(self.words)
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since it was started; 0 where it does not run."""
+        return time.monotonic() - self.started if self.state == RUNNING else 0.0
+
+    @property
+    def open(self) -> bool:
+        """Whether it waits or runs."""
+        return self.state in (WAITING, RUNNING)
+
+    @property
+    def last(self) -> str:
+        """Its last words."""
+        lines = self.progress.strip().split("\n")
+        errors = [line for line in lines if line.startswith("error: ")]
+        return (errors or lines)[-1].removeprefix("error: ") or f"exit code {self.code}"
+
+    def signal(self, number: signal.Signals) -> None:
+        """A signal to its process and those that it has started, where they are."""
+        if self.process is not None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.process.pid, number)
+
+
+class Jobs:
+    """The queue.
+
+    Parameters
+    ----------
+    folder : Path
+        Where commands run.
+    programs : mapping of str to list of str
+        What the first word of a command stands for.
+    changed : callable
+        Called without arguments whenever something has changed.
+    """
+
+    def __init__(
+        self, folder: Path, programs: Mapping[str, list[str]], changed: Callable[[], None]
+    ) -> None:
+        self.folder, self.programs, self.changed = folder, programs, changed
+        self.all: list[Job] = []
+        self.wake = asyncio.Event()
+
+    def add(self, title: str, words: Sequence[str], *, key: str = "", run: str = "") -> None:
+        """Queue a command; one with the same `key` gives way to it."""
+        for job in self.all:
+            if key and job.key == key:
+                self.cancel(job)
+        if sum(job.open for job in self.all) >= MOST_COMMANDS:
+            raise ValueError(
+                f"{MOST_COMMANDS} commands wait already; cancel some, or wait for them"
+            )
+        number = self.all[-1].number + 1 if self.all else 1
+        self.all.append(Job(number, title, tuple(words), key, run))
+        self.wake.set()
+        self.changed()
+
+    def last(self, key: str) -> Job | None:
+        """The last command of a key."""
+        return next((job for job in reversed(self.all) if job.key == key), None)
+
+    def cancel(self, job: Job) -> None:
+        """Take it out of the queue, or end its process."""
+        if job.open:
+            job.state = CANCELLED
+            job.signal(signal.SIGINT)
+            asyncio.get_running_loop().call_later(GRACE, job.signal, signal.SIGKILL)
+            self.changed()
+
+    async def work(self) -> None:
+        """Run what is queued, for ever; cancelled, it ends the process that runs."""
+        while True:
+            job = next((j for j in self.all if j.state == WAITING), None)
+            if job is None:
+                self.wake.clear()
+                await self.wake.wait()
+                continue
+            try:
+                await self._run(job)
+            finally:
+                job.signal(signal.SIGKILL)
+                job.process = None
+                self._tidy(job)
+
+    async def _run(self, job: Job) -> None:
+        temporary = self.folder / ".tmp"
+        temporary.mkdir(exist_ok=True)
+        job.started, job.state = time.monotonic(), RUNNING
+        self.changed()
+        job.process = process = await asyncio.create_subprocess_exec(
+            *self.programs[job.words[0]],
+            *job.words[1:],
+            cwd=self.folder,
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=PIPE,
+            env={**os.environ, **dict.fromkeys(BLAS_THREADS, "1"), "TMPDIR": str(temporary)},
+            start_new_session=True,
+        )
+        if job.state == CANCELLED:  # while it was started
+            job.signal(signal.SIGKILL)
+        streams = {"output": process.stdout, "progress": process.stderr}
+        await asyncio.gather(*(self._listen(job, *stream) for stream in streams.items()))
+        job.code = await process.wait()
+        if job.state == RUNNING:
+            job.state = DONE if job.code in (0, 1) else FAILED
+
+    async def _listen(self, job: Job, name: str, stream: Any) -> None:
+        """Keep the end of what a process says."""
+        while part := await stream.read(2**16):
+            setattr(
+                job, name, (getattr(job, name) + part.decode("utf-8", "replace"))[-OUTPUT_KEPT:]
+            )
+            self.changed()
+
+    def _tidy(self, job: Job) -> None:
+        """Nothing is left of a command but its result."""
+        shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
+        run = self.folder / "runs" / job.run
+        if job.run and not (job.state == DONE and result_of(run)):
+            shutil.rmtree(run, ignore_errors=True)
+            (self.folder / f"study-{job.run}.yaml").unlink(missing_ok=True)
+            job.state = FAILED if job.state == DONE else job.state
+        self.changed()

@@ -1,0 +1,315 @@
+"""Handlers of the studio: Robot, Record, Check, Solve, Results. Each changes files of the work
+folder, or asks for a command, and answers with a page or a part of one
+(pip install symgen[studio]).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+
+from runtime.errors import InputError
+from symgen.derive.models import SYMBOLIC
+from symgen.description import packaged_robots
+from symgen.description.files import TREES, content_of
+from symgen.description.new import skeleton
+from symgen.emit.targets import TARGETS
+from symgen.errors import SymgenError
+from symgen.studio import table, views
+from symgen.studio.folder import DRAFT, json_of, run_of
+from symgen.studio.server import Server, page
+
+PAGE_STEPS = ("robot", "record", "check", "solve", "results")
+PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
+SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
+SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
+VIEWS = ("formulas", "model", "module", "preview", "series")
+MOST_FIELDS = 100  # of a form
+Handler = Callable[[Any], Awaitable[Any]]
+ESTIMATORS = {
+    "ols": "least squares, as the chapter",
+    "wls": "weighted by joint",
+    "irls": "weighted, outliers count less",
+    "tls": "errors in the regressor too",
+    "iv": "instrumental variables, needs the controller",
+    "didim": "simulated closed loop, torques; needs the controller",
+    "cloe": "simulated closed loop, positions; needs the controller",
+    "feasible": "masses and inertias that bodies can have",
+}
+
+
+class Pages:
+    """The handlers of one server: those of GET answer, those of POST change something and name the
+    part of a page that shows it, "" for all of it.
+    """
+
+    def __init__(self, server: Server) -> None:
+        self.server, self.folder, self.jobs = server, server.folder, server.jobs
+
+    def routes(self) -> list[Route]:
+        """Those under /do/ take POST alone."""
+        gets = {
+            "/{name}": self._show,
+            "/view/{name}": self._view,
+            "/file/{name}": self._file,
+            "/runs/{run}/{name}": self._file,
+            "/do/upload": self._upload,
+        }
+        acts: tuple[Handler, ...] = (
+            self._packaged,
+            self._edit,
+            self._prove,
+            self._study,
+            self._check,
+        )
+        acts += (self._solve, self._resolve, self._cancel, self._apply)
+        posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
+        return [
+            Route(path, answering(handler), methods=["POST" if "/do/" in path else "GET"])
+            for path, handler in (gets | posts).items()
+        ]
+
+    def _posted(self, act: Handler) -> Handler:
+        async def posted(request: Request) -> Response:
+            body = (await request.body()).decode("utf-8", "replace")
+            fields = parse_qsl(body, keep_blank_values=True, max_num_fields=MOST_FIELDS)
+            return await self._changed(await act(dict(fields)))
+
+        return posted
+
+    async def _changed(self, name: str) -> Response:
+        self.server.changed()
+        if name:
+            return await self._part(name)
+        self.server.before = ""
+        return PlainTextResponse("taken", headers={"hx-refresh": "true"})
+
+    async def _show(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in (*PAGE_STEPS, *PAGE_PARTS):
+            raise InputError("no such page")
+        return await self._part(name, request.query_params.get("run"))
+
+    async def _part(self, name: str, asked: str | None = None) -> Response:
+        """A template with all that pages show, but for what `_view` derives."""
+        folder, shown = self.folder, await self.server.robot()
+        runs = [run_of(run) for run in folder.results()]
+        record, validation = folder.measured("record"), folder.measured("validation")
+        findings = json_of(folder.path / "check.json")
+        own = folder.first(TREES)
+        now = views.digest_of(folder.robot or Path(), folder.path / "study.yaml")
+        cells, values, wrong = None, {}, ""
+        try:
+            cells, values = table.cells_of(shown.get("text", "")), folder.study()
+        except InputError as e:
+            wrong = str(e)
+        return page(
+            name,
+            steps=PAGE_STEPS,
+            shown=shown,
+            place=".".join(shown.get("path", [])[:3]),
+            cells=cells if shown.get("text") else None,
+            columns=table.TABLE_COLUMNS,
+            units=table.UNITS_OF_CELLS,
+            left_out=self.server.left_out,
+            digest=folder.digest,
+            file=folder.robot.name if folder.robot else "",
+            packaged=packaged_robots(),
+            models=sorted(SYMBOLIC),
+            targets=list(TARGETS),
+            proof=self._proof(),
+            record=record.name if record else "",
+            validation=validation.name if validation else "",
+            study=folder.read("study.yaml"),
+            values=values,
+            wrong=wrong,
+            findings=findings,
+            stale=findings.get("of") != now,
+            checked=self.jobs.last("check"),
+            methods=ESTIMATORS,
+            jobs=self.jobs.all,
+            runs=runs,
+            run=next((r for r in runs if r["name"] == asked), runs[-1] if runs else None),
+            own=own.name if own else "",
+            applied=self.jobs.last("apply"),
+        )
+
+    def _proof(self) -> dict[str, Any]:
+        """The certificate and its state: none, stale, running, failed, valid, invalid or draft."""
+        claim, job = json_of(self.folder.path / "proof.json"), self.jobs.last("proof")
+        state = "valid" if claim.get("valid") else "invalid"
+        if claim.get("source_sha256") != self.folder.digest:
+            state = "stale" if claim else "none"
+            if job is not None and (job.open or job.state == "failed"):
+                state = "running" if job.open else "failed"
+        draft = bool(self.folder.read(DRAFT))
+        return {**claim, "state": "draft" if draft else state, "error": job.last if job else ""}
+
+    def _source(self) -> Path:
+        if self.folder.robot is None or self.folder.read(DRAFT):
+            raise InputError("the table describes no robot yet")
+        return self.folder.robot
+
+    async def _view(self, request: Request) -> Response:
+        """What is derived from robot, record or run, as a part of a page or as JSON."""
+        name, asked = request.path_params["name"], dict(request.query_params)
+        path: Path | None = self.folder.measured("record") if name == "preview" else self._source()
+        if name not in VIEWS or path is None:
+            raise InputError("no such view")
+        given: Any = self.server.before if name == "formulas" else asked
+        if name == "series":
+            given = {"run": str(self.folder.run(asked.get("run", "")))}
+        value = await self.server.view(getattr(views, name), str(path), given)
+        if name in ("preview", "series"):
+            return JSONResponse(value)
+        return page(name, value=value, asked=asked, file=path.name)
+
+    async def _file(self, request: Request) -> Response:
+        """A file of ours, or one of a run; its pages in a sandbox of their own."""
+        name, run = request.path_params["name"], request.path_params.get("run")
+        folder, robot = self.folder, self.folder.robot or Path()
+        own = [folder.path / "study.yaml", *folder.path.glob("applied.*"), robot]
+        places = folder.run(run).iterdir() if run else own
+        path = next((p for p in places if p.name == name and p.is_file()), None)
+        if path is None:
+            raise InputError("no such file")
+        kind = SHOWN_FILES.get(path.suffix) if run and "keep" not in request.query_params else None
+        keep = attached(f"{(await self.server.robot()).get('name')}_{path.name}")
+        headers = {"content-security-policy": SANDBOX} | ({} if kind else keep)
+        return FileResponse(path, media_type=kind or "application/octet-stream", headers=headers)
+
+    async def _upload(self, request: Request) -> Response:
+        """A file as the body, its kind and the name that its owner gave it in the address."""
+        kind, name = (request.query_params.get(key, "") for key in ("kind", "name"))
+        if kind not in ("robot", "record", "validation"):
+            raise InputError("expected a robot, a record or a validation record")
+        if kind != "robot":
+            self.folder.measured_name(kind, name)
+        part = self.folder.path / f"{secrets.token_hex(8)}.part"
+        try:
+            with part.open("xb") as file:
+                async for piece in request.stream():
+                    file.write(piece)
+            if kind != "robot":
+                self.folder.take_measured(kind, name, part)
+            else:
+                self.folder.take_robot(name, content_of(part))
+        finally:
+            part.unlink(missing_ok=True)
+        return await self._changed("")
+
+    async def _packaged(self, form: dict[str, str]) -> str:
+        name = form.get("name", "")
+        if name == "new":
+            self.folder.take_robot("arm.yaml", skeleton("arm").encode())
+        elif name in packaged_robots():
+            self.folder.take_robot_of(name)
+        return ""
+
+    async def _edit(self, form: dict[str, str]) -> str:
+        """An edit of the table, cell by cell or as a text."""
+        if form.get("digest") != self.folder.digest:
+            raise InputError("another page has changed the robot; reload this one")
+        text = (await self.server.robot()).get("text", "")
+        if not self.folder.read(DRAFT):
+            self.server.before = text
+        text = form["text"].replace("\r\n", "\n") if "text" in form else text
+        text = table.with_cells(text, form["cells"]) if "cells" in form else text
+        text, self.server.left_out = table.fitted(text) if "resized" in form else (text, [])
+        self.folder.edit_robot(text, draft=table.wrong(text) is not None)
+        return "table"
+
+    async def _prove(self, form: dict[str, str]) -> str:
+        words = ("symgen", "check", self._source().name, "--certificate", "proof.json")
+        self.jobs.add("certificate", words, key="proof")
+        return "certificate"
+
+    async def _study(self, form: dict[str, str]) -> str:
+        """The study as text, or as values in JSON."""
+        text = form.get("text", "").replace("\r\n", "\n")
+        self.folder.save_study(json.loads(form["values"]) if "values" in form else text)
+        return "study"
+
+    def _command(self) -> tuple[str, str]:
+        """Names of the robot file and of the study for a command."""
+        if not self.folder.read("study.yaml"):
+            raise InputError("no study yet; answer the questions on the page Record first")
+        return self._source().name, "study.yaml"
+
+    async def _check(self, form: dict[str, str]) -> str:
+        words = ("check", *self._command(), "check.json")
+        self.jobs.add("check of the record", words, key="check")
+        return "findings"
+
+    def _run(self, name: str, *words: str) -> str:
+        """Name of a new run whose command is queued."""
+        taken = [job.run for job in self.jobs.all] + [p.name for p in self.folder.results()]
+        number = max((int(run[:2]) for run in taken if run[:2].isdigit()), default=0) + 1
+        run = f"{number:02d}-{safe(name)}"
+        named = [word.replace("RUN", run) for word in ("symgen", *words, "-o", "runs/RUN")]
+        self.jobs.add(run, named, run=run)
+        return run
+
+    async def _solve(self, form: dict[str, str]) -> str:
+        """A run of the study with the values of a form, in JSON."""
+        robot, _ = self._command()
+        options = [f"--{name}" for name in ("physical", "friction") if form.get(name)]
+        new = self.folder.path / "study-new.yaml"
+        self.folder.save_study(json.loads(form.get("values", "")), new.name)
+        run = self._run(form.get("name", ""), "identify", robot, "study-RUN.yaml", *options)
+        new.replace(self.folder.path / f"study-{run}.yaml")
+        return "jobs"
+
+    async def _resolve(self, form: dict[str, str]) -> str:
+        delta = form.get("delta", "").strip()[:60]
+        asked = [f"--delta={delta}"] if delta else []
+        self._run("resolution", "cestac", *self._command(), "--advise", *asked)
+        return "jobs"
+
+    async def _cancel(self, form: dict[str, str]) -> str:
+        for job in self.jobs.all:
+            if str(job.number) == form.get("number"):
+                self.jobs.cancel(job)
+        return "jobs"
+
+    async def _apply(self, form: dict[str, str]) -> str:
+        """The values of a run into the user's own file: the diff first."""
+        run = self.folder.run(form.get("run", ""))
+        own, robot = self.folder.first(TREES), self._source()
+        if own is None:
+            raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
+        words = ["symgen", "apply", f"runs/{run.name}", own.name, "-o", f"applied{own.suffix}"]
+        words += ["--force", "--diff", *([] if robot == own else ["--robot", robot.name])]
+        self.jobs.add("apply", words, key="apply")
+        return "applied"
+
+
+def answering(handler: Handler) -> Handler:
+    """A handler whose bad input is one sentence on the page, with status 422."""
+
+    async def answer(request: Request) -> Response:
+        try:
+            return await handler(request)  # type: ignore[no-any-return]
+        except (InputError, SymgenError, ValueError, OSError) as e:
+            return page("message", 422, text=str(e) or type(e).__name__)
+
+    return answer
+
+
+def safe(text: str) -> str:
+    """Letters, digits, _ . - of a text, for the name of a file."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "", text).lstrip(".-")[:60]
+
+
+def attached(name: str) -> dict[str, str]:
+    """Headers of a file that is kept."""
+    return {"content-disposition": f'attachment; filename="{safe(name)}"'}

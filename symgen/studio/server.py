@@ -1,0 +1,94 @@
+"""What all requests of the studio share: the work folder, the queue, the process of views; needs
+pip install symgen[studio].
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from starlette.responses import HTMLResponse, Response
+
+from runtime.parallel import OtherProcess
+from symgen.studio import child, views
+from symgen.studio.folder import DRAFT, WorkFolder
+from symgen.studio.jobs import Jobs
+
+VIEW_PATIENCE = 60.0  # s that a page waits for a view
+REMEMBERED = 30  # views
+PAGE_TEMPLATES = Environment(
+    loader=PackageLoader("symgen.studio", "templates"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+
+
+class Server:
+    """What all requests share.
+
+    Parameters
+    ----------
+    folder : WorkFolder
+    programs : dict of str to list of str
+        As of `Jobs`.
+    """
+
+    def __init__(self, folder: WorkFolder, programs: dict[str, list[str]]) -> None:
+        self.folder, self.token = folder, secrets.token_urlsafe(16)
+        self.jobs = Jobs(folder.path, programs, self.changed)
+        self.version, self.pages = 0, 0
+        self.before, self.left_out = "", list[str]()
+        self.news = asyncio.Event()
+        self.process = OtherProcess()
+        self.viewing = asyncio.Lock()
+        self.views: dict[Any, dict[str, Any]] = {}
+
+    def changed(self) -> None:
+        """Tell every page."""
+        self.version += 1
+        self.news.set()
+        self.news = asyncio.Event()
+
+    async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
+        """A view of files in the process of views, ended where it takes too long; what it gave
+        before where the robot and the arguments are the same.
+        """
+        key = (view.__name__, self.folder.digest, str(args))
+        async with self.viewing:
+            if key in self.views:
+                return self.views[key]
+            try:
+                if self.process.pool is None:
+                    self.process.start().submit(child.limited)
+                future = asyncio.wrap_future(self.process.start().submit(view, *args))
+                value = await asyncio.wait_for(future, VIEW_PATIENCE)
+            except (TimeoutError, BrokenProcessPool):
+                await asyncio.to_thread(self.process.end)
+                why = f"takes more than {VIEW_PATIENCE:g} s, or than the memory that there is"
+                return {"error": f"{why}; the terminal has no such limit"}
+            while len(self.views) >= REMEMBERED:
+                self.views.pop(next(iter(self.views)))
+            self.views[key] = value
+            return value
+
+    async def robot(self) -> dict[str, Any]:
+        """What is shown of the robot file, or of its draft."""
+        path, draft = self.folder.robot, self.folder.read(DRAFT)
+        if path is None and not draft:
+            return {}
+        name = "" if path is None else path.name
+        shown = await self.view(views.robot, str(path), draft)
+        own = draft or (self.folder.read(name) if name.endswith(".yaml") else "")
+        return {**shown, "text": own or shown.get("text", "")}
+
+
+def page(name: str, status: int = 200, **context: Any) -> Response:
+    """A template as an answer; every name in it is escaped."""
+    template = PAGE_TEMPLATES.get_template(f"{name}.html.jinja")
+    return HTMLResponse(template.render(step=name, **context), status)

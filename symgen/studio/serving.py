@@ -1,0 +1,115 @@
+"""The studio as a process: the application, its events, its end (pip install symgen[studio])."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import webbrowser
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from importlib.resources import files
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from symgen.studio.folder import WorkFolder
+from symgen.studio.guard import Guard
+from symgen.studio.pages import Pages
+from symgen.studio.server import Server
+
+IDLE_TIME = 600.0  # s without a page after which the server ends
+PULSE = 0.25  # s between two events of one page
+
+
+def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
+    """The ASGI application: guarded, all paths behind the token; `end` is called when no page has
+    been open for IDLE_TIME seconds.
+    """
+
+    async def events(request: Request) -> Response:
+        return StreamingResponse(told(server), media_type="text/event-stream")
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        tasks = [asyncio.create_task(work) for work in (server.jobs.work(), idle(server, end))]
+        try:
+            yield
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            server.process.end()
+
+    scripts = {"static": "studio/static", "report": "report"}
+    mounts = [
+        Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))
+        for name, place in scripts.items()
+    ]
+    inner = [Route("/events", events), *mounts, *Pages(server).routes()]
+    app = Starlette(routes=[Mount(f"/{server.token}", routes=inner)], lifespan=lifespan)
+    hosts = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
+    return Guard(app, server.token, hosts)
+
+
+async def told(server: Server) -> AsyncIterator[str]:
+    """Server-sent events of one page: a number that changes with whatever has changed."""
+    server.pages += 1
+    try:
+        while True:
+            state = {"version": server.version, "robot": server.folder.digest}
+            yield f"data: {json.dumps(state)}\n\n"
+            with suppress(TimeoutError):
+                await asyncio.wait_for(server.news.wait(), 15)
+            await asyncio.sleep(PULSE)
+    finally:
+        server.pages -= 1
+
+
+async def idle(server: Server, end: Callable[[], None]) -> None:
+    """Call `end` when no page has been open for IDLE_TIME seconds."""
+    quiet, pause = 0.0, IDLE_TIME / 200
+    while quiet < IDLE_TIME:
+        await asyncio.sleep(pause)
+        quiet = 0.0 if server.pages else quiet + pause
+    end()
+
+
+def serve(
+    folder: Path,
+    programs: dict[str, list[str]],
+    say: Callable[[str], None],
+    *,
+    robot: str | None = None,
+    record: str | None = None,
+    port: int = 0,
+    browser: bool = True,
+) -> None:
+    """Serve the page of a work folder until Ctrl-C, or IDLE_TIME after its last page has gone.
+
+    Raises InputError or SymgenError where robot or record cannot be taken.
+    """
+    work = WorkFolder(folder)
+    if robot is not None:
+        work.take_robot_of(robot)
+    if record is not None:
+        work.take_record_of(record)
+    server = Server(work, programs)
+    server.process.start("symgen.studio.views")
+    listening = socket.create_server(("127.0.0.1", port))
+    port = listening.getsockname()[1]
+    own: list[uvicorn.Server] = []
+    app = application(server, port, lambda: setattr(own[0], "should_exit", True))
+    quiet = {"log_level": "critical", "access_log": False, "server_header": False, "ws": "none"}
+    config = uvicorn.Config(app, timeout_graceful_shutdown=2, **quiet)  # type: ignore[arg-type]
+    own.append(uvicorn.Server(config))
+    address = f"http://127.0.0.1:{port}/{server.token}/robot"
+    say(f"symgen studio: {address}\nwork folder: {work.path}\nCtrl-C ends it.")
+    if browser:
+        webbrowser.open(address)
+    own[0].run(sockets=[listening])

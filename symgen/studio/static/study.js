@@ -1,0 +1,201 @@
+// The study: columns by their names, answers, remedies, estimators, values side by side.
+"use strict";
+
+(function () {
+  const node = (tag, properties, ...inside) => { const made = Object.assign(document.createElement(tag), properties); made.append(...inside); return made; };
+  const page = one("#values")?.dataset || {}, joints = Number(page.joints) || 99;
+  const study = () => JSON.parse((one("#study[data-values], #findings[data-values]") || one("#values")).dataset.values);
+  const save = (values) => htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: { values: JSON.stringify(values) } });
+  const number = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text.trim());
+  const listed = (x) => (x === null || x === undefined ? "" : Array.isArray(x) ? x.join(", ") : String(x));
+  // --- columns by their names ---
+  const WORDS = {
+    "columns.t": /^(.*_)?(t|time|timestamps?|stamp)$/,
+    "columns.q": /^(.*_)?(q|qm|pos|positions?|angles?|theta|joint)$/,
+    "columns.tau": /^(.*_)?(tau|torques?|cur|curr|currents?|i|effort|gam|gamma|force)$/,
+  };
+  const UNITS = {
+    "columns.t": { ms: "ms", us: "us", ns: "ns", s: "s", sec: "s" },
+    "columns.q": { deg: "deg", degrees: "deg", rad: "rad", counts: "counts", inc: "counts", ticks: "counts", rev: "rev", mm: "mm" },
+    "columns.tau": { a: "A", ma: "mA", nm: "N*m", mnm: "mN*m", v: "V" },
+  };
+
+  function guessed(names) {
+    const found = { "columns.t": [], "columns.q": [], "columns.tau": [] }, units = {};
+    for (const name of names) {
+      const words = name.toLowerCase().split(/[^a-z]+/).filter(Boolean);
+      for (const [key, pattern] of Object.entries(WORDS)) {
+        const unit = words.length > 1 ? UNITS[key][words.at(-1)] : undefined;
+        const stems = [words.join("_"), (unit ? words.slice(0, -1) : words).join("_"), words.filter((word) => word !== "joint").join("_")];
+        if (!stems.some((stem) => pattern.test(stem))) continue;
+        found[key].push(name);
+        if (unit) units[key.replace("columns", "units")] = unit;
+        break;
+      }
+    }
+    const order = (name) => Number(/(\d+)(?!.*\d)/.exec(name)?.[1] ?? 0);
+    for (const key of ["columns.q", "columns.tau"]) found[key] = found[key].map((name, k) => [order(name), k, name]).sort((a, b) => a[0] - b[0] || a[1] - b[1]).slice(0, joints).map((entry) => entry[2]);
+    found["columns.t"] = found["columns.t"].slice(0, 1);
+    return { ...found, ...units };
+  }
+  // --- the questions ---
+  const LISTS = ["columns.q", "columns.tau"];
+  let guess = {};
+
+  function fill() {
+    const form = one("#questions");
+    if (!form) return;
+    const record = study().record?.[0] || {};
+    for (const field of form.elements) {
+      if (!field.name) continue;
+      const [key, inner] = field.name.split("."), own = inner ? record[key]?.[inner] : record[key];
+      field.value = listed(own ?? guess[field.name]);
+      if (own && !field.value) field.value = listed(own);
+    }
+    if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
+    one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
+    ask();
+  }
+
+  const ask = () => {
+    for (const name of [...LISTS, "units.q", "units.tau", "side"]) {
+      const field = one(`#questions [name='${name}']`);
+      one(`label[for='${field.id}'] .ask`).hidden = Boolean(field.value);
+    }
+  };
+  document.addEventListener("change", (event) => { if (event.target.closest("#questions")) ask(); });
+
+  function answered(form) {
+    const values = study(), record = { files: [page.record], ...values.record?.[0] };
+    for (const field of form.elements) {
+      if (!field.name) continue;
+      const [key, inner] = field.name.split("."), text = field.value.trim();
+      const value = LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
+        : field.name === "columns.t" ? text || null : text.includes(",") ? text.split(",").map(number) : text === "" ? undefined : number(text);
+      if (inner) record[key] = { ...record[key], [inner]: value };
+      else record[key] = value;
+      if (inner && value === undefined) delete record[key][inner];
+    }
+    const validation = page.validation ? { validate: { ...values.validate, record: [{ ...record, files: [page.validation] }] } } : {};
+    return { symgen: 1, ...values, record: [record, ...(values.record || []).slice(1)], ...validation };
+  }
+  document.addEventListener("submit", (event) => {
+    if (event.target.id === "questions") {
+      event.preventDefault();
+      const open = all("strong.ask:not([hidden])", event.target);
+      if (open.length) return document.getElementById(open[0].parentElement.htmlFor).focus();
+      save(answered(event.target));
+    }
+    if (event.target.id === "solve") {
+      event.preventDefault();
+      solve(event.target);
+    }
+  });
+
+  async function preview() {
+    const place = one("#preview");
+    if (!place) return;
+    const asked = async (query) => { const answer = await fetch(`view/preview?${new URLSearchParams(query)}`); return answer.ok ? answer.json() : { error: await answer.text() }; };
+    const names = await asked({});
+    if (names.error) return place.replaceChildren(node("p", { className: "no", textContent: names.error }));
+    guess = guessed(names.names);
+    fill();
+    const of = study().record?.[0]?.columns || {}, columns = ["t", "q", "tau"].map((key) => [of[key] ?? guess[`columns.${key}`]].flat().filter((name) => names.names.includes(name)));
+    const used = columns.flat().length ? columns.flat() : names.names.slice(0, 12);
+    const value = await asked({ columns: used.join(","), t: columns[0][0] || "" });
+    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    const cells = (kind, row) => node("tr", {}, ...row.map((x) => node(kind, { textContent: x })));
+    const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
+    first.setAttribute("role", "region");
+    first.setAttribute("aria-label", "First rows");
+    const plots = node("div", { className: "plots" });
+    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${names.names.join(", ")}` }), first, plots);
+    const lines = (list) => Object.fromEntries(list.map((name) => [name, value.lines[name]]));
+    new Plots(plots, value.t, columns[1].length + columns[2].length ? [{ title: "q, as in the file", lines: lines(columns[1]) }, { title: "tau, as in the file", lines: lines(columns[2]) }] : [{ title: "as in the file", lines: value.lines }]);
+  }
+  // --- remedies as one change of the study ---
+  const SET = /\bset ((?:record|signals|rows|estimate)\.[a-z_.]+): (\[[^\]]*\]|[^\s,;()]+)/;
+  const SIGN = /turn the sign of the (torque|position)s?(?: of joint (\d+))?(?=[:,]|$)/;
+
+  function change(remedy) {
+    const set = SET.exec(remedy), sign = SIGN.exec(remedy);
+    if (!set && !sign) return null;
+    const key = set ? set[1] : `record.scale.${sign[1] === "torque" ? "tau" : "q"}`;
+    const [section, ...keys] = key.split(".");
+    return {
+      text: set ? `Set ${key}: ${set[2]}` : `Turn the sign: ${key}, joint ${sign[2] || "all"}`,
+      of(values) {
+        const new_ = structuredClone(values), several = section === "record";
+        for (const part of several ? new_.record : [(new_[section] ??= {})]) {
+          const place = keys.slice(0, -1).reduce((at, name) => (at[name] ??= {}), part), last = keys.at(-1);
+          if (set) place[last] = set[2].startsWith("[") ? set[2].slice(1, -1).split(",").map(number) : number(set[2]);
+          else place[last] = Array.from({ length: joints }, (_, k) => [place[last] ?? 1].flat().at(Array.isArray(place[last]) ? k : 0) * (!sign[2] || Number(sign[2]) === k + 1 ? -1 : 1));
+        }
+        return new_;
+      },
+    };
+  }
+
+  function remedies() {
+    for (const place of all("[data-remedy]")) {
+      const found = change(place.dataset.remedy);
+      if (!found || one("button", place)) continue;
+      const button = node("button", { type: "button", textContent: found.text });
+      button.addEventListener("click", async () => {
+        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: { values: JSON.stringify(found.of(study())) } });
+        htmx.ajax("POST", "do/check", { target: "#findings", swap: "outerHTML" });
+      });
+      place.append(button);
+    }
+  }
+  // --- estimators and settings, each a run ---
+  async function solve(form) {
+    const data = new FormData(form), cutoffs = data.get("cutoff").split(",").map((text) => text.trim());
+    for (const method of data.getAll("method"))
+      for (const cutoff of cutoffs) {
+        const values = study();
+        values.estimate = { ...values.estimate, method };
+        if (cutoff) values.signals = { ...values.signals, lowpass: { ...values.signals?.lowpass, cutoff: number(cutoff) } };
+        const options = Object.fromEntries(["physical", "friction"].filter((name) => data.get(name)).map((name) => [name, "1"]));
+        await htmx.ajax("POST", "do/solve", { target: "#jobs", swap: "outerHTML", values: { values: JSON.stringify(values), name: cutoff ? `${method}-${cutoff}` : method, ...options } });
+      }
+  }
+  // --- values side by side ---
+  const short = (x, digits) => String(Number(x.toPrecision(digits))).replace("-", "−");
+  let shown = null;
+
+  async function compare() {
+    const place = one("#compared");
+    if (!place) return;
+    const names = all("#jobs [name='side']:checked").map((box) => box.value).slice(-6), key = names.join(" ");
+    if (key === shown) return;
+    shown = key;
+    const fits = await Promise.all(names.map(async (name) => (await fetch(`runs/${name}/estimate.json`)).json()));
+    if (!fits.length) return place.replaceChildren(node("p", { className: "note", textContent: "Nothing to compare yet." }));
+    const columns = fits.map((fit) => Object.fromEntries(fit.names.map((name, k) => [name, [fit.X[k], (fit.sigma_corrected || fit.sigma)[k]]])));
+    const units = Object.assign({}, ...fits.map((fit) => fit.units));
+    const cell = (name, column) => {
+      const own = column[name], first = columns[0][name];
+      if (!own) return node("td", { textContent: "–" });
+      const far = first && column !== columns[0] ? (own[0] - first[0]) / Math.hypot(own[1] || 0, first[1] || 0) : null;
+      const text = `${short(own[0], 5)} ± ${short(own[1] || 0, 2)}`, known = far !== null && Number.isFinite(far);
+      return node("td", { className: known && Math.abs(far) > 3 ? "far" : "", textContent: known ? `${text} (${far > 0 ? "+" : "−"}${Math.abs(far).toFixed(1)})` : text });
+    };
+    const head = node("tr", {}, ...["parameter", "unit", ...names].map((text) => node("th", { scope: "col", textContent: text })));
+    const rows = Object.keys(units).map((name) => node("tr", {}, node("th", { scope: "row", textContent: name }), node("td", { textContent: units[name].replace("**2", "²").replaceAll("*", " ") }), ...columns.map((column) => cell(name, column))));
+    const table = node("div", { className: "scroll tall", tabIndex: 0 }, node("table", {}, node("thead", {}, head), node("tbody", {}, ...rows)));
+    table.setAttribute("role", "region");
+    table.setAttribute("aria-label", "Values of the runs");
+    place.replaceChildren(node("p", { className: "note", textContent: `Differences from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 they are marked.` }), table);
+  }
+
+  document.addEventListener("change", (event) => { if (event.target.name === "side") compare(); });
+  document.addEventListener("htmx:afterSettle", (event) => {
+    if (event.target.id === "study") fill();
+    remedies();
+    compare();
+  });
+  preview();
+  remedies();
+  compare();
+})();

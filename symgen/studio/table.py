@@ -1,0 +1,114 @@
+"""The table of a robot file as cells, and edits of it that leave the rest of the text as it is."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from runtime.settings.yaml import yaml_values
+from symgen.description import parse_robot
+from symgen.errors import DescriptionError
+
+TABLE_COLUMNS = ("ant", "sigma", "mu", "gamma", "b", "alpha", "d", "theta", "r")
+UNITS_OF_CELLS = {"gamma": "rad", "alpha": "rad", "theta": "rad", "b": "m", "d": "m", "r": "m"}
+EDITED: dict[str, Any] = {"frames": {}, "constants": {}, "gravity": ["0", "0", "-g"], "loops": []}
+SIZED = ("limits", "drives", "values", "labels", "elements", "constraints", "massless")
+"""Parts whose size is that of the robot: they go where a frame is added or removed."""
+PLAIN_CELL = re.compile(r"(?!- )[A-Za-z0-9_.+/(-][A-Za-z0-9_.+*/() -]*(?<! )\Z|[0-9]\Z")
+TOP_LEVEL = re.compile(r"^(?=[A-Za-z_]+\s*:)", re.M)
+CELL = 200  # characters of a cell
+
+
+def cells_of(text: str) -> dict[str, Any]:
+    """Frames, constants, gravity and loops of a robot file as texts, whatever they are.
+
+    Returns
+    -------
+    dict
+        frames : {number: {column: text}}; constants : {name: text}; gravity : list of text; loops :
+        list of {cut, twin}.
+    """
+    values = yaml_values(text, file="robot.yaml")[0]
+    values = values if isinstance(values, dict) else {}
+    given = {key: values.get(key) or empty for key, empty in EDITED.items()}
+    return {
+        key: _texts(x) if isinstance(x, type(EDITED[key])) else EDITED[key]
+        for key, x in given.items()
+    }
+
+
+def _texts(x: Any) -> Any:
+    """The same with a text in place of every scalar; what stands deeper than a cell as JSON."""
+    if isinstance(x, dict):
+        return {str(key): _texts(value) for key, value in x.items()}
+    if isinstance(x, list):
+        return [_texts(value) for value in x]
+    return "" if x is None else str(x)
+
+
+def with_cells(text: str, asked: str) -> str:
+    """The text of a robot file with the cells of `asked`, JSON as `cells_of`; its other parts, and
+    their comments, stay.
+
+    Raises DescriptionError where that is no table.
+    """
+    try:
+        cells = {key: type(empty)(json.loads(asked)[key]) for key, empty in EDITED.items()}
+        frames = [f"  {int(j)}: {_flow(row.items())}" for j, row in cells["frames"].items()]
+        loops = [f"  - {_flow(loop.items())}" for loop in cells["loops"]]
+        gravity = ", ".join(map(_scalar, cells["gravity"]))
+        constants = _flow(cells["constants"].items())
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise DescriptionError("the page sent no table; reload it") from error
+    new = {
+        "gravity": f"gravity: [{gravity}]\n",
+        "constants": f"constants: {constants}\n",
+        "frames": "\n".join(["frames:", *frames, ""]),
+        "loops": "\n".join(["loops:", *loops, ""]) if loops else "",
+    }
+    now = cells_of(text)
+    kept = {key for key, cell in cells.items() if cell == now[key]}
+    parts = [new.pop(key, part) if key not in kept else part for key, part in blocks(text)]
+    return "".join([*parts, *(x for key, x in new.items() if key not in kept)])
+
+
+def blocks(text: str) -> list[tuple[str, str]]:
+    """(key, lines) of every part of a robot file, in order; what stands ahead has the key ""."""
+    parts = [part if part.endswith("\n") else f"{part}\n" for part in TOP_LEVEL.split(text) if part]
+    return [(re.match(r"[A-Za-z_]*", part)[0], part) for part in parts]  # type: ignore[index]
+
+
+def wrong(text: str) -> DescriptionError | None:
+    """What a text lacks of a robot file; None where it is one."""
+    try:
+        parse_robot(text.encode(), "robot.yaml")
+    except DescriptionError as error:
+        return error
+    return None
+
+
+def fitted(text: str) -> tuple[str, list[str]]:
+    """A text after frames have come or gone, without the parts that are for the others; their
+    names.
+    """
+    left_out: list[str] = []
+    while (error := wrong(text)) is not None and error.path and error.path[0] in SIZED:
+        left_out.append(str(error.path[0]))
+        shorter = "".join(part for key, part in blocks(text) if key != left_out[-1])
+        if shorter == text:
+            break
+        text = shorter
+    return text, left_out
+
+
+def _flow(items: Iterable[tuple[str, Any]]) -> str:
+    return f"{{{', '.join(f'{_scalar(key)}: {_scalar(x)}' for key, x in items)}}}"
+
+
+def _scalar(x: Any) -> str:
+    """A text as YAML, between quotes unless it is plain; a deeper value as JSON."""
+    if not isinstance(x, str):
+        return json.dumps(x)
+    return x if PLAIN_CELL.match(x) and len(x) <= CELL else json.dumps(x[: CELL + 1])

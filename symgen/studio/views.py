@@ -1,0 +1,246 @@
+"""What the pages show of files, computed in a process of its own: plain values, or an error with
+its place.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from functools import wraps
+from hashlib import sha256
+from json import dumps
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import symgen
+from runtime.errors import InputError
+from runtime.result_files import write_all
+from symgen.derive.doubts import doubts
+from symgen.derive.loops import close
+from symgen.description.files import write_robot
+from symgen.errors import SymgenError
+from symgen.report.figure import figure
+
+INSTANTS_DRAWN = 800  # instants of a plot
+FIRST_ROWS = 5  # first ones that are shown
+NAMES_LISTED = 200  # columns that are listed
+
+
+def answered(view: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
+    """A view whose errors are values, {error, path}; with the notes of the library."""
+
+    @wraps(view)
+    def shown(*args: Any) -> dict[str, Any]:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                value = view(*args)
+            except (SymgenError, InputError, OSError, MemoryError, ArithmeticError) as e:
+                text = getattr(e, "message", "") or str(e) or type(e).__name__
+                return {"error": text, "path": list(map(str, getattr(e, "path", ())))}
+        return value | {"notes": [str(w.message) for w in caught] + value.get("notes", [])}
+
+    return shown
+
+
+@answered
+def robot(path: str, draft: str) -> dict[str, Any]:
+    """Of a robot file, or of its draft, without deriving anything: the text of its table, drawing,
+    angles in degrees, doubts.
+    """
+    described = (
+        symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
+    )
+    drawn = figure(described, close(described))
+    turned = [
+        {name: f"{np.degrees(frame[name]):.6g}°" for name in ("gamma", "alpha", "theta")}
+        for frame in drawn["frames"]
+    ]
+    return {
+        "text": "" if path.endswith(".yaml") else write_robot(described, "robot.yaml")[0],
+        "name": described.name,
+        "title": described.title or described.name,
+        "joints": described.joints,
+        "labels": [described.labels.get(f.j, "") for f in described.frames],
+        "figure": drawn,
+        "degrees": [{name: x for name, x in row.items() if x != "0°"} for row in turned],
+        "notes": doubts(described),
+    }
+
+
+@answered
+def formulas(path: str, before: str) -> dict[str, Any]:
+    """Base parameters with their formulas, what becomes of every standard parameter and why, and
+    what the edit of the text `before` has changed.
+    """
+    from symgen.emit.spec import module_spec
+    from symgen.report.effects import effects
+    from symgen.report.page import printed
+    from symgen.symbols import mathml, trees
+
+    regrouping = symgen.regrouping(symgen.load_robot(path))
+    reasons = {a.name: f"{a.columns}: {a.rule}" for a in symgen.absorptions(regrouping)}
+    of = {e.name: e for e in effects(module_spec(regrouping))}
+    difference = ""
+    if before:
+        earlier = symgen.regrouping(symgen.parse_robot(before.encode(), "robot.yaml"))
+        difference = str(symgen.base_difference(earlier, regrouping))
+    base = [
+        {
+            "symbol": mathml.math(trees.parameter(b.name)),
+            "terms": mathml.terms(trees.formula(b.formula)) if b.name != b.own else [],
+            "unit": printed(of[b.own].unit),
+        }
+        for b in regrouping.base
+    ]
+    parameters = [
+        asdict(e)
+        | {"symbol": mathml.math(trees.parameter(e.name)), "unit": printed(e.unit)}
+        | {"why": e.why or reasons.get(e.name, "identified in its own name")}
+        for e in of.values()
+    ]
+    return {"base": base, "parameters": parameters, "difference": difference}
+
+
+@answered
+def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """A model in symbols in three notations, certified as it is printed."""
+    from symgen.certify.shown import certified_model
+
+    described = symgen.load_robot(path)
+    name, form = request.get("model", "gravity"), request.get("form", "closed")
+    frames = {key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()}
+    models, regrouping = symgen.symbolic(described), symgen.regrouping(described)
+    texts = {
+        kind: certified_model(models, regrouping, name, form, kind, **frames)
+        for kind in ("text", "latex", "sympy")
+    }
+    notes = sorted({note for _, note in texts.values() if note})
+    return {"texts": {kind: text for kind, (text, _) in texts.items()}, "notes": notes}
+
+
+@answered
+def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """{file: text} of an emitted target, below its certificate."""
+    from symgen.certify.modules import certified_files
+
+    described, targets = symgen.load_robot(path), (request.get("target", "numpy"),)
+    return {"files": certified_files(described, targets=targets, command=described.file)}
+
+
+@answered
+def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """Names of the columns of a measured file, and of those asked for (`columns`, by commas) first
+    rows and thinned lines; rate and gaps by the column `t`.
+    """
+    from runtime.records.formats.table import open_table
+    from runtime.records.time_stamps import time_stamps
+
+    opened = open_table(Path(path))
+    names = list(opened.names)[:NAMES_LISTED]
+    asked = [n for n in request.get("columns", "").split(",") if n in names]
+    parts = list(opened.blocks([[name] for name in asked])) if asked else []
+    values = [np.concatenate([part[k] for part in parts])[:, 0] for k in range(len(asked))]
+    columns = dict(zip(asked, values, strict=True))
+    N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
+    kept = np.unique(np.linspace(0, max(N - 1, 0), min(N, INSTANTS_DRAWN)).astype(int))
+    return {
+        "names": names,
+        "rows": N,
+        "stamps": "" if t is None else time_stamps(t).to_text(),
+        "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],
+        "t": _plain(kept if t is None else t[kept]),
+        "lines": {name: _plain(x[kept]) for name, x in columns.items()},
+    }
+
+
+@answered
+def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
+    """Measured and predicted torques of the run in the folder `run`, with positions, at instants
+    that its estimate read.
+    """
+    from runtime.estimators.estimate import load_estimate
+    from runtime.identification.validation import direct_comparison
+    from runtime.records.record import Record
+    from runtime.rows.prepared import prepared
+
+    place = Path(request["run"])
+    loaded, study, (record, *_) = _read(path, place / "study.yaml")
+    fit = load_estimate(place / "estimate.json")
+    if not isinstance(record, Record):
+        raise InputError("the record is read by blocks; its report shows the torques")
+    own = prepared(loaded, record, study)
+    selection, K = own.selection, len(own.selection.kept)
+    shown = np.unique(np.linspace(0, K - 1, min(K, INSTANTS_DRAWN)).astype(int))
+    torques = np.full((2, len(loaded.JOINTS), K), np.nan)
+    for j, joint in enumerate(direct_comparison(own.observation(loaded), fit)):
+        rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
+        torques[:, j, rows] = joint.measured, joint.predicted
+    return {
+        "t": _plain(selection.t[shown]),
+        "joints": [str(j) for j in loaded.JOINTS],
+        "q": list(map(_plain, own.states.q[selection.samples.start + selection.kept[shown]].T)),
+        "measured": list(map(_plain, torques[0][:, shown])),
+        "predicted": list(map(_plain, torques[1][:, shown])),
+    }
+
+
+def _read(path: str, study_file: Path) -> tuple[Any, Any, Any]:
+    """Model, study and records of a command, whose files are relative to the study file."""
+    import runtime
+    from runtime.records.reading_by_blocks import records_or_streams
+    from runtime.settings.location import located
+
+    model = runtime.load_model(symgen.model(path))
+    study = located(runtime.load_study(study_file), study_file.parent)
+    missing = study.signals.admits_missing
+    return model, study, records_or_streams(study.record, model, study.stream, missing=missing)
+
+
+@answered
+def findings(robot_file: str, study_file: str) -> dict[str, Any]:
+    """Checks of record, study and robot with their remedies, and the predicted deviation of every
+    parameter, %.
+    """
+    import runtime
+    from runtime.checks.motion import unexcited_shares
+
+    loaded, study, records = _read(robot_file, Path(study_file))
+    variants = runtime.load_model(symgen.variants(robot_file))
+    judged = runtime.plausibility(loaded, records, study, variants=variants)
+    rank, shares = 0, {}
+    with suppress(InputError, np.linalg.LinAlgError):
+        rows = runtime.observe(loaded, records, study)
+        rank = int(np.linalg.matrix_rank(rows.W))
+        shares = unexcited_shares(rows, study.signals, records[0].rate)
+    return {
+        "of": digest_of(Path(robot_file), Path(study_file)),
+        "checks": [asdict(check) for check in judged.checks],
+        "named": judged.named_causes,
+        "deviations": dict(sorted(shares.items(), key=lambda item: -item[1])),
+        "rank": rank,
+        "count": len(loaded.BASE_PARAMETERS),
+    }
+
+
+def check() -> None:
+    """`check ROBOT STUDY FILE`: write the findings; code 2 and one line where there are none."""
+    robot_file, study_file, target = sys.argv[1:4]
+    value = findings(robot_file, study_file)
+    if "error" in value:
+        sys.exit(f"error: {value['error']}")
+    write_all(Path(), {target: f"{dumps(value, indent=1)}\n"})
+
+
+def digest_of(*paths: Path) -> str:
+    """SHA-256 of files together."""
+    return sha256(b"".join(path.read_bytes() for path in paths if path.is_file())).hexdigest()
+
+
+def _plain(x: Any) -> list[float | None]:
+    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(x, dtype=float)]

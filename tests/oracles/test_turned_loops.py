@@ -1,0 +1,86 @@
+"""Loops whose plane joints before them turn: closure is written in the frame that carries the loop,
+so nothing of it depends on those joints, at no angle of theirs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from campaign import campaign, sampled
+
+from oracles.multipliers import Multipliers
+from oracles.random_loops import KINDS, random_loop
+from oracles.random_robots import random_parameters
+from oracles.test_loops_agree import whole
+from oracles.test_random_loops import SEEDS, module_of, torques_agree
+from symgen.derive.loops import close
+from symgen.description import parse_robot
+from symgen.emit.generate import generate_module
+
+WITH_COUNTERBALANCE = """symgen: 1
+name: balanced
+gravity: [0, 0, -g]
+constants: {A1: 0.35, A2: 1.15, A3: 0.041, D1: 0.675, D4: 1.0, D6: 0.24, E1: 0.3, H1: 0.5, E2: 0.25,
+  g: 9.81}
+frames:                            # KUKA KR300 R2500 ultra, its counterbalance as a jack: 7, 8, 9
+  1: {ant: 0, sigma: 0, alpha: pi,    d: 0,  theta: q1,        r: -D1}
+  2: {ant: 1, sigma: 0, alpha: pi/2,  d: A1, theta: q2 - pi/2, r: 0}
+  3: {ant: 2, sigma: 0, alpha: 0,     d: A2, theta: q3 + pi,   r: 0}
+  4: {ant: 3, sigma: 0, alpha: -pi/2, d: A3, theta: q4,        r: -D4}
+  5: {ant: 4, sigma: 0, alpha: pi/2,  d: 0,  theta: q5,        r: 0}
+  6: {ant: 5, sigma: 0, alpha: -pi/2, d: 0,  theta: q6,        r: 0}
+  7: {ant: 1, sigma: 0, mu: 0, b: H1, alpha: pi/2,  d: -E1, theta: q7, r: 0}
+  8: {ant: 7, sigma: 1, mu: 0, alpha: pi/2,  d: 0,  theta: 0,  r: q8}
+  9: {ant: 8, sigma: 0, mu: 0, alpha: -pi/2, d: 0,  theta: q9, r: 0}
+  10: {ant: 2, sigma: 2,       alpha: 0,     d: E2, theta: 0,  r: 0}
+loops: [{cut: 9, twin: 10, start: {q2: 0.1}}]
+elements:
+  Ia: {kind: inertia, along: all}
+  FV: {kind: viscous, along: all}
+  GAS: {kind: offset, along: {8: q8}}
+  K: {kind: stiffness, along: {8: q8}}
+"""
+
+
+def check_behind(kind: str, seed: int, behind: int, folder: Path) -> None:
+    """Torques and base parameters at all angles of the joints before, on which the passive ones do
+    not depend.
+    """
+    robot = random_loop(kind, seed, behind=behind)
+    module = module_of(generate_module(robot), folder)
+    torques_agree(robot, module, behind)
+    q = np.tile([close(robot).start[j] for j in robot.joints], (25, 1))
+    for k in range(behind):
+        q[:, k] = np.linspace(-np.pi, np.pi, 25)
+        assert np.ptp(module.passive_joints(q), axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", sampled(KINDS, 2))
+def test_behind_turning_joints(kind: str, tmp_path: Path) -> None:
+    check_behind(kind, KINDS.index(kind), 1 + KINDS.index(kind) % 3, tmp_path)
+
+
+@campaign
+@pytest.mark.parametrize("behind", [1, 2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_more_behind_turning_joints(kind: str, behind: int, tmp_path: Path) -> None:
+    for seed in SEEDS:
+        check_behind(kind, seed, behind, tmp_path)
+
+
+def test_counterbalance_as_a_jack_over_the_range_of_axis_1(tmp_path: Path) -> None:
+    """-147 to 147 degrees of axis 1, -50 to 85 of axis 2."""
+    robot = parse_robot(WITH_COUNTERBALANCE.encode(), "balanced.yaml")
+    module = module_of(generate_module(robot), tmp_path)
+    rng = np.random.default_rng(4)
+    q = rng.uniform(-1, 1, (41, 6))
+    q[:, 0] = np.radians(np.linspace(-147, 147, 41))
+    q[:, 1] = np.radians(rng.uniform(-50, 85, 41))
+    qd, qdd = rng.standard_normal((2, *q.shape))
+    oracle = Multipliers(robot, whole(robot, q, module.passive_joints(q)), qd, qdd)
+    chi = random_parameters(robot, seed=7)
+    X, tau = module.base_parameters(chi), oracle.torque(chi)
+    for found in (module.inverse_dynamics(q, qd, qdd, X), module.regressor(q, qd, qdd) @ X):
+        assert np.abs(found - tau).max() < 1e-10 * np.abs(tau).max()

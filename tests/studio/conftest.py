@@ -1,0 +1,97 @@
+"""A studio in this process for the server's own tests, and one as a command for those in a browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from runtime.parallel import OtherProcess
+from symgen.studio import folder, server, serving
+
+COMMAND = "from symgen.cli.main import main; main()"
+PROGRAMS = {
+    "symgen": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); " + COMMAND],
+    "check": [sys.executable, "-P", "-c", "from symgen.studio.child import watched; watched(); from symgen.studio.views import check; check()"],
+}  # fmt: skip
+PORT = 8123
+OWN = f"http://127.0.0.1:{PORT}"
+
+
+class Studio:
+    """A client that asks as the pages do: own Host, own Origin, the token."""
+
+    def __init__(self, path: Path) -> None:
+        self.server = server.Server(folder.WorkFolder(path), PROGRAMS)
+        self.app = serving.application(self.server, PORT, lambda: None)
+        self.client = TestClient(self.app, base_url=OWN, raise_server_exceptions=False)
+        self.path = path
+
+    def get(self, name: str, **more: Any) -> Any:
+        return self.client.get(f"/{self.server.token}/{name}", follow_redirects=False, **more)
+
+    def post(self, name: str, form: dict[str, str] | None = None, **more: Any) -> Any:
+        headers = {"origin": OWN} | more.pop("headers", {})
+        return self.client.post(
+            f"/{self.server.token}/do/{name}", data=form, headers=headers, **more
+        )
+
+    def upload(self, kind: str, name: str, content: bytes) -> Any:
+        return self.post("upload", params={"kind": kind, "name": name}, content=content)
+
+
+@pytest.fixture(scope="module")
+def process() -> Iterator[OtherProcess]:
+    """The process of views, one for all tests of a file."""
+    own = OtherProcess()
+    yield own
+    own.end()
+
+
+@pytest.fixture
+def studio(tmp_path: Path, process: OtherProcess) -> Iterator[Studio]:
+    own = Studio(tmp_path / "work")
+    own.server.process = process
+    with own.client:
+        yield own
+        own.server.process = OtherProcess()
+
+
+class Running:
+    """`symgen studio` as a process."""
+
+    def __init__(self, *arguments: str, work: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, "studio", *arguments, "-o", str(work), "--no-browser"],
+            stderr=subprocess.PIPE, text=True, env={**os.environ},
+        )  # fmt: skip
+        line = self.process.stderr.readline()  # type: ignore[union-attr]
+        found = re.search(r"(http://127\.0\.0\.1:\d+/[\w-]+/)robot", line)
+        assert found, line
+        self.address, self.work = found[1], work
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        self.process.send_signal(number)
+        return self.process.wait(20)
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[Callable[..., Running]]:
+    started: list[Running] = []
+
+    def start(*arguments: str, work: Path | None = None) -> Running:
+        started.append(Running(*arguments, work=work or tmp_path / "work"))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.end(signal.SIGKILL)

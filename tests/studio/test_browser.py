@@ -1,0 +1,325 @@
+"""The studio in a browser, as a person works in it, and as a process that ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import kr300
+import numpy as np
+import pytest
+from browser import WEAK_CONTRAST, Browser, started_browser
+
+import symgen
+from runtime.settings.yaml import yaml_text
+
+pytestmark = pytest.mark.campaign
+
+URDF = """\
+<?xml version="1.0"?>
+<robot name="lever">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="3.0"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.15 0 0"/><mass value="1.5"/>
+    <inertia ixx="0.005" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="100" velocity="5"/><dynamics damping="0.5" friction="0.2"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/>
+    <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="50" velocity="5"/>
+    <dynamics damping="0.3" friction="0.1"/></joint>
+</robot>
+"""
+HEAVIER = 1.2  # inertias of the robot that made the record, over those of the file
+JOB = "[...document.querySelectorAll('.job')].map((node) => node.className)"
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Browser]:
+    with started_browser() as browser:
+        yield browser
+
+
+def go(page: Browser, address: str, width: int = 1280) -> None:
+    page.resize(width, 800)
+    for place in ("about:blank", address):  # the page of a server that has ended is gone first
+        page.run("0")
+        page.events.clear()
+        page.call("Page.navigate", url=place)
+        while not any(e.get("method") == "Page.loadEventFired" for e in page.events):
+            page.events.append(page._next())
+
+
+def until(page: Browser, script: str, seconds: float = 30.0) -> Any:
+    end = time.monotonic() + seconds
+    while not (value := page.run(script)):
+        assert time.monotonic() < end, script
+        time.sleep(0.05)
+    return value
+
+
+def choose(page: Browser, selector: str, path: Path) -> None:
+    """A file for an input, as a person chooses it."""
+    page.run("delete window.here; window.here = 1")
+    root = page.call("DOM.getDocument")["root"]["nodeId"]
+    node = page.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+    page.call("DOM.setFileInputFiles", files=[str(path)], nodeId=node)
+    until(page, "!window.here && document.readyState === 'complete'")  # it has loaded again
+
+
+def type_in(page: Browser, ident: str, text: str) -> None:
+    """Replace what a field holds, key by key."""
+    page.run(f"document.getElementById({json.dumps(ident)}).select()")
+    page.call("Input.insertText", text=text)
+
+
+def proved(page: Browser) -> None:
+    until(page, "document.querySelector('#certificate')?.classList.contains('valid')", 60)
+
+
+def quiet(page: Browser) -> None:
+    assert page.complaints == []
+
+
+def record(path: Path) -> Path:
+    """A record of a heavier lever, in degrees."""
+    robot = symgen.load_robot(path.parent / "lever.urdf")
+    model = symgen.model(robot)
+    t = np.arange(0, 12, 0.005)
+    w = 2 * np.pi * np.outer([0.13, 0.29, 0.53], [1, 1.3])
+    a = np.array([[0.9, 0.5, 0.25], [0.8, 0.6, 0.3]]).T
+    angle = t[:, None, None] * w
+    q, qd, qdd = (
+        (f * a * w**k).sum(axis=1)
+        for k, f in enumerate((np.sin(angle), np.cos(angle), -np.sin(angle)))
+    )
+    of_links = ("M", "XX", "YY", "ZZ", "XY", "XZ", "YZ")
+    values = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | {
+        name: x * (HEAVIER if name.startswith(of_links) else 1) for name, x in robot.values.items()
+    }
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(values))
+    tau += np.random.default_rng(1).normal(0, 0.05, q.shape)
+    header = "time_s,shoulder_pos_deg,elbow_pos_deg,shoulder_tau_nm,elbow_tau_nm"
+    table = np.column_stack([t, np.degrees(q), tau])
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.6g")
+    return path
+
+
+def test_from_nothing_to_a_certified_arm_of_two_joints(
+    page: Browser, running: Callable[..., Any]
+) -> None:
+    studio = running()
+    go(page, studio.address + "robot")
+    page.click("button[value='new']")
+    until(page, "!!document.getElementById('f-2-alpha')")
+    proved(page)
+    page.run("document.getElementById('f-2-alpha').scrollIntoView()")
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "pi/2")
+    until(page, "document.querySelector('#certificate').classList.contains('stale')")
+    assert "90°" in page.run("document.querySelector('#cells').textContent")
+    proved(page)  # after a second of rest
+    until(page, "document.body.textContent.includes('alpha of frame 2: 0 -> pi/2')")
+    robot = symgen.load_robot(studio.work / "robot.yaml")
+    claim = json.loads((studio.work / "proof.json").read_text())
+    assert claim["valid"] and claim["count"] == len(symgen.regrouping(robot).base)
+    assert page.run("document.activeElement.id") == "f-2-alpha"  # the focus stays
+    page.click("[data-act='add 2']")
+    until(page, "!!document.getElementById('f-3-theta')")
+    page.click("[data-act='remove 3']")
+    until(page, "!document.getElementById('f-3-theta')")
+    assert page.run(WEAK_CONTRAST) == []
+    quiet(page)
+
+
+def test_a_wrong_alpha_shows_in_the_picture(page: Browser, running: Callable[..., Any]) -> None:
+    """Turned the other way the wrist lies below the base; its slider moves the arm."""
+    studio = running("tx40")
+    go(page, studio.address + "robot")
+    up = until(page, "document.querySelector('#arm svg')?.outerHTML")
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "pi/2")
+    until(page, f"document.querySelector('#arm svg').outerHTML !== {json.dumps(up)}")
+    before = page.run("document.querySelector('#arm svg').outerHTML")
+    page.run("document.getElementById('s-1').focus()")
+    page.press("End")
+    assert page.run("document.querySelector('#arm svg').outerHTML") != before
+    page.click("[data-key='0']")
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "-pi/")
+    wrong = until(page, "document.querySelector('.wrong')?.textContent")
+    assert (
+        wrong.startswith("frames.2.alpha: expected")
+        and page.run("document.activeElement.id") == "f-2-alpha"
+    )
+    type_in(page, "f-2-alpha", "-pi/2")
+    until(page, "!document.querySelector('.wrong')")
+    page.click("[data-key='0']")
+    until(page, f"document.querySelector('#arm svg').outerHTML === {json.dumps(up)}")
+    page.run("document.querySelector('form[hx-get=\"view/model\"] button').click()")
+    latex = until(page, "document.querySelector('#model-latex')?.textContent")
+    assert latex.strip() == subprocess.run(
+        [sys.executable, "-c", "from symgen.cli.main import main; main()", "show", "tx40", "--model", "gravity", "--format", "latex"],
+        capture_output=True, text=True, check=True,
+    ).stdout.strip()  # fmt: skip
+    quiet(page)
+
+
+def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "lever.urdf").write_text(URDF)
+    studio = running()
+    go(page, studio.address + "robot")
+    choose(page, "#robot-file", tmp_path / "lever.urdf")
+    go(page, studio.address + "record")
+    choose(page, "#record-file", record(tmp_path / "run.csv"))
+    until(page, "document.querySelectorAll('#preview svg').length === 2")
+    assert page.run("document.querySelector('[name=\"units.q\"]').value") == "deg"
+    page.click("#questions button.main")  # the side is asked for: nothing is written
+    assert page.run("document.activeElement.name") == "side"
+    page.run("document.querySelector('[name=side]').value = 'joint'")
+    page.run(
+        "document.querySelector('[name=side]').dispatchEvent(new Event('change', {bubbles: true}))"
+    )
+    page.click("#questions button.main")
+    until(page, "document.querySelector('#study-text')?.value.includes('side: joint')")
+    go(page, studio.address + "check")
+    page.click("#findings button.main")
+    until(page, "document.querySelectorAll('.checks li').length > 10", 60)
+    go(page, studio.address + "solve")
+    page.run("document.querySelector('[value=feasible]').checked = true")
+    page.click("#solve button.main")
+    until(page, "document.querySelector('#jobs').dataset.runs.split(' ').length === 2", 90)
+    until(page, "document.querySelectorAll('#compared tbody tr').length === 13")
+    page.run("location.reload()")
+    until(page, "document.querySelector('#jobs')?.dataset.runs.split(' ').length === 2")
+    go(page, studio.address + "results", 390)
+    assert page.run("document.documentElement.scrollWidth") <= 390
+    until(page, "document.querySelectorAll('.plots svg').length === 4")
+    assert page.run("document.querySelector('.answer').textContent").startswith("Yes")
+    page.click("form[hx-post='do/apply'] button")
+    assert "mass value" in until(page, "document.querySelector('.diff')?.textContent")
+    applied = symgen.load_robot(studio.work / "applied.urdf").values
+    given = symgen.load_robot(tmp_path / "lever.urdf").values
+    assert applied["MX2"] == pytest.approx(HEAVIER * given["MX2"], rel=0.01)
+    assert page.run("fetch('runs/01-ols/report.html').then((answer) => answer.headers.get('content-security-policy'))").startswith("sandbox")  # fmt: skip
+    quiet(page)
+
+
+def test_cancel_two_pages_and_a_kill(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Cancelled, a run leaves no process and no file; killed, the server leaves what was saved, and
+    its processes end; a page whose robot another one has changed says so.
+    """
+    studio = running("tx40", "tx40")
+    go(page, studio.address + "solve")
+    page.click("#solve button.main")
+    until(page, f"{JOB}.some((name) => name.includes('running'))")
+    own = children(studio.process.pid)
+    assert (studio.work / ".tmp").is_dir() and len(own) >= 2
+    page.click(".job button")
+    until(page, f"{JOB}.some((name) => name.includes('cancelled'))")
+    wait_for(
+        lambda: not (studio.work / ".tmp").exists() and len(children(studio.process.pid)) < len(own)
+    )
+    assert list((studio.work / "runs").iterdir()) == [] and not list(studio.work.glob("study-*"))
+
+    go(page, studio.address + "robot")
+    until(page, "!!document.querySelector('#cells')")
+    text = (studio.work / "robot.yaml").read_text()
+    (studio.work / "robot.yaml").write_text(
+        text.replace("D3: 0.225", "D3: 0.3")
+    )  # another page, or an editor
+    page.run("fetch('do/cancel', {method: 'POST', body: ''})")
+    until(page, "!document.getElementById('other').hidden")
+
+    go(page, studio.address + "solve")
+    page.click("#solve button.main")
+    until(page, f"{JOB}.some((name) => name.includes('running'))")
+    own = children(studio.process.pid)
+    studio.process.send_signal(signal.SIGKILL)
+    studio.process.wait()
+    wait_for(lambda: not any(alive(pid) for pid in own))
+    again = running(work=studio.work)
+    go(page, again.address + "robot")
+    assert until(page, "document.getElementById('c-0-value')?.value") == "0.3"
+    assert list((studio.work / "runs").iterdir()) == []
+    assert again.end(signal.SIGTERM) in (0, -signal.SIGTERM)
+    wait_for(lambda: not children(again.process.pid))
+
+
+def children(pid: int) -> set[int]:
+    """Processes that a process has started, and theirs."""
+    found: set[int] = set()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parent = int(path.read_text().rpartition(")")[2].split()[1])
+        except (OSError, ValueError):
+            continue
+        if parent == pid:
+            found |= {int(path.parent.name), *children(int(path.parent.name))}
+    return found
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+# --- the same numbers ---
+
+
+def tx40_study() -> dict[str, Any]:
+    from runtime.records.datasets import dataset_study
+
+    return dict(dataset_study("tx40"))
+
+
+@pytest.mark.parametrize("name", ["tx40", "kr300"])
+def test_the_numbers_are_those_of_the_command_line(studio: Any, tmp_path: Path, name: str) -> None:
+    """To the last digit: estimate.json but for the names of files."""
+    if name == "tx40":
+        studio.post("packaged", {"name": "tx40"})
+        values = tx40_study()
+    else:
+        studio.upload("robot", "kr300.yaml", kr300.robot_text().encode())
+        studio.upload("record", "A.mat", (kr300.DATA / "A.mat").read_bytes())
+        values = kr300.study("A")
+        for part in values["record"] if isinstance(values["record"], list) else [values["record"]]:
+            part["files"] = ["record.mat"]
+    values = json.loads(json.dumps(values))
+    assert studio.post("study", {"values": json.dumps(values)}).status_code == 200
+    assert studio.post("solve", {"values": json.dumps(values), "name": "ols"}).status_code == 200
+    run = studio.path / "runs" / "01-ols"
+    wait_for(lambda: (run / "estimate.json").is_file() or "failed" in studio.get("jobs").text, 120)
+    (tmp_path / "by_hand").mkdir()
+    (tmp_path / "by_hand" / "study.yaml").write_text(yaml_text(values))
+    for file in ("robot.yaml", "record.mat"):
+        if (studio.path / file).is_file():
+            (tmp_path / "by_hand" / file).write_bytes((studio.path / file).read_bytes())
+    subprocess.run(
+        [sys.executable, "-P", "-c", "from symgen.cli.main import main; main()", "identify", "robot.yaml", "study.yaml", "-o", "out"],
+        cwd=tmp_path / "by_hand", env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, capture_output=True, check=False,
+    )  # fmt: skip
+    ours, theirs = (
+        (path / "estimate.json").read_text() for path in (run, tmp_path / "by_hand" / "out")
+    )
+    assert ours == theirs

@@ -1,0 +1,386 @@
+"""The server of the studio, asked without a browser: what it takes, what it refuses, what lies in its folder."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import io
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symgen
+from symgen.studio import guard, server, serving, table
+from symgen.studio.folder import WorkFolder
+
+EVIL = """<script>alert(1)</script>'"><img src=x onerror=alert(1)>&{{7*7}}"""
+TEXT = """\
+symgen: 1
+name: arm   # a comment that stays
+gravity: [0, -g, 0]
+constants: {D2: 0.5, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: 0, d: D2, theta: q2, r: 0}
+elements:
+  FV: {kind: viscous, along: all}   # another one
+limits: {q: [3, 3]}
+"""
+
+
+def csv(rows: int = 300) -> bytes:
+    t = np.arange(rows) / 100
+    table = np.column_stack([t, np.sin(t), np.cos(t), t, -t])
+    text = io.StringIO()
+    np.savetxt(text, table, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+    return text.getvalue().encode()
+
+
+def edited(studio: Any, change: Any, **more: str) -> Any:
+    cells = table.cells_of(WorkFolder(studio.path).read("robot.yaml"))
+    change(cells)
+    return studio.post(
+        "edit", {"digest": studio.server.folder.digest, "cells": json.dumps(cells), **more}
+    )
+
+
+# --- who may ask ---
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:8123",
+        "127.0.0.1",
+        "127.0.0.1:80",
+        "localhost:8123.evil.example",
+        "",
+    ],
+)
+def test_another_host_is_refused(studio: Any, host: str) -> None:
+    assert studio.get("robot", headers={"host": host}).status_code == 421
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "http://127.0.0.1:80", "https://127.0.0.1:8123", ""]
+)
+def test_another_origin_is_refused(studio: Any, origin: str) -> None:
+    """Whatever it asks for; and a change needs an origin."""
+    assert studio.post("packaged", {"name": "tx40"}, headers={"origin": origin}).status_code == 403
+    assert studio.get("robot", headers={"origin": origin}).status_code == 403
+    assert (
+        studio.client.post(f"/{studio.server.token}/do/packaged", data={"name": "tx40"}).status_code
+        == 403
+    )
+    assert (
+        studio.post(
+            "packaged", {"name": "tx40"}, headers={"sec-fetch-site": "cross-site"}
+        ).status_code
+        == 403
+    )
+    assert not (studio.path / "robot.yaml").exists()
+
+
+@pytest.mark.parametrize("path", ["/", "/robot", "/wrong/robot", "//robot", "/%2e%2e/robot"])
+def test_nothing_without_the_token(studio: Any, path: str) -> None:
+    assert studio.client.get(path).status_code == 404
+
+
+def test_methods_that_no_page_uses_are_refused(studio: Any) -> None:
+    for method in ("PUT", "DELETE", "OPTIONS", "PATCH"):
+        assert studio.client.request(method, f"/{studio.server.token}/robot").status_code == 405
+    assert studio.get("do/packaged").status_code in (404, 405, 422)
+    assert studio.post("../robot", {}).status_code == 405
+
+
+def test_every_answer_has_the_policy(studio: Any) -> None:
+    for answer in (
+        studio.get("robot"),
+        studio.get("nothing"),
+        studio.get("static/studio.js"),
+        studio.client.get("/"),
+    ):
+        policy = answer.headers["content-security-policy"]
+        assert policy.startswith("default-src 'none'") and "unsafe" not in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../../etc/passwd",
+        "..%2f..%2fetc%2fpasswd",
+        "%2e%2e/%2e%2e/pyproject.toml",
+        "....//",
+        "/etc/passwd",
+        "robot.yaml%00",
+    ],
+)
+def test_no_path_leads_out(studio: Any, name: str) -> None:
+    (studio.path / "secret.txt").write_text("secret")
+    for place in ("static", "report", "file", "runs/01-ols", "runs/..", "view", ""):
+        answer = studio.get(f"{place}/{name}")
+        assert answer.status_code in (307, 404, 405, 422), (place, answer.text)
+    assert studio.get("file/secret.txt").status_code == 422
+    assert studio.get("runs/../secret.txt").status_code in (404, 422)
+
+
+# --- what is sent ---
+
+
+def test_a_file_gets_a_name_of_ours(studio: Any) -> None:
+    assert studio.upload("record", "../../../tmp/evil<script>.CSV", csv()).status_code == 200
+    assert studio.upload("robot", "/etc/cron.d/arm.yaml", TEXT.encode()).status_code == 200
+    assert sorted(p.name for p in studio.path.iterdir() if p.is_file()) == [
+        "record.csv",
+        "robot.yaml",
+    ]
+
+
+@pytest.mark.parametrize(("kind", "name"), [("robot", "arm.py"), ("robot", "arm"), ("record", "run.exe"), ("record", "run.csv.exe"), ("record", ".gz"), ("record", ""), ("module", "arm.py")])  # fmt: skip
+def test_another_kind_is_refused(studio: Any, kind: str, name: str) -> None:
+    answer = studio.upload(kind, name, b"x")
+    assert answer.status_code == 422 and "expected" in answer.text
+    assert [p.name for p in studio.path.iterdir() if p.is_file()] == []
+
+
+def test_too_much_is_refused_before_it_is_read(studio: Any) -> None:
+    big = {"content-length": str(100 * 10**6)}
+    assert (
+        studio.post(
+            "upload", params={"kind": "record", "name": "a.csv"}, content=b"", headers=big
+        ).status_code
+        == 413
+    )
+    assert studio.post("edit", headers={"content-length": str(2 * 2**20)}).status_code == 413
+
+
+def test_too_much_is_refused_where_the_length_was_a_lie(
+    studio: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sent in parts without a length: the file goes, none is left."""
+    monkeypatch.setattr(guard, "LARGEST_UPLOAD", 10**5)
+    parts = (b"0,1\n" * 10**4 for _ in range(10))
+    answer = studio.post("upload", params={"kind": "record", "name": "a.csv"}, content=parts)
+    assert answer.status_code == 422 and "more than" in answer.text
+    assert [p.name for p in studio.path.iterdir() if p.is_file()] == []
+
+
+@pytest.mark.campaign
+def test_a_bomb_ends_in_a_sentence(studio: Any) -> None:
+    """100 MB of zeros in an archive, in gzip; nothing of it is unpacked in the server."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("q.npy", bytes(100 * 10**6))
+    for name, content in (
+        ("a.npz", buffer.getvalue()),
+        ("a.csv.gz", gzip.compress(bytes(100 * 10**6))),
+    ):
+        assert studio.upload("record", name, content).status_code == 200
+        answer = studio.get("view/preview").json()
+        assert "error" in answer and len(answer["error"]) < 2500
+
+
+# --- the table ---
+
+
+def test_an_edit_changes_its_line_alone(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    answer = edited(studio, lambda cells: cells["frames"]["2"].update(alpha="pi/2"))
+    assert answer.status_code == 200 and "90°" in answer.text
+    text = (studio.path / "robot.yaml").read_text()
+    assert "alpha: pi/2" in text and "# a comment that stays" in text and "# another one" in text
+    assert (
+        symgen.load_robot(studio.path / "robot.yaml").frames[1].alpha
+        == symgen.load_robot("tx40").frames[3].alpha
+    )
+
+
+def test_an_error_stands_beside_its_cell_and_the_last_robot_stays(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    answer = edited(studio, lambda cells: cells["frames"]["2"].update(alpha="pi/"))
+    assert 'aria-invalid="true" aria-describedby="wrong-2"' in answer.text
+    wrong = TEXT.replace("alpha: 0, d: D2", "alpha: pi/, d: D2")
+    with pytest.raises(symgen.SymgenError) as said:
+        symgen.parse_robot(wrong.encode(), "robot.yaml")
+    assert said.value.message.replace("'", "&#39;") in answer.text  # type: ignore[attr-defined]
+    assert (studio.path / "robot.yaml").read_text() == TEXT
+    assert studio.get("certificate").text.count("No certificate")
+    assert 'value="pi/"' in studio.get("robot").text  # reloaded
+
+
+def test_frames_come_and_go_with_the_parts_that_are_for_them(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    new = {"ant": "1", "sigma": "0", "alpha": "0", "d": "0", "theta": "q3", "r": "0"}
+    answer = edited(studio, lambda cells: cells["frames"].update({"3": new}), resized="1")
+    assert "Left out, since they were for the other frames: limits" in answer.text
+    assert len(symgen.load_robot(studio.path / "robot.yaml").joints) == 3
+
+
+def test_two_pages_do_not_overwrite_each_other(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    old = studio.server.folder.digest
+    edited(studio, lambda cells: cells["constants"].update(D2="0.7"))
+    answer = studio.post("edit", {"digest": old, "text": TEXT})
+    assert answer.status_code == 422 and "another page" in answer.text
+    assert "0.7" in (studio.path / "robot.yaml").read_text()
+
+
+def test_names_are_escaped_wherever_they_are_shown(studio: Any) -> None:
+    title = json.dumps(EVIL)
+    text = TEXT.replace(
+        "limits: {q: [3, 3]}", f"title: {title}\nsource: {title}\nlabels: {{1: {title}, 2: b}}"
+    )
+    studio.upload("robot", "arm.yaml", text.encode())
+    studio.upload("record", f"{EVIL}.csv", csv().replace(b"q1", b"q1<script>alert(1)</script>"))
+    studio.post("study", {"text": f"symgen: 1\nrecord: {{files: [record.csv], name: {title}}}\n"})
+    run = studio.path / "runs" / "01-ols"
+    run.mkdir()
+    data = {
+        "names": [EVIL],
+        "X": [1.0],
+        "sigma": [1.0],
+        "units": {EVIL: EVIL},
+        "verdict": EVIL,
+        "method": EVIL,
+    }
+    (run / "estimate.json").write_text(
+        json.dumps(data | {"checklist": {"answer": EVIL, "use": EVIL, "state": EVIL}})
+    )
+    (studio.path / "check.json").write_text(json.dumps({"checks": [{"state": "no", "question": EVIL, "finding": EVIL, "remedy": EVIL}], "named": [{"cause": EVIL, "remedy": EVIL}], "deviations": {EVIL: 1.0}, "rank": 1, "count": 1}))  # fmt: skip
+    for step in ("robot", "record", "check", "solve", "results"):
+        answer = studio.get(step).text
+        assert (
+            "<script>alert" not in answer
+            and "<img" not in answer
+            and "49" not in answer.split("{{7*7}}")[0][-3:]
+        ), step
+    bad = studio.post("packaged", {"name": EVIL})
+    assert "<script>alert" not in bad.text
+
+
+@pytest.mark.parametrize("file", ["/etc/passwd", "../record.csv", "C:\\\\x.csv", "a/b.csv"])
+def test_a_study_of_the_browser_names_no_file_of_another_folder(studio: Any, file: str) -> None:
+    for text in (f"record: {{files: ['{file}']}}", f"validate: {{record: [{{files: ['{file}']}}]}}", f"record: {{files: [record.csv], also: [['{file}']]}}"):  # fmt: skip
+        answer = studio.post("study", {"text": text})
+        if Path(file).name != file:
+            assert answer.status_code == 422 and "work folder" in answer.text
+            assert not (studio.path / "study.yaml").exists()
+
+
+def test_a_folder_opens_again(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    studio.upload("record", "run.csv", csv())
+    studio.post(
+        "study", {"values": json.dumps({"symgen": 1, "record": [{"files": ["record.csv"]}]})}
+    )
+    (studio.path / "runs" / "01-killed").mkdir()
+    (studio.path / "left.part").write_text("x")
+    again = WorkFolder(studio.path)
+    assert again.robot == studio.path / "robot.yaml" and again.study()["record"][0]["files"] == [
+        "record.csv"
+    ]
+    assert sorted(p.name for p in studio.path.iterdir()) == [
+        "record.csv",
+        "robot.yaml",
+        "runs",
+        "study.yaml",
+    ]
+    assert list((studio.path / "runs").iterdir()) == []
+
+
+@pytest.mark.campaign
+def test_many_requests_at_once(studio: Any) -> None:
+    """200, among them 50 edits: each is answered, one edit of each state wins."""
+    import httpx
+
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    digest, cells = studio.server.folder.digest, table.cells_of(TEXT)
+
+    async def all_of_them() -> list[int]:
+        transport = httpx.ASGITransport(app=studio.app)
+        async with httpx.AsyncClient(
+            transport=transport, base_url=f"http://127.0.0.1:8123/{studio.server.token}/"
+        ) as client:
+            edits = [
+                json.dumps(cells | {"constants": {"D2": str(k), "g": "9.81"}}) for k in range(1, 51)
+            ]
+            posts = [
+                client.post(
+                    "do/edit",
+                    data={"digest": digest, "cells": e},
+                    headers={"origin": "http://127.0.0.1:8123"},
+                )
+                for e in edits
+            ]
+            gets = [client.get(name) for name in ("record", "check", "jobs") for _ in range(50)]
+            return [answer.status_code for answer in await asyncio.gather(*posts, *gets)]
+
+    studio.server.process.end()
+    studio.server.viewing = asyncio.Lock()
+    codes = asyncio.run(all_of_them())
+    assert set(codes[50:]) == {200} and codes[:50].count(200) >= 1 and set(codes[:50]) <= {200, 422}
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        "{",
+        "5",
+        "[]",
+        '{"frames": {"1": 5}, "constants": {}, "gravity": [], "loops": []}',
+        '{"frames": {"x": {}}}',
+    ],
+)
+def test_what_is_no_table_is_refused(studio: Any, cells: str) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    answer = studio.post("edit", {"digest": studio.server.folder.digest, "cells": cells})
+    assert answer.status_code == 422 and "no table" in answer.text
+    assert (studio.path / "robot.yaml").read_text() == TEXT
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("a.urdf", b"<robot"), ("a.yaml", bytes(range(256))), ("a.yaml", b"- a"), ("a.yaml", b"frames: {1: 5}\nsymgen: 1"), ("a.xml", b"<mujoco/>"), ("a.par", b"x")],
+)  # fmt: skip
+def test_a_file_that_is_no_robot_is_told_on_the_page(
+    studio: Any, name: str, content: bytes
+) -> None:
+    assert studio.upload("robot", name, content).status_code == 200
+    for step in ("robot", "record", "check", "solve", "results"):
+        assert studio.get(step).status_code == 200
+    assert 'class="no"' in studio.get("robot").text
+    assert studio.post("check", {}).status_code == 422
+
+
+@pytest.mark.parametrize("text", ["- 1", "record: 5", "estimate: 7", "{" * 60, "\x00"])
+def test_a_text_that_is_no_study_is_refused(studio: Any, text: str) -> None:
+    for form in ({"text": text}, {"values": text}, {"values": "[1]"}):
+        assert studio.post("study", form).status_code == 422
+    assert studio.post("solve", {"values": "5", "name": "../x"}).status_code == 422
+    assert (
+        not (studio.path / "study.yaml").exists() and list((studio.path / "runs").iterdir()) == []
+    )
+
+
+def test_the_server_ends_some_time_after_its_last_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving, "IDLE_TIME", 0.2)
+    ended: list[float] = []
+
+    async def closed_after(seconds: float) -> None:
+        own = server.Server(WorkFolder(tmp_path), {})
+        own.pages = 1
+        loop = asyncio.get_running_loop()
+        start = loop.time()
+        loop.call_later(seconds, lambda: setattr(own, "pages", 0))
+        await asyncio.wait_for(serving.idle(own, lambda: ended.append(loop.time() - start)), 5)
+
+    asyncio.run(closed_after(0.3))
+    assert ended[0] >= 0.45
