@@ -209,13 +209,15 @@
     const node = document.activeElement;
     typed = node?.id && node.matches("#cells input") ? { id: node.id, value: node.value } : null;
   });
-  document.addEventListener("htmx:afterSettle", (event) => {
+  document.addEventListener("htmx:afterSwap", () => { // at once: a key pressed before it settles is of the new field
     const node = typed && document.getElementById(typed.id);
     if (node && node.value !== typed.value) {
       node.value = typed.value;
       node.dispatchEvent(new Event("input", { bubbles: true }));
     }
     typed = null;
+  });
+  document.addEventListener("htmx:afterSettle", (event) => {
     if (event.target.id === "table" || one("#table")?.contains(event.target)) read();
   });
   document.addEventListener("htmx:sendError", () => say("The server has ended; what was saved is in the work folder. Start symgen studio again."));
