@@ -177,6 +177,25 @@ def test_corrected_sigma_with_as_many_parameters_as_blocks():
     assert np.median(np.sqrt(np.mean(plain, axis=0) / real)) < 0.85
 
 
+def test_a_block_that_alone_knows_a_parameter_is_left_out_for_the_others():
+    """Five rows a block, so that leverages are large: refits without each block, and no deviation
+    for the parameter that only the first of them sees.
+    """
+    rng = np.random.default_rng(4)
+    W, Y = rng.standard_normal((30, 4)), rng.standard_normal(30)
+    W[5:, 3] = 0
+    blocks = np.split(np.column_stack([W, Y]), 6)
+    X, T = np.linalg.lstsq(W, Y, rcond=None)[0], np.linalg.inv(np.linalg.qr(W, mode="r"))
+    changes = []
+    for k in range(6):
+        rest = np.vstack([rows for i, rows in enumerate(blocks) if i != k])
+        changes.append(X[:3] - np.linalg.lstsq(rest[:, :-1], rest[:, -1], rcond=None)[0][:3])
+    expected = 5 / 6 * sum(np.outer(change, change) for change in changes)
+    covariance = block_covariance(blocks, X, T)
+    np.testing.assert_allclose(covariance[:3, :3], expected, rtol=1e-9)
+    assert np.isnan(covariance[3, 3])
+
+
 def test_corrected_sigma_is_that_of_estimates_without_one_block():
     """The jackknife from its definition, with the weights of the joints; nothing where one block
     alone determines a parameter.
