@@ -5,9 +5,10 @@ where the study is written.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from runtime.settings.record import RecordSettings
 from runtime.settings.study import Study, to_mapping
@@ -19,15 +20,31 @@ def located(study: Study, folder: Path) -> Study:
     return _with_files(study, lambda file: str(folder / file))
 
 
-def study_text(study: Study, destination: Path) -> str:
-    """The text of study.yaml in the folder `destination`: every setting, defaults included; files
-    relative to that folder.
+def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str:
+    """The text of study.yaml in the folder `destination`; files relative to that folder. defaults :
+    every setting; else those that differ from their default, and the units of each record.
     """
-    return yaml_text(
-        to_mapping(
-            _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
-        )
+    mapping = to_mapping(
+        _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
     )
+    if not defaults:
+        mapping = {"symgen": mapping["symgen"], **_differing(mapping, to_mapping(Study()))}
+        usual = to_mapping(RecordSettings())
+        mapping["record"] = [
+            _differing(record, usual) | {"units": record["units"]} for record in mapping["record"]
+        ]
+    return yaml_text(mapping)
+
+
+def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries that are not the usual ones, sections by entry."""
+    return {
+        key: _differing(value, usual[key])
+        if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)
+        else value
+        for key, value in mapping.items()
+        if value != usual.get(key)
+    }
 
 
 def _with_files(study: Study, change: Callable[[str], str]) -> Study:

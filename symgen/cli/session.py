@@ -55,7 +55,8 @@ def reported_errors() -> Iterator[None]:
         raise typer.Exit(BROKEN_PIPE) from e
     except (InputError, SymgenError) as e:
         code = NEGATIVE if isinstance(e, CertificateError) else BAD_INPUT
-        fail(str(e), lines=isinstance(e, DataUnavailableError), code=code)
+        likely = getattr(e, "remedy", None) and "; identify --suggest FILE writes a likely study"
+        fail(f"{e}{likely or ''}", lines=isinstance(e, DataUnavailableError), code=code)
     except OSError as e:
         fail(f"{e.filename or 'cannot print, or write a temporary file'}: {e.strerror or e}")
 
@@ -68,15 +69,17 @@ def _noted_angles() -> Iterator[None]:
 
     with warnings.catch_warnings():
         show = warnings.showwarning
+        told: set[str] = set()  # a verb may read its robot twice
 
         def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
-            if issubclass(category, AngleWarning):
-                typer.echo(f"note: {message}", err=True)
-            else:
+            if not issubclass(category, AngleWarning):
                 show(message, category, *place)
+            elif str(message) not in told:
+                told.add(str(message))
+                typer.echo(f"note: {message}", err=True)
 
         warnings.showwarning = note  # type: ignore[assignment]
-        warnings.simplefilter("default", AngleWarning)
+        warnings.simplefilter("always", AngleWarning)
         yield
 
 
@@ -286,7 +289,8 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     if path.exists():
         raise InputError("the study to suggest exists; choose another name", file=str(path))
     study, told = suggested(study, model)
-    write_all(path.resolve().parent, {path.name: study_text(study, path.resolve().parent)})
+    folder = path.resolve().parent
+    write_all(folder, {path.name: study_text(study, folder, defaults=False)})
     for text in (*told, f"suggested study: {path}; look at it before you trust the values"):
         say(text)
     return study

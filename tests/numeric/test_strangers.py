@@ -308,12 +308,13 @@ def test_a_study_is_suggested_where_a_record_is_refused(tmp_path, logger) -> Non
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
     record, study = str(tmp_path / "log.csv"), tmp_path / "new" / "study.yaml"
     refused = CliRunner().invoke(app, ["identify", "planar_2r", record])
-    assert refused.exit_code == 2
+    assert refused.exit_code == 2 and "--suggest FILE" in refused.stderr
     first = CliRunner().invoke(app, ["identify", "planar_2r", record, "--suggest", str(study)])
     assert first.exit_code == 0, first.output
     assert "FV1 0.4" in first.stdout or "FV1 0.5" in first.stdout
     assert "suggested: record: columns:" in first.stderr and "resample" in first.stderr
     assert ("units: {tau: A}" in first.stderr) == (logger == "ur")
+    assert "lowpass" not in study.read_text() and "units: {t: s, q: rad" in study.read_text()
     again = CliRunner().invoke(app, ["identify", "planar_2r", str(study)])
     assert again.exit_code == 0 and again.stdout == first.stdout
     twice = CliRunner().invoke(app, ["identify", "planar_2r", record, "--suggest", str(study)])
