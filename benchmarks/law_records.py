@@ -1,6 +1,7 @@
-"""Records without torques and joints with two encoders: tables of docs/guide/law.md.
+"""Records without torques and joints with two encoders: tables of docs/guide/law.md; `calf`: the one of
+docs/answers/go2_calf.md.
 
-    SYMGEN_DATA=... python benchmarks/law_records.py [go2] [kr300]
+    SYMGEN_DATA=... python benchmarks/law_records.py [go2] [kr300] [calf]
 
 Go2: runs 0 to 7 under one PD law; torque of the law, weights by joint. KR300: records A and B, motor
 encoders and those behind the gears of axes 1 to 3.
@@ -169,6 +170,20 @@ def go2() -> None:
     table(("treatment", *map(str, RUNS), "mean"), rows)
 
 
+def calf() -> None:
+    """Armature of the calves by treatment: mean of eight fits, scatter, stated deviation."""
+    model = go2_model()
+    rows = []
+    for title, study in (
+        ("median off, low-pass 10 Hz", go2_study()),
+        ("the same, torques 10 ms later", go2_study(delay=0.01)),
+        ("defaults: median 5, cut-off auto", go2_study(cutoff="auto", median=5)),
+    ):
+        values = spread(model, observed(model, study), [f"Ia{j}" for j in CALVES])
+        rows.append((title, *(f"{m:.4f}, {s:.4f} ({d:.4f})" for _, m, s, d in values)))
+    table(("treatment", "FL, `Ia3`", "FR, `Ia6`", "RL, `Ia9`", "RR, `Ia12`"), rows)
+
+
 def kr300() -> None:
     import kr300 as source
 
@@ -206,4 +221,4 @@ def kr300() -> None:
 if __name__ == "__main__":
     asked = sys.argv[1:] or ["go2", "kr300"]
     for name in asked:
-        {"go2": go2, "kr300": kr300}[name]()
+        {"go2": go2, "kr300": kr300, "calf": calf}[name]()

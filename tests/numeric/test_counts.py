@@ -4,6 +4,7 @@ states against motions known in closed form.
 
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,6 +35,8 @@ from runtime.signals.encoder_advice import encoder_sentences
 from runtime.signals.filters import filtered_states
 from runtime.signals.states import observed_states
 from symgen.demo.tx40_tables import MAIN
+
+GENERATED = Path(__file__).parents[2] / "generated"
 
 RATE = 2000.0
 T = np.arange(8000) / RATE
@@ -490,7 +493,7 @@ def test_encoders_on_the_motors_of_a_coupled_wrist():
     """Motor 6 sees q5 and q6: six encoders of 200 lines on the motors, read there, say joints to
     the step over the ratio.
     """
-    model = load_model("tx40")
+    model = load_model("tx40", folder=GENERATED)
     drives = {
         key: np.array(value) for key, value in model.DRIVES.items() if key != "torque_constant"
     }
@@ -515,7 +518,7 @@ def test_encoders_on_the_motors_of_a_coupled_wrist():
 @pytest.mark.parametrize("coupling", ["both", "position", "torque", "none"])
 def test_motor_counts_are_counts_whatever_the_coupling(coupling, tmp_path):
     """Positions that were turned by drives of some coupling are turned back by the same drives."""
-    model = load_model("tx40")
+    model = load_model("tx40", folder=GENERATED)
     ratio = np.array(model.DRIVES["ratio"])
     t = np.arange(2000) / 1000.0
     q = 0.4 * np.sin(2 * np.pi * 0.6 * t[:, None] + np.arange(6))
@@ -568,7 +571,7 @@ def test_measured_record_at_a_coarse_step(tx40_data):
     """2 pi/1000 at the joints: main parameters within 2 % rms of those of the whole record,
     low-pass above 20 %.
     """
-    model, study = load_model("tx40"), study_from_mapping(dataset_study("tx40"))
+    model, study = load_model("tx40", folder=GENERATED), study_from_mapping(dataset_study("tx40"))
     full = read_records(study.record, model)[0]
     step = 2 * np.pi / 1000
     main = list(MAIN)

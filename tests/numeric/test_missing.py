@@ -4,6 +4,7 @@ where counts are not read."""
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import polars
@@ -30,6 +31,8 @@ from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study
 from runtime.signals.filters import filtered_states
 from runtime.signals.states import encoder_position, observed_states
 from symgen.cli.main import app
+
+GENERATED = Path(__file__).parents[2] / "generated"
 
 N, STEP = 4000, 2.5e-3
 T = np.arange(N) / 1000.0
@@ -231,7 +234,7 @@ def test_coupled_motors():
     """Motor 6 turns with joints 5 and 6. Recorded at the motors, each stands for itself; recorded
     at the joints, motor 6 lacks what either lacks.
     """
-    model = load_model("tx40")
+    model = load_model("tx40", folder=GENERATED)
     drives = Drives.from_mapping(model.DRIVES)
     q = 0.4 * np.sin(2 * np.pi * 0.6 * T[:2000, None] + np.arange(6)) + drives.offset
     step = 2 * np.pi / 50
@@ -268,7 +271,7 @@ def test_motor_side_of_a_file(tmp_path):
     follow from them.
     """
     given = replace(written("csv", tmp_path), side="motor")
-    model = load_model("planar_2r")
+    model = load_model("planar_2r", folder=GENERATED)
     drives = {"ratio": [[40.0, 0.0], [10.0, 30.0]]}
 
     class Coupled:
