@@ -20,7 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from runtime.errors import InputError
-from runtime.records.formats.table import KINDS, is_measured
+from runtime.records.datasets import DATASETS
+from runtime.records.formats.bags import stored_files
+from runtime.records.formats.table import BAG, KINDS, is_measured
 from runtime.records.named import study_of
 from runtime.result_files import write_all
 from runtime.settings.files import study_from_text
@@ -50,7 +52,7 @@ class WorkFolder:
         (self.path / "runs").mkdir(parents=True, exist_ok=True)
         killed = [run for run in (self.path / "runs").iterdir() if not result_of(run)]
         for left in (*killed, *self.path.glob("*.part"), self.path / ".tmp"):
-            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(True)
+            remove(left)
 
     def write(self, name: str, content: str | bytes) -> None:
         """One file of ours, whole or not at all."""
@@ -79,8 +81,7 @@ class WorkFolder:
 
     def take_robot(self, name: str, content: bytes) -> None:
         """A file that was dropped becomes the robot; results and record stay."""
-        ending = Path(name).suffix.lower()
-        ending = OTHER_ENDINGS.get(ending, ending)
+        ending = OTHER_ENDINGS.get(suffix := Path(name).suffix.lower(), suffix)
         if ending not in ROBOT_ENDINGS:
             raise InputError(
                 f"{name[:80]}: expected a robot file that ends in {', '.join(ROBOT_ENDINGS)}"
@@ -107,33 +108,32 @@ class WorkFolder:
         """The file of the record, or of its validation."""
         return next((p for p in sorted(self.path.glob(f"{kind}.*")) if is_measured(p)), None)
 
-    def measured_name(self, kind: str, name: str) -> str:
-        """Name here of a measured file that is called `name` by its owner."""
+    def take_measured(self, kind: str, name: str, part: Path) -> None:
+        """A file that has arrived, called `name` by its owner, becomes the record or the
+        validation; a record has a new study.
+        """
         ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*KINDS, ".gz"))
         if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in KINDS:
             raise InputError(f"{name[:80]}: expected a measured file: {', '.join(KINDS)}, or .gz")
-        return kind + ending
-
-    def take_measured(self, kind: str, name: str, part: Path) -> None:
-        """A file that has arrived becomes the record or the validation; a record has a new
-        study.
-        """
-        target = self.path / self.measured_name(kind, name)
         if (old := self.measured(kind)) is not None:
-            old.unlink()
-        part.replace(target)
+            remove(old)
+        part.replace(self.path / f"{kind}{ending}")
         if kind == "record":
             (self.path / "study.yaml").unlink(missing_ok=True)
 
     def take_record_of(self, source: str) -> None:
         """A dataset, a study file or a measured file of the command line."""
         study, base = study_of(source)
-        if is_measured(Path(source)) and Path(source).is_file():
-            part = self.path / "command.part"
-            shutil.copyfile(source, part)
-            self.take_measured("record", source, part)
-        else:
+        path, part = Path(source), self.path / "command.part"
+        if source in DATASETS or not is_measured(path):
             self.write("study.yaml", study_text(located(study, base.resolve()), self.path))
+        elif path.is_dir():
+            bag = {file.name for file in stored_files(path)} | {"metadata.yaml"}
+            shutil.copytree(path, part, ignore=lambda _, names: {*names} - bag)
+            self.take_measured("record", f"bag{BAG}", part)
+        else:
+            shutil.copyfile(path, part)
+            self.take_measured("record", source, part)
 
     def study(self) -> dict[str, Any]:
         """The plain values of study.yaml, {} where it holds none; InputError where it is no
@@ -142,8 +142,8 @@ class WorkFolder:
         values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
         return values if isinstance(values, dict) else {}
 
-    def save_study(self, given: Any, name: str = "study.yaml") -> None:
-        """A study by its text or its values, checked; InputError where it is none, or names a file
+    def checked_study(self, given: Any) -> str:
+        """Text of a study by its text or its values; InputError where it is none, or names a file
         of another folder that study.yaml did not name before.
         """
         text = given if isinstance(given, str) else yaml_text(given)
@@ -154,7 +154,7 @@ class WorkFolder:
                 f"{', '.join(alien)[:200]}: a study of the studio names files of its work folder; "
                 "drop the file on the page, or name it on the command line"
             )
-        self.write(name, text)
+        return text
 
     def results(self) -> list[Path]:
         """Folders of complete results, in their order."""
@@ -167,10 +167,34 @@ class WorkFolder:
             raise InputError("no such run; reload the page")
         return found[name]
 
+    def about(self, run: Path) -> dict[str, Any]:
+        """What pages say of one run."""
+        kind = result_of(run)
+        data = json_of(run / kind)
+        parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]
+        unseen = [p.get("relative_error") or 0.0 for p in parts if not p.get("fitted")]
+        return {
+            "name": run.name,
+            "kind": kind.removesuffix(".json"),
+            "method": data.get("method", "resolution"),
+            "error": data.get("relative_error"),
+            "unseen": max(unseen, default=None),
+            "checklist": data.get("checklist") or {},
+            "verdict": data.get("verdict", ""),
+            "levels": data.get("levels") or [],
+            "command": self.read(f"study-{run.name}.yaml").partition("\n")[0].partition("# ")[2],
+            "files": sorted(p.name for p in run.iterdir() if p.is_file() and p.name[0] != "."),
+        }
+
 
 def result_of(run: Path) -> str:
     """Name of the result of a run; "" where it has not ended with one."""
     return next((name for name in RESULT_FILES if (run / name).is_file()), "")
+
+
+def remove(path: Path) -> None:
+    """No file or folder of that name is left."""
+    shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def json_of(path: Path) -> dict[str, Any]:
@@ -188,21 +212,3 @@ def files_named(settings: Any, key: str = "") -> list[str]:
     parts = settings.items() if isinstance(settings, dict) else ()
     items = [(key, x) for x in settings] if isinstance(settings, list | tuple) else parts
     return [file for inner, x in items for file in files_named(x, inner)]
-
-
-def run_of(path: Path) -> dict[str, Any]:
-    """What pages say of one run."""
-    kind = result_of(path)
-    data = json_of(path / kind)
-    parts = [p for part in data.get("validation") or [] for p in part.get("predictions", [])]
-    unseen = [p.get("relative_error") or 0.0 for p in parts if not p.get("fitted")]
-    return {
-        "name": path.name,
-        "kind": kind.removesuffix(".json"),
-        "method": data.get("method", "resolution"),
-        "error": data.get("relative_error"),
-        "unseen": max(unseen, default=None),
-        "checklist": data.get("checklist") or {},
-        "verdict": data.get("verdict", data.get("message", "")),
-        "files": sorted(p.name for p in path.iterdir() if p.is_file() and p.name[0] != "."),
-    }

@@ -83,7 +83,6 @@ class Guard:
         host, origin = (headers.get(name, []) for name in ("host", "origin"))
         changes = scope["method"] == "POST"
         own = origin == [f"http://{name}" for name in host]
-        site = headers.get("sec-fetch-site", ["same-origin"])
         length = headers.get("content-length", ["0"])[0]
         token = f"{scope['path']}/".split("/")[1]
         refused = {
@@ -93,7 +92,7 @@ class Guard:
             ),
             (405, "expected GET or POST"): scope["method"] not in ("GET", "HEAD", "POST"),
             (403, "the request comes from another site"): ((origin or changes) and not own)
-            or (changes and site != ["same-origin"]),
+            or (changes and headers.get("sec-fetch-site", ["same-origin"]) != ["same-origin"]),
             (
                 413,
                 f"more than {limit // 2**20} MB; name a larger record on the command line: symgen "

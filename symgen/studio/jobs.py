@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -24,6 +25,7 @@ from symgen.studio.folder import result_of
 
 GRACE = 3.0  # s, between the interrupt and the kill
 OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
+DRAWN = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[━╸╺]")  # bars, colours, moves of the cursor
 MOST_COMMANDS = 40  # commands in the queue
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
@@ -36,11 +38,9 @@ class Job:
     ----------
     number : int
     title : str
-        What it does, for the eye.
+        What it does, for the eye; of commands with one title only the last counts.
     words : tuple of str
         The command line.
-    key : str
-        Of commands of one key only the last counts.
     run : str
         Name of its folder of results; "" without.
     state : str
@@ -56,7 +56,6 @@ class Job:
     number: int
     title: str
     words: tuple[str, ...]
-    key: str = ""
     run: str = ""
     state: str = WAITING
     code: int | None = None
@@ -71,21 +70,27 @@ class Job:
         return shlex.join(self.words)
 
     @property
-    def elapsed(self) -> float:
-        """Seconds since it was started; 0 where it does not run."""
-        return time.monotonic() - self.started if self.state == RUNNING else 0.0
-
-    @property
     def open(self) -> bool:
         """Whether it waits or runs."""
         return self.state in (WAITING, RUNNING)
 
     @property
+    def said(self) -> list[str]:
+        """Lines of its error stream without what draws in a terminal."""
+        lines = re.split(r"[\r\n]+", DRAWN.sub(" ", self.progress))
+        return [" ".join(line.split()) for line in lines if line.strip()]
+
+    @property
+    def counted(self) -> list[str]:
+        """What is done and the total, as its bar says last."""
+        return re.findall(r"\d+(?=/\d)|(?<=\d/)\d+", "".join(self.said[-1:]))[:2]
+
+    @property
     def last(self) -> str:
         """Its last words."""
-        lines = self.progress.strip().split("\n")
-        errors = [line for line in lines if line.startswith("error: ")]
-        return (errors or lines)[-1].removeprefix("error: ") or f"exit code {self.code}"
+        errors = [line for line in self.said if line.startswith("error: ")]
+        words = (errors or self.said or [f"exit code {self.code}"])[-1]
+        return words.removeprefix("error: ")
 
     def signal(self, number: signal.Signals) -> None:
         """A signal to its process and those that it has started, where they are."""
@@ -114,23 +119,23 @@ class Jobs:
         self.all: list[Job] = []
         self.wake = asyncio.Event()
 
-    def add(self, title: str, words: Sequence[str], *, key: str = "", run: str = "") -> None:
-        """Queue a command; one with the same `key` gives way to it."""
+    def add(self, title: str, words: Sequence[str], *, run: str = "") -> None:
+        """Queue a command; one with the same title gives way to it."""
         for job in self.all:
-            if key and job.key == key:
+            if job.title == title:
                 self.cancel(job)
         if sum(job.open for job in self.all) >= MOST_COMMANDS:
             raise ValueError(
                 f"{MOST_COMMANDS} commands wait already; cancel some, or wait for them"
             )
         number = self.all[-1].number + 1 if self.all else 1
-        self.all.append(Job(number, title, tuple(words), key, run))
+        self.all.append(Job(number, title, tuple(words), run))
         self.wake.set()
         self.changed()
 
-    def last(self, key: str) -> Job | None:
-        """The last command of a key."""
-        return next((job for job in reversed(self.all) if job.key == key), None)
+    def last(self, title: str) -> Job | None:
+        """The last command of that title."""
+        return next((job for job in reversed(self.all) if job.title == title), None)
 
     def cancel(self, job: Job) -> None:
         """Take it out of the queue, or end its process."""
@@ -167,7 +172,9 @@ class Jobs:
             stdin=PIPE,
             stdout=PIPE,
             stderr=PIPE,
-            env={**os.environ, **dict.fromkeys(BLAS_THREADS, "1"), "TMPDIR": str(temporary)},
+            env=os.environ
+            | dict.fromkeys(BLAS_THREADS, "1")
+            | {"TMPDIR": str(temporary), "FORCE_COLOR": "1", "TERM": "xterm"},  # bars are drawn
             start_new_session=True,
         )
         if job.state == CANCELLED:  # while it was started

@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 import re
 import secrets
+import shlex
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,7 @@ from symgen.description.new import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of, run_of
+from symgen.studio.folder import DRAFT, json_of
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -33,6 +35,11 @@ PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
 VIEWS = ("formulas", "model", "module", "preview", "series")
+RUN_COMMANDS = {
+    "identify": ("identify",),
+    "cestac": ("cestac",),
+    "advise": ("cestac", "--advise"),
+}
 MOST_FIELDS = 100  # of a form
 Handler = Callable[[Any], Awaitable[Any]]
 ESTIMATORS = {
@@ -65,13 +72,9 @@ class Pages:
             "/do/upload": self._upload,
         }
         acts: tuple[Handler, ...] = (
-            self._packaged,
-            self._edit,
-            self._prove,
-            self._study,
-            self._check,
+            *(self._packaged, self._edit, self._prove, self._study, self._check),
+            *(self._solve, self._cancel, self._apply),
         )
-        acts += (self._solve, self._resolve, self._cancel, self._apply)
         posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
         return [
             Route(path, answering(handler), methods=["POST" if "/do/" in path else "GET"])
@@ -80,8 +83,11 @@ class Pages:
 
     def _posted(self, act: Handler) -> Handler:
         async def posted(request: Request) -> Response:
-            body = (await request.body()).decode("utf-8", "replace")
-            fields = parse_qsl(body, keep_blank_values=True, max_num_fields=MOST_FIELDS)
+            fields = parse_qsl(
+                (await request.body()).decode("utf-8", "replace"),
+                keep_blank_values=True,
+                max_num_fields=MOST_FIELDS,
+            )
             return await self._changed(await act(dict(fields)))
 
         return posted
@@ -101,8 +107,8 @@ class Pages:
 
     async def _part(self, name: str, asked: str | None = None) -> Response:
         """A template with all that pages show, but for what `_view` derives."""
-        folder, shown = self.folder, await self.server.robot()
-        runs = [run_of(run) for run in folder.results()]
+        folder, version, shown = self.folder, self.server.version, await self.server.robot()
+        runs = [folder.about(run) for run in folder.results()]
         record, validation = folder.measured("record"), folder.measured("validation")
         findings = json_of(folder.path / "check.json")
         own = folder.first(TREES)
@@ -115,6 +121,7 @@ class Pages:
         return page(
             name,
             steps=PAGE_STEPS,
+            version=version,
             shown=shown,
             place=".".join(shown.get("path", [])[:3]),
             cells=cells if shown.get("text") else None,
@@ -134,9 +141,10 @@ class Pages:
             wrong=wrong,
             findings=findings,
             stale=findings.get("of") != now,
-            checked=self.jobs.last("check"),
+            checked=self.jobs.last("check of the record"),
             methods=ESTIMATORS,
             jobs=self.jobs.all,
+            now=time.monotonic(),
             runs=runs,
             run=next((r for r in runs if r["name"] == asked), runs[-1] if runs else None),
             own=own.name if own else "",
@@ -145,7 +153,7 @@ class Pages:
 
     def _proof(self) -> dict[str, Any]:
         """The certificate and its state: none, stale, running, failed, valid, invalid or draft."""
-        claim, job = json_of(self.folder.path / "proof.json"), self.jobs.last("proof")
+        claim, job = json_of(self.folder.path / "proof.json"), self.jobs.last("certificate")
         state = "valid" if claim.get("valid") else "invalid"
         if claim.get("source_sha256") != self.folder.digest:
             state = "stale" if claim else "none"
@@ -167,7 +175,8 @@ class Pages:
             raise InputError("no such view")
         given: Any = self.server.before if name == "formulas" else asked
         if name == "series":
-            given = {"run": str(self.folder.run(asked.get("run", "")))}
+            run = str(self.folder.run(asked.get("run", "")))
+            given = {"run": run, "record": asked.get("record", "")}
         value = await self.server.view(getattr(views, name), str(path), given)
         if name in ("preview", "series"):
             return JSONResponse(value)
@@ -183,8 +192,9 @@ class Pages:
         if path is None:
             raise InputError("no such file")
         kind = SHOWN_FILES.get(path.suffix) if run and "keep" not in request.query_params else None
-        keep = attached(f"{(await self.server.robot()).get('name')}_{path.name}")
-        headers = {"content-security-policy": SANDBOX} | ({} if kind else keep)
+        keep = safe(f"{(await self.server.robot()).get('name')}_{path.name}")
+        attached = {"content-disposition": f'attachment; filename="{keep}"'}
+        headers = {"content-security-policy": SANDBOX} | ({} if kind else attached)
         return FileResponse(path, media_type=kind or "application/octet-stream", headers=headers)
 
     async def _upload(self, request: Request) -> Response:
@@ -192,8 +202,6 @@ class Pages:
         kind, name = (request.query_params.get(key, "") for key in ("kind", "name"))
         if kind not in ("robot", "record", "validation"):
             raise InputError("expected a robot, a record or a validation record")
-        if kind != "robot":
-            self.folder.measured_name(kind, name)
         part = self.folder.path / f"{secrets.token_hex(8)}.part"
         try:
             with part.open("xb") as file:
@@ -217,9 +225,9 @@ class Pages:
 
     async def _edit(self, form: dict[str, str]) -> str:
         """An edit of the table, cell by cell or as a text."""
+        text = (await self.server.robot()).get("text", "")
         if form.get("digest") != self.folder.digest:
             raise InputError("another page has changed the robot; reload this one")
-        text = (await self.server.robot()).get("text", "")
         if not self.folder.read(DRAFT):
             self.server.before = text
         text = form["text"].replace("\r\n", "\n") if "text" in form else text
@@ -230,13 +238,14 @@ class Pages:
 
     async def _prove(self, form: dict[str, str]) -> str:
         words = ("symgen", "check", self._source().name, "--certificate", "proof.json")
-        self.jobs.add("certificate", words, key="proof")
+        self.jobs.add("certificate", words)
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
         """The study as text, or as values in JSON."""
         text = form.get("text", "").replace("\r\n", "\n")
-        self.folder.save_study(json.loads(form["values"]) if "values" in form else text)
+        values = json.loads(form["values"]) if "values" in form else text
+        self.folder.write("study.yaml", self.folder.checked_study(values))
         return "study"
 
     def _command(self) -> tuple[str, str]:
@@ -247,38 +256,37 @@ class Pages:
 
     async def _check(self, form: dict[str, str]) -> str:
         words = ("check", *self._command(), "check.json")
-        self.jobs.add("check of the record", words, key="check")
+        self.jobs.add("check of the record", words)
         return "findings"
 
-    def _run(self, name: str, *words: str) -> str:
-        """Name of a new run whose command is queued."""
+    async def _solve(self, form: dict[str, str]) -> str:
+        """A run of the study, or of the values of a form in JSON: an estimate, or a study of the
+        resolution. Its settings begin with its command.
+        """
+        robot, _ = self._command()
+        kind = form.get("kind", "identify")
+        if kind not in RUN_COMMANDS:
+            raise InputError(f"expected one of {', '.join(RUN_COMMANDS)}")
+        text = self.folder.checked_study(
+            json.loads(form.get("values", "{}")) or self.folder.study()
+        )
+        options = [f"--{name}" for name in ("physical", "friction") if form.get(name)] + [
+            f"--delta={' '.join(part.split())[:60]}"
+            for part in form.get("delta", "").split(",")
+            if part.strip()
+        ]
         taken = [job.run for job in self.jobs.all] + [p.name for p in self.folder.results()]
         number = max((int(run[:2]) for run in taken if run[:2].isdigit()), default=0) + 1
-        run = f"{number:02d}-{safe(name)}"
-        named = [word.replace("RUN", run) for word in ("symgen", *words, "-o", "runs/RUN")]
-        self.jobs.add(run, named, run=run)
-        return run
-
-    async def _solve(self, form: dict[str, str]) -> str:
-        """A run of the study with the values of a form, in JSON."""
-        robot, _ = self._command()
-        options = [f"--{name}" for name in ("physical", "friction") if form.get(name)]
-        new = self.folder.path / "study-new.yaml"
-        self.folder.save_study(json.loads(form.get("values", "")), new.name)
-        run = self._run(form.get("name", ""), "identify", robot, "study-RUN.yaml", *options)
-        new.replace(self.folder.path / f"study-{run}.yaml")
-        return "jobs"
-
-    async def _resolve(self, form: dict[str, str]) -> str:
-        delta = form.get("delta", "").strip()[:60]
-        asked = [f"--delta={delta}"] if delta else []
-        self._run("resolution", "cestac", *self._command(), "--advise", *asked)
+        run = f"{number:02d}-{safe(form.get('name', '') or kind)}"
+        verb, *own = RUN_COMMANDS[kind]
+        words = ("symgen", verb, robot, f"study-{run}.yaml", *own, *options, "-o", f"runs/{run}")
+        self.jobs.add(run, words, run=run)
+        self.folder.write(f"study-{run}.yaml", f"# {shlex.join(words)}\n{text}")
         return "jobs"
 
     async def _cancel(self, form: dict[str, str]) -> str:
-        for job in self.jobs.all:
-            if str(job.number) == form.get("number"):
-                self.jobs.cancel(job)
+        for job in (job for job in self.jobs.all if str(job.number) == form.get("number")):
+            self.jobs.cancel(job)
         return "jobs"
 
     async def _apply(self, form: dict[str, str]) -> str:
@@ -287,9 +295,9 @@ class Pages:
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
             raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
-        words = ["symgen", "apply", f"runs/{run.name}", own.name, "-o", f"applied{own.suffix}"]
-        words += ["--force", "--diff", *([] if robot == own else ["--robot", robot.name])]
-        self.jobs.add("apply", words, key="apply")
+        target = ("-o", f"applied{own.suffix}", "--force", "--diff")
+        edited = () if robot == own else ("--robot", robot.name)
+        self.jobs.add("apply", ("symgen", "apply", f"runs/{run.name}", own.name, *target, *edited))
         return "applied"
 
 
@@ -308,8 +316,3 @@ def answering(handler: Handler) -> Handler:
 def safe(text: str) -> str:
     """Letters, digits, _ . - of a text, for the name of a file."""
     return re.sub(r"[^A-Za-z0-9_.-]", "", text).lstrip(".-")[:60]
-
-
-def attached(name: str) -> dict[str, str]:
-    """Headers of a file that is kept."""
-    return {"content-disposition": f'attachment; filename="{safe(name)}"'}

@@ -8,6 +8,7 @@ import asyncio
 import secrets
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -57,9 +58,11 @@ class Server:
 
     async def view(self, view: Callable[..., dict[str, Any]], *args: Any) -> dict[str, Any]:
         """A view of files in the process of views, ended where it takes too long; what it gave
-        before where the robot and the arguments are the same.
+        before where the robot, the file of the view and the arguments are the same.
         """
-        key = (view.__name__, self.folder.digest, str(args))
+        file = Path(args[0])
+        written = file.stat().st_mtime_ns if file.exists() else 0
+        key = (view.__name__, self.folder.digest, written, str(args))
         async with self.viewing:
             if key in self.views:
                 return self.views[key]
@@ -70,8 +73,10 @@ class Server:
                 value = await asyncio.wait_for(future, VIEW_PATIENCE)
             except (TimeoutError, BrokenProcessPool):
                 await asyncio.to_thread(self.process.end)
-                why = f"takes more than {VIEW_PATIENCE:g} s, or than the memory that there is"
-                return {"error": f"{why}; the terminal has no such limit"}
+                return {
+                    "error": f"takes more than {VIEW_PATIENCE:g} s, or than the memory that there "
+                    "is; the terminal has no such limit"
+                }
             while len(self.views) >= REMEMBERED:
                 self.views.pop(next(iter(self.views)))
             self.views[key] = value
@@ -82,13 +87,12 @@ class Server:
         path, draft = self.folder.robot, self.folder.read(DRAFT)
         if path is None and not draft:
             return {}
-        name = "" if path is None else path.name
         shown = await self.view(views.robot, str(path), draft)
-        own = draft or (self.folder.read(name) if name.endswith(".yaml") else "")
-        return {**shown, "text": own or shown.get("text", "")}
+        own = "" if path is None or path.suffix != ".yaml" else self.folder.read(path.name)
+        return {**shown, "text": draft or own or shown.get("text", "")}
 
 
 def page(name: str, status: int = 200, **context: Any) -> Response:
     """A template as an answer; every name in it is escaped."""
-    template = PAGE_TEMPLATES.get_template(f"{name}.html.jinja")
-    return HTMLResponse(template.render(step=name, **context), status)
+    text = PAGE_TEMPLATES.get_template(f"{name}.html.jinja").render(step=name, **context)
+    return HTMLResponse(text, status)

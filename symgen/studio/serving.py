@@ -46,10 +46,9 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
             await asyncio.gather(*tasks, return_exceptions=True)
             server.process.end()
 
-    scripts = {"static": "studio/static", "report": "report"}
     mounts = [
         Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))
-        for name, place in scripts.items()
+        for name, place in {"static": "studio/static", "report": "report"}.items()
     ]
     inner = [Route("/events", events), *mounts, *Pages(server).routes()]
     app = Starlette(routes=[Mount(f"/{server.token}", routes=inner)], lifespan=lifespan)
@@ -62,10 +61,10 @@ async def told(server: Server) -> AsyncIterator[str]:
     server.pages += 1
     try:
         while True:
-            state = {"version": server.version, "robot": server.folder.digest}
+            news, state = server.news, {"version": server.version, "robot": server.folder.digest}
             yield f"data: {json.dumps(state)}\n\n"
-            with suppress(TimeoutError):
-                await asyncio.wait_for(server.news.wait(), 15)
+            with suppress(TimeoutError):  # news that came while it was sent counts
+                await asyncio.wait_for(news.wait(), 15)
             await asyncio.sleep(PULSE)
     finally:
         server.pages -= 1
@@ -105,8 +104,14 @@ def serve(
     port = listening.getsockname()[1]
     own: list[uvicorn.Server] = []
     app = application(server, port, lambda: setattr(own[0], "should_exit", True))
-    quiet = {"log_level": "critical", "access_log": False, "server_header": False, "ws": "none"}
-    config = uvicorn.Config(app, timeout_graceful_shutdown=2, **quiet)  # type: ignore[arg-type]
+    config = uvicorn.Config(
+        app,
+        timeout_graceful_shutdown=2,
+        log_level="critical",
+        access_log=False,
+        server_header=False,
+        ws="none",
+    )
     own.append(uvicorn.Server(config))
     address = f"http://127.0.0.1:{port}/{server.token}/robot"
     say(f"symgen studio: {address}\nwork folder: {work.path}\nCtrl-C ends it.")

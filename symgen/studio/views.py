@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+import runtime
 import symgen
 from runtime.errors import InputError
 from runtime.result_files import write_all
@@ -57,7 +58,7 @@ def robot(path: str, draft: str) -> dict[str, Any]:
         symgen.parse_robot(draft.encode(), "robot.yaml") if draft else symgen.load_robot(path)
     )
     drawn = figure(described, close(described))
-    turned = [
+    degrees = [
         {name: f"{np.degrees(frame[name]):.6g}°" for name in ("gamma", "alpha", "theta")}
         for frame in drawn["frames"]
     ]
@@ -68,7 +69,7 @@ def robot(path: str, draft: str) -> dict[str, Any]:
         "joints": described.joints,
         "labels": [described.labels.get(f.j, "") for f in described.frames],
         "figure": drawn,
-        "degrees": [{name: x for name, x in row.items() if x != "0°"} for row in turned],
+        "degrees": [{name: x for name, x in row.items() if x != "0°"} for row in degrees],
         "notes": doubts(described),
     }
 
@@ -161,8 +162,8 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 @answered
 def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Measured and predicted torques of the run in the folder `run`, with positions, at instants
-    that its estimate read.
+    """Measured and predicted torques of one `record` of the run in the folder `run`, fitted or to
+    validate on, with positions, at instants that its estimate read.
     """
     from runtime.estimators.estimate import load_estimate
     from runtime.identification.validation import direct_comparison
@@ -170,7 +171,7 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     from runtime.rows.prepared import prepared
 
     place = Path(request["run"])
-    loaded, study, (record, *_) = _read(path, place / "study.yaml")
+    loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
     fit = load_estimate(place / "estimate.json")
     if not isinstance(record, Record):
         raise InputError("the record is read by blocks; its report shows the torques")
@@ -182,6 +183,7 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
         rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
         torques[:, j, rows] = joint.measured, joint.predicted
     return {
+        "records": list(named),
         "t": _plain(selection.t[shown]),
         "joints": [str(j) for j in loaded.JOINTS],
         "q": list(map(_plain, own.states.q[selection.samples.start + selection.kept[shown]].T)),
@@ -190,16 +192,24 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _read(path: str, study_file: Path) -> tuple[Any, Any, Any]:
-    """Model, study and records of a command, whose files are relative to the study file."""
-    import runtime
+def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, ...]:
+    """Model, study, records, and settings of all of its records by their names; of the records
+    those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
+    relative to its study.
+    """
     from runtime.records.reading_by_blocks import records_or_streams
     from runtime.settings.location import located
 
     model = runtime.load_model(symgen.model(path))
     study = located(runtime.load_study(study_file), study_file.parent)
+    named = {
+        f"{k + 1}: {', '.join(Path(f).name for f in part.files) or part.dataset}, {use}": part
+        for use, settings in (("fitted", study.record), ("validation", study.validate.record))
+        for k, part in enumerate(settings)
+    }
+    chosen = study.record if asked is None else (named.get(asked, study.record[0]),)
     missing = study.signals.admits_missing
-    return model, study, records_or_streams(study.record, model, study.stream, missing=missing)
+    return model, study, records_or_streams(chosen, model, study.stream, missing=missing), named
 
 
 @answered
@@ -207,10 +217,9 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """Checks of record, study and robot with their remedies, and the predicted deviation of every
     parameter, %.
     """
-    import runtime
     from runtime.checks.motion import unexcited_shares
 
-    loaded, study, records = _read(robot_file, Path(study_file))
+    loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))
     judged = runtime.plausibility(loaded, records, study, variants=variants)
     rank, shares = 0, {}

@@ -1,7 +1,7 @@
 // Lines over time, or over position, as SVG with one cursor for all panels. The name space is that of drawing.js.
 "use strict";
-
 const one = (selector, of = document) => of.querySelector(selector), all = (selector, of = document) => [...of.querySelectorAll(selector)];
+const node = (tag, properties, ...inside) => { const made = Object.assign(document.createElement(tag), properties); made.append(...inside); return made; };
 const [PLOT_WIDTH, PLOT_HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [640, 150, 54, 8, 22, 20];
 
 /** Number of the instant next to t; the instants rise. */

@@ -1,9 +1,8 @@
 // Uploads, the drawing with its sliders, copy buttons, news of the server. htmx does the rest.
 "use strict";
-
 (function () {
   const plain = (x, digits) => { const text = x.toFixed(digits); return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "−"); };
-  const say = (text, kind = "no") => one("#message").replaceChildren(Object.assign(document.createElement("p"), { textContent: text, className: kind }));
+  const say = (text, kind = "no") => one("#message").replaceChildren(node("p", { textContent: text, className: kind }));
   // --- files that are dropped or chosen ---
   async function send(drop, file) {
     if (!file) return;
@@ -11,8 +10,7 @@
     try {
       const answer = await fetch(`${drop.dataset.upload}&name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
       if (answer.ok) return location.reload();
-      const text = await answer.text();
-      say(new DOMParser().parseFromString(text, "text/html").body.textContent.trim() || `refused, ${answer.status}`);
+      say(new DOMParser().parseFromString(await answer.text(), "text/html").body.textContent.trim() || `refused, ${answer.status}`);
     } catch {
       say(`${file.name}: was not taken: larger than the studio takes, or the server has ended`);
     }
@@ -23,7 +21,10 @@
       drop.addEventListener(name, (event) => {
         event.preventDefault();
         drop.classList.toggle("over", over);
-        if (name === "drop") send(drop, event.dataTransfer.files[0]);
+        if (name !== "drop") return;
+        const entry = event.dataTransfer.items?.[0]?.webkitGetAsEntry?.();
+        if (entry?.isDirectory) say(`${entry.name} is a folder; name it on the command line: symgen studio ROBOT ${entry.name}`);
+        else send(drop, event.dataTransfer.files[0]);
       });
   }
   // --- the drawing: kinematics.js and drawing.js of the page of a robot ---
@@ -49,18 +50,13 @@
     if (!place) return;
     const focused = document.activeElement?.id;
     place.replaceChildren(...arm.robot.joints.map(({ j, low, high }) => {
-      const row = Object.assign(document.createElement("div"), { className: "joint" });
-      const label = Object.assign(document.createElement("label"), { textContent: `q${j}`, htmlFor: `s-${j}` });
-      const input = Object.assign(document.createElement("input"), { type: "range", id: `s-${j}`, min: low, max: high, step: "any", value: arm.q[j] });
-      const at = Object.assign(document.createElement("output"), { id: `at-${j}` });
-      at.htmlFor = `s-${j}`;
+      const input = node("input", { type: "range", id: `s-${j}`, min: low, max: high, step: "any", value: arm.q[j] });
       input.addEventListener("input", () => {
         const result = moved(arm.robot, arm.q, j, Number(input.value), slides(j) ? arm.drawing.size / 50 : 0.05);
         arm.q = result.q;
         redraw();
       });
-      row.append(label, input, at);
-      return row;
+      return node("div", { className: "joint" }, node("label", { textContent: `q${j}`, htmlFor: `s-${j}` }), input, node("output", { id: `at-${j}`, htmlFor: `s-${j}` }));
     }));
     document.getElementById(focused)?.focus();
   }
@@ -102,13 +98,10 @@
     for (const end of ["pointerup", "pointercancel"]) view.addEventListener(end, () => { grip = null; });
   }
   // --- replay: one cursor for the drawing and all plots ---
-  async function replay(place) {
-    const answer = await fetch(place.dataset.series), data = answer.ok ? await answer.json() : { error: await answer.text() };
-    if (data.error) return place.replaceChildren(Object.assign(document.createElement("p"), { className: "no", textContent: data.error }));
-    const cursor = one("#cursor"), joint = one("#joint"), play = one("#play");
-    Object.assign(cursor, { min: data.t[0], max: data.t.at(-1), value: data.t[0] });
-    joint.replaceChildren(...data.joints.map((name) => new Option(name)));
-    let plots = null, timer = null;
+  function replay(place) {
+    const [cursor, joint, part, play] = ["#cursor", "#joint", "#part", "#play"].map((id) => one(id));
+    let data = null, plots = null, timer = null;
+    const options = (select, names, k) => select.replaceChildren(...names.map((name, i) => new Option(name, name, i === k, i === k)));
     const at = (t) => {
       const k = nearest(data.t, t);
       cursor.value = data.t[k];
@@ -130,20 +123,30 @@
       ], at);
       at(Number(cursor.value));
     };
+    const load = async () => { // the record that is chosen, "" for the first
+      const answer = await fetch(`${place.dataset.series}&record=${encodeURIComponent(part.value)}`), value = answer.ok ? await answer.json() : { error: await answer.text() };
+      if (value.error) return say(value.error);
+      data = value;
+      options(part, data.records, Math.max(part.selectedIndex, 0));
+      options(joint, data.joints, Math.max(joint.selectedIndex, 0));
+      Object.assign(cursor, { min: data.t[0], max: data.t.at(-1), value: data.t[0] });
+      show();
+    };
+    part.addEventListener("change", load);
     joint.addEventListener("change", show);
-    cursor.addEventListener("input", () => at(Number(cursor.value)));
+    cursor.addEventListener("input", () => data && at(Number(cursor.value)));
     play.addEventListener("click", () => {
-      if (timer) { clearInterval(timer); timer = null; play.textContent = "Play"; return; }
+      if (timer || !data) { clearInterval(timer); timer = null; play.textContent = "Play"; return; }
       play.textContent = "Stop";
       timer = setInterval(() => {
         const t = Number(cursor.value) + 0.05;
         at(t > data.t.at(-1) ? data.t[0] : t);
       }, 50);
     });
-    show();
+    load();
   }
   // --- the table: every cell to the server, one edit at a time; what is typed meanwhile stays ---
-  let pending = null, busy = false, resting = null;
+  let pending = null, busy = false, resting = null, sent = {};
 
   function cells() {
     const form = one("#cells"), found = { frames: {}, constants: {}, gravity: [], loops: [] }, names = {};
@@ -178,12 +181,15 @@
     return { ...table, frames: Object.fromEntries(rows.map((row, k) => [k + 1, row])) };
   }
 
-  async function edit(table, resized) {
-    pending = { digest: one("#cells").dataset.digest, cells: JSON.stringify(table), ...(resized ? { resized: "1" } : {}) };
+  /** Send a table, or the cells as they then are; `act` is what added or removed a frame. */
+  async function edit(table, act) {
+    clearTimeout(resting);
+    pending = { table, act };
     if (busy) return;
     busy = true;
     while (pending) {
-      const values = { ...pending, digest: one("#cells").dataset.digest };
+      const values = { digest: one("#cells").dataset.digest, cells: JSON.stringify(pending.table || cells()), ...(pending.act ? { resized: "1" } : {}) };
+      sent = pending.act === "remove" ? {} : Object.fromEntries(all("#cells input").map((input) => [input.id, input.value]));
       pending = null;
       await htmx.ajax("POST", "do/edit", { target: "#table", swap: "outerHTML", values });
     }
@@ -192,30 +198,28 @@
   document.addEventListener("input", (event) => {
     if (!event.target.closest("#cells")) return;
     clearTimeout(resting);
-    resting = setTimeout(() => edit(cells(), false), 250);
+    resting = setTimeout(edit, 250);
   });
   document.addEventListener("submit", (event) => {
     if (event.target.id !== "cells") return;
     event.preventDefault();
-    edit(cells(), false);
+    edit();
   });
   document.addEventListener("click", (event) => {
     const [act, j] = event.target.closest("[data-act]")?.dataset.act.split(" ") || [];
-    if (act) edit(changed(cells(), act, Number(j)), act === "add" || act === "remove");
+    if (act) edit(changed(cells(), act, Number(j)), act.endsWith("loop") ? "" : act);
   });
 
-  let typed = null;
-  document.addEventListener("htmx:beforeSwap", () => {
-    const node = document.activeElement;
-    typed = node?.id && node.matches("#cells input") ? { id: node.id, value: node.value } : null;
-  });
+  let typed = [];
+  document.addEventListener("htmx:beforeSwap", () => { typed = all("#cells input").filter(({ id, value }) => id in sent && value !== sent[id]); });
   document.addEventListener("htmx:afterSwap", () => { // at once: a key pressed before it settles is of the new field
-    const node = typed && document.getElementById(typed.id);
-    if (node && node.value !== typed.value) {
-      node.value = typed.value;
-      node.dispatchEvent(new Event("input", { bubbles: true }));
+    for (const { id, value, selectionStart } of typed) {
+      const field = document.getElementById(id);
+      if (!field || field.value === value) continue;
+      field.value = value;
+      if (field === document.activeElement) field.setSelectionRange(selectionStart, selectionStart);
+      field.dispatchEvent(new Event("input", { bubbles: true }));
     }
-    typed = null;
   });
   document.addEventListener("htmx:afterSettle", (event) => {
     if (event.target.id === "table" || one("#table")?.contains(event.target)) read();
@@ -224,40 +228,35 @@
   document.addEventListener("htmx:beforeRequest", () => one("#message").replaceChildren());
 
   document.addEventListener("click", async (event) => {
-    const button = event.target.closest("[data-copy]");
+    const button = event.target.closest("[data-copy], [data-download]");
     if (!button) return;
-    const source = one(button.dataset.copy);
+    const source = one(button.dataset.copy || button.dataset.download), before = button.textContent;
+    if (button.dataset.download) {
+      const href = URL.createObjectURL(new Blob([source.textContent]));
+      node("a", { href, download: button.dataset.name }).click();
+      return setTimeout(() => URL.revokeObjectURL(href), 1000);
+    }
     try { await navigator.clipboard.writeText(source.textContent); } catch { getSelection().selectAllChildren(source); document.execCommand("copy"); }
-    const before = button.textContent;
     button.textContent = "Copied";
     setTimeout(() => { button.textContent = before; }, 1200);
   });
-  document.addEventListener("click", (event) => {
-    const button = event.target.closest("[data-download]");
-    if (!button) return;
-    const href = URL.createObjectURL(new Blob([one(button.dataset.download).textContent]));
-    Object.assign(document.createElement("a"), { href, download: button.dataset.name }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 1000);
-  });
   // --- news of the server ---
-  let shownRobot = one("#figure")?.dataset.digest || "", version = null, timer = null;
+  let shownRobot = one("#figure")?.dataset.digest || "", version = Number(one("#values").dataset.version), timer = null;
   const news = new EventSource("events");
   news.addEventListener("message", (event) => {
     const state = JSON.parse(event.data);
-    if (version !== null && state.version !== version) htmx.trigger(document.body, "changed");
+    if (state.version !== version) htmx.trigger(document.body, "changed");
     version = state.version;
     clearTimeout(timer);
     timer = setTimeout(() => {
       const own = one("#figure")?.dataset.digest;
-      if (own && one("#table") && state.robot !== own) one("#other").hidden = false;
-      if (own && state.robot === own) one("#other").hidden = true;
+      if (own && one("#table")) one("#other").hidden = state.robot === own;
     }, 1500);
   });
   document.addEventListener("htmx:afterSettle", () => {
     const robot = one("#figure")?.dataset.digest || "";
     if (robot !== shownRobot && one("#figure").dataset.figure) { shownRobot = robot; htmx.trigger(document.body, "robot"); }
   });
-  // the one that the parts of this page are of
   read();
   all("[data-series]").forEach(replay);
 })();

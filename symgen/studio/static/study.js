@@ -1,11 +1,8 @@
 // The study: columns by their names, answers, remedies, estimators, values side by side.
 "use strict";
-
 (function () {
-  const node = (tag, properties, ...inside) => { const made = Object.assign(document.createElement(tag), properties); made.append(...inside); return made; };
   const page = one("#values")?.dataset || {}, joints = Number(page.joints) || 99;
   const study = () => JSON.parse((one("#study[data-values], #findings[data-values]") || one("#values")).dataset.values);
-  const save = (values) => htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: { values: JSON.stringify(values) } });
   const number = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const listed = (x) => (x === null || x === undefined ? "" : Array.isArray(x) ? x.join(", ") : String(x));
   // --- columns by their names ---
@@ -40,7 +37,7 @@
   }
   // --- the questions ---
   const LISTS = ["columns.q", "columns.tau"];
-  let guess = {};
+  let guess = {}, shown = null;
 
   function fill() {
     const form = one("#questions");
@@ -50,7 +47,6 @@
       if (!field.name) continue;
       const [key, inner] = field.name.split("."), own = inner ? record[key]?.[inner] : record[key];
       field.value = listed(own ?? guess[field.name]);
-      if (own && !field.value) field.value = listed(own);
     }
     if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
     one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
@@ -63,7 +59,10 @@
       one(`label[for='${field.id}'] .ask`).hidden = Boolean(field.value);
     }
   };
-  document.addEventListener("change", (event) => { if (event.target.closest("#questions")) ask(); });
+  document.addEventListener("change", (event) => {
+    if (event.target.closest("#questions")) ask();
+    else if (event.target.closest("#jobs")) compare();
+  });
 
   function answered(form) {
     const values = study(), record = { files: [page.record], ...values.record?.[0] };
@@ -84,12 +83,11 @@
       event.preventDefault();
       const open = all("strong.ask:not([hidden])", event.target);
       if (open.length) return document.getElementById(open[0].parentElement.htmlFor).focus();
-      save(answered(event.target));
+      htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: { values: JSON.stringify(answered(event.target)) } });
     }
-    if (event.target.id === "solve") {
-      event.preventDefault();
-      solve(event.target);
-    }
+    if (event.target.id !== "solve" && event.target.id !== "resolution") return;
+    event.preventDefault();
+    (event.target.id === "solve" ? solve : round)(new FormData(event.target));
   });
 
   async function preview() {
@@ -149,20 +147,27 @@
     }
   }
   // --- estimators and settings, each a run ---
-  async function solve(form) {
-    const data = new FormData(form), cutoffs = data.get("cutoff").split(",").map((text) => text.trim());
+  const run = (values, more) => htmx.ajax("POST", "do/solve", { target: "#jobs", swap: "outerHTML", values: { values: JSON.stringify(values), ...more } });
+
+  function round(data) {
+    const kind = data.get("kind"), delta = data.get("delta").split(",").map((text) => text.trim()).filter(Boolean), values = study();
+    values.cestac = { ...values.cestac, ...(delta.length ? { delta } : {}), ...(data.get("runs") ? { runs: number(data.get("runs")) } : {}) };
+    return run(values, { kind, ...(kind === "advise" ? { delta: delta.join(",") } : {}) });
+  }
+
+  async function solve(data) {
+    const cutoffs = data.get("cutoff").split(",").map((text) => text.trim());
     for (const method of data.getAll("method"))
       for (const cutoff of cutoffs) {
         const values = study();
         values.estimate = { ...values.estimate, method };
         if (cutoff) values.signals = { ...values.signals, lowpass: { ...values.signals?.lowpass, cutoff: number(cutoff) } };
         const options = Object.fromEntries(["physical", "friction"].filter((name) => data.get(name)).map((name) => [name, "1"]));
-        await htmx.ajax("POST", "do/solve", { target: "#jobs", swap: "outerHTML", values: { values: JSON.stringify(values), name: cutoff ? `${method}-${cutoff}` : method, ...options } });
+        await run(values, { name: cutoff ? `${method}-${cutoff}` : method, ...options });
       }
   }
   // --- values side by side ---
   const short = (x, digits) => String(Number(x.toPrecision(digits))).replace("-", "−");
-  let shown = null;
 
   async function compare() {
     const place = one("#compared");
@@ -189,13 +194,10 @@
     place.replaceChildren(node("p", { className: "note", textContent: `Differences from ${names[0]} in deviations, (X − X₁)/√(σ² + σ₁²); above 3 they are marked.` }), table);
   }
 
-  document.addEventListener("change", (event) => { if (event.target.name === "side") compare(); });
   document.addEventListener("htmx:afterSettle", (event) => {
     if (event.target.id === "study") fill();
     remedies();
     compare();
   });
-  preview();
-  remedies();
-  compare();
+  for (const show of [preview, remedies, compare]) show();
 })();
