@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numeric.bag_files import joint_states, write_bag
 
 import symgen
 from symgen.studio import guard, server, serving, table
 from symgen.studio.folder import WorkFolder
+from symgen.studio.jobs import Job
 
 EVIL = """<script>alert(1)</script>'"><img src=x onerror=alert(1)>&{{7*7}}"""
 TEXT = """\
@@ -186,6 +188,58 @@ def test_a_bomb_ends_in_a_sentence(studio: Any) -> None:
         assert "error" in answer and len(answer["error"]) < 2500
 
 
+def test_a_new_record_is_what_the_page_shows(studio: Any) -> None:
+    """Its file has the name of the one before."""
+    studio.upload("record", "run.csv", csv())
+    assert studio.get("view/preview").json()["names"] == ["t", "q1", "q2", "tau1", "tau2"]
+    studio.upload("record", "other.csv", csv().replace(b"tau", b"effort_"))
+    assert studio.get("view/preview").json()["names"][-1] == "effort_2"
+
+
+def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path: Path) -> None:
+    """Copied without what is not of the bag; a record that is dropped later takes its place."""
+    t = np.arange(50) / 100
+    states = joint_states(
+        t * 1e9, ("a", "b"), np.column_stack([t, -t]), np.column_stack([2 * t, t])
+    )
+    bag = write_bag("sqlite3", tmp_path / "bag", {"/joint_states": states})
+    (bag / "private.txt").write_text("not of the bag")
+    work = WorkFolder(studio.path)
+    work.take_record_of(str(bag))
+    place = work.measured("record")
+    assert place is not None and place.is_dir() and not (place / "private.txt").exists()
+    answer = studio.get("view/preview", params={"columns": "a.position,b.effort"}).json()
+    assert answer["rows"] == 50 and answer["first"][1] == ["0.01", "0.01"], answer
+    studio.upload("record", "run.csv", csv())
+    assert not place.exists() and work.measured("record") == studio.path / "record.csv"
+
+
+def test_what_a_bar_draws_in_a_terminal_is_a_count_on_the_page() -> None:
+    bar = "\x1b[?25lruns \x1b[38;5;237m━━━━\x1b[0m  \x1b[32m0/?\x1b[0m \x1b[36m-:--:--\x1b[0m"
+    job = Job(1, "01-cestac", ("symgen",), progress=bar)
+    assert job.said == ["runs 0/? -:--:--"] and job.counted == []
+    job.progress += (
+        "\r\x1b[2Kruns \x1b[35m━━\x1b[0m\x1b[90m╺━\x1b[0m 12/40 \x1b[36m0:00:07\x1b[0m\r"
+    )
+    assert job.said[-1] == "runs 12/40 0:00:07" and job.counted == ["12", "40"]
+    job.progress += "\x1b[2K\x1b[?25h\nerror: no such file\nmore of it"
+    assert job.last == "no such file"
+
+
+def test_the_settings_of_a_run_begin_with_its_command(studio: Any) -> None:
+    """Nothing that is asked for can add a line to them."""
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    studio.upload("record", "run.csv", csv())
+    values = {"symgen": 1, "record": [{"files": ["record.csv"]}]}
+    studio.post("study", {"values": json.dumps(values)})
+    asked = {"kind": "advise", "delta": "2*pi/500,\n1\x85record: {files: /etc/passwd}\u2028x"}
+    assert studio.post("solve", asked).status_code == 200
+    first, _, rest = (studio.path / "study-01-advise.yaml").read_text().partition("\n")
+    assert first.startswith("# symgen cestac robot.yaml study-01-advise.yaml --advise ")
+    assert len(first.splitlines()) == 1 and "passwd" not in rest
+    assert studio.post("solve", {"kind": "identify --force"}).status_code == 422
+
+
 # --- the table ---
 
 
@@ -271,6 +325,21 @@ def test_a_study_of_the_browser_names_no_file_of_another_folder(studio: Any, fil
         if Path(file).name != file:
             assert answer.status_code == 422 and "work folder" in answer.text
             assert not (studio.path / "study.yaml").exists()
+
+
+def test_news_that_come_while_others_are_sent_are_told(tmp_path: Path) -> None:
+    """A page that reads slowly learns of every change at once, not at the next one."""
+
+    async def versions() -> list[int]:
+        own = server.Server(WorkFolder(tmp_path), {})
+        events = serving.told(own)
+        parts = [await anext(events)]
+        own.changed()  # the stream waits for its reader
+        parts.append(await asyncio.wait_for(anext(events), 5))
+        await events.aclose()
+        return [json.loads(part.removeprefix("data: "))["version"] for part in parts]
+
+    assert asyncio.run(versions()) == [0, 1]
 
 
 def test_a_folder_opens_again(studio: Any) -> None:
