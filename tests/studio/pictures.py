@@ -20,7 +20,8 @@ READY = {
     "record": "document.querySelectorAll('#preview svg').length === 2",
     "check": "document.querySelectorAll('.checks li').length > 10",
     "solve": "document.querySelectorAll('#compared tbody tr').length > 0",
-    "results": "document.querySelectorAll('.plots svg').length === 4",
+    "results?run=02-feasible": "document.querySelectorAll('.plots svg').length === 4",
+    "results?run=03-cestac": "document.querySelector('figure img')?.naturalWidth > 300",
 }
 
 
@@ -49,18 +50,23 @@ def main() -> None:
             go(page, studio.address + "solve")
             page.run("document.querySelector('[value=feasible]').checked = true")
             page.click("#solve button.main")
-            until(page, "document.querySelector('#jobs').dataset.runs.split(' ').length === 2", 120)
+            page.run(
+                "document.querySelector('#resolution [name=delta]').value = '2*pi/10000, 2*pi/2000, 2*pi/500'"
+            )
+            page.click("#resolution button")
+            until(page, "document.querySelector('#jobs').dataset.runs.split(' ').length === 3", 300)
             for step, ready in READY.items():
                 for width in (1280, 390):
                     go(page, studio.address + step, width)
                     until(page, ready)
-                    if step == "results":
+                    if step == "results?run=02-feasible":
                         page.run(
                             "(() => { const c = document.querySelector('#cursor'); c.value = 6; c.dispatchEvent(new Event('input')); })()"
                         )
                     picture = Image.open(io.BytesIO(page.screenshot()))
                     small = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
-                    small.save(DOCS / f"studio_{step}_{width}.png", optimize=True)
+                    name = step.partition("?")[0] if "cestac" not in step else "resolution"
+                    small.save(DOCS / f"studio_{name}_{width}.png", optimize=True)
         finally:
             studio.end()
 
