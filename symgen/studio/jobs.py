@@ -25,7 +25,7 @@ from symgen.studio.folder import result_of
 
 GRACE = 3.0  # s, between the interrupt and the kill
 OUTPUT_KEPT = 500_000  # characters of what a command says that are kept
-DRAWN = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[━╸╺]")  # bars, colours, moves of the cursor
+CONTROL_CODES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[━╸╺]")  # bars, colours, moves of the cursor
 MOST_COMMANDS = 40  # commands in the queue
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
@@ -77,7 +77,7 @@ class Job:
     @property
     def said(self) -> list[str]:
         """Lines of its error stream without what draws in a terminal."""
-        lines = re.split(r"[\r\n]+", DRAWN.sub(" ", self.progress))
+        lines = re.split(r"[\r\n]+", CONTROL_CODES.sub(" ", self.progress))
         return [" ".join(line.split()) for line in lines if line.strip()]
 
     @property
