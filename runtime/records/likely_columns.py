@@ -13,15 +13,16 @@ from typing import Any
 
 QUANTITY_WORDS = {  # the first words are taken before the others
     "q": ("q", "pos", "position", "positions", "angle", "angles"),
-    "tau": ("tau", "torque", "torques", "effort", "moment", "current", "currents"),
+    "tau": ("tau", "torque", "torques", "effort", "moment", "current", "currents", "cur"),
 }
 TIME = {"t", "time", "timestamp", "stamp", "seconds"}
+UNITS = {"t": "ms", "q": "deg", "tau": "mA"}
 NOT_MEASURED = {"target", "desired", "ref", "reference", "cmd", "command", "setpoint", "window"}
 
 
 def likely_columns(names: Sequence[str]) -> dict[str, Any]:
-    """Settings of a record: columns t, q, tau, and the unit of currents; {} where names do not tell
-    positions and as many torques.
+    """Settings of a record: columns t, q, tau, and units that names tell (currents are in A unless
+    they say mA); {} where names do not tell positions and as many torques.
     """
     stems: dict[str, list[str]] = {}
     for name in names:
@@ -43,8 +44,12 @@ def likely_columns(names: Sequence[str]) -> dict[str, Any]:
     columns: dict[str, Any] = {"q": stems[positions[0]], "tau": torques}
     if time := next((name for name in names if _words(name) & TIME), None):
         columns["t"] = time
-    current = QUANTITY_WORDS["tau"][alike[0][1]].startswith("current")
-    return {"columns": columns, **({"units": {"tau": "A"}} if current else {})}
+    units = {"tau": "A"} if QUANTITY_WORDS["tau"][alike[0][1]].startswith("cur") else {}
+    stated = {"t": time or "", "q": positions[0], "tau": alike[0][2]}
+    for key, name in stated.items():
+        if UNITS[key].lower() in re.split(r"[\W\d_]+", name.lower()):
+            units[key] = UNITS[key]
+    return {"columns": columns, **({"units": units} if units else {})}
 
 
 def _words(name: str) -> set[str]:

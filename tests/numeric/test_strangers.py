@@ -15,6 +15,7 @@ import symgen
 from runtime.checks.alternatives import alternatives
 from runtime.checks.check import Check
 from runtime.model.drives import Drives
+from runtime.records.likely_columns import likely_columns
 from symgen.cli.main import app
 from symgen.description.yaml import parse_robot
 
@@ -319,6 +320,13 @@ def test_a_study_is_suggested_where_a_record_is_refused(tmp_path, logger) -> Non
     assert again.exit_code == 0 and again.stdout == first.stdout
     twice = CliRunner().invoke(app, ["identify", "planar_2r", record, "--suggest", str(study)])
     assert twice.exit_code == 2 and "choose another name" in twice.stderr
+
+
+def test_units_that_names_tell() -> None:
+    names = ["time_ms", "pos_deg_1", "pos_deg_2", "cur_mA_1", "cur_mA_2"]
+    assert likely_columns(names)["units"] == {"t": "ms", "q": "deg", "tau": "mA"}
+    assert likely_columns(["t", "pos_1", "cur_1"])["units"] == {"tau": "A"}
+    assert "units" not in likely_columns(["t", "pos_1", "effort_1"])
 
 
 def test_names_that_tell_nothing_are_refused_as_before(tmp_path) -> None:
