@@ -16,7 +16,7 @@ QUANTITY_WORDS = {  # the first words are taken before the others
     "tau": ("tau", "torque", "torques", "effort", "moment", "current", "currents", "cur"),
 }
 TIME = {"t", "time", "timestamp", "stamp", "seconds"}
-UNITS = {"t": "ms", "q": "deg", "tau": "mA"}
+NAMED_UNITS = {"t": "ms", "q": "deg", "tau": "mA"}
 NOT_MEASURED = {"target", "desired", "ref", "reference", "cmd", "command", "setpoint", "window"}
 
 
@@ -47,8 +47,8 @@ def likely_columns(names: Sequence[str]) -> dict[str, Any]:
     units = {"tau": "A"} if QUANTITY_WORDS["tau"][alike[0][1]].startswith("cur") else {}
     stated = {"t": time or "", "q": positions[0], "tau": alike[0][2]}
     for key, name in stated.items():
-        if UNITS[key].lower() in re.split(r"[\W\d_]+", name.lower()):
-            units[key] = UNITS[key]
+        if NAMED_UNITS[key].lower() in re.split(r"[\W\d_]+", name.lower()):
+            units[key] = NAMED_UNITS[key]
     return {"columns": columns, **({"units": units} if units else {})}
 
 
