@@ -36,6 +36,7 @@ CONSTANTS = (
     "CONSTANTS",
     "SOURCE_SHA256",
 )
+OWN_KINDS = ("column", "dissipative")  # of the user's own columns
 SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
 FUNCTIONS = (
     "store",
@@ -273,7 +274,8 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
 
     A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of
     one that slides; without such elements, where no
-    moment of inertia acts on it, since a force depends on masses and first moments alone.
+    moment of inertia acts on it, since a force depends on masses and first moments alone. The unit
+    of a column of the user's own says nothing: that of its law is his.
     """
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []
@@ -282,7 +284,8 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
         own = {
             units.get(name, "")
             for name in acting
-            if set(elements.get(name.removesuffix("R"), (0, 0, ()))[2]) == {joint}
+            if set((element := elements.get(name.removesuffix("R"), (0, 0, ())))[2]) == {joint}
+            and element[0] not in OWN_KINDS
         }
         slides = (
             bool(own & SLIDING) if own else not any(units.get(name) == "kg*m**2" for name in acting)

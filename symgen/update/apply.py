@@ -96,12 +96,17 @@ def apply(
         if parameter(family, j) in families
     }
     stated = {name: text.joint_values(j)[family] for name, (family, j) in own.items()}
-    others = [
-        name for name in physical.standard if name not in own and name not in _inertial(physical)
-    ]
+    elsewhere = {
+        name: described.values.get(name, 0.0)
+        for name in physical.standard
+        if name not in own and name not in _inertial(physical)
+    }
     try:
-        absent = [*others, *(name for name, x in stated.items() if not x and own[name][0] != "Ia")]
-        closest = nearest(physical, links, stated | dict.fromkeys(others, 0.0), names, X, absent)
+        values = elsewhere | stated
+        absent = [
+            name for name, x in values.items() if not x and (name not in own or own[name][0] != "Ia")
+        ]
+        closest = nearest(physical, links, values, names, X, absent)
         writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)
         rows = [*writing.links(edits), *writing.joints(edits)]
         new = edits.edited()
