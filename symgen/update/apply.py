@@ -104,7 +104,9 @@ def apply(
     try:
         values = elsewhere | stated
         absent = [
-            name for name, x in values.items() if not x and (name not in own or own[name][0] != "Ia")
+            name
+            for name, x in values.items()
+            if not x and (name not in own or own[name][0] != "Ia")
         ]
         closest = nearest(physical, links, values, names, X, absent)
         writing, edits = Writing(text, closest, own, _root(result, names)), XmlEdits(content)

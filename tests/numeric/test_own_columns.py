@@ -112,7 +112,7 @@ def test_simulation_with_a_curved_law_and_a_spring(arm) -> None:
 @campaign
 def test_excitation_judges_the_columns_too(arm) -> None:
     result = runtime.excite(arm, study=study_from_mapping({"excitation": STUDY["excitation"]}))
-    t, q, qd, qdd, tau = (np.asarray(x) for x in result.sampled())
+    _, q, qd, qdd, tau = (np.asarray(x) for x in result.sampled())
     own = [
         0.8 * a + x - 0.8 * acceleration(p, v, x)
         for p, v, a, x in zip(q[:, 0], qd[:, 0], qdd[:, 0], tau[:, 0], strict=True)
