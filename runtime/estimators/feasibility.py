@@ -91,8 +91,9 @@ class Feasibility:
 
     Attributes
     ----------
-    margin : float, SI
-        t*: kg m^2 or kg of a pseudo-inertia, unit of a friction parameter.
+    margin : float
+        t*: a share of the link's second moment and mass in the robot file; SI where it has none,
+        and of friction and actuators.
     feasible : bool
         Whether t* >= 0, or may be for all that the record tells (`within_noise`).
     physical : bool
@@ -142,7 +143,7 @@ def feasibility(
     """Whether base parameters X, shape (len(names),), are those of a physical robot within the
     limits. blame : all conditions in the way, not the first.
     """
-    rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, scales(physical))
+    rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, units(physical))
     first = margin(physical.conditions, rows, space)
     if not first.solved:
         raise InputError(
@@ -177,7 +178,7 @@ def within_noise(
         z / size,
         physical.conditions,
         limit_rows(physical, None),
-        everything(scales(physical)),
+        everything(units(physical)),
         least=LIMIT.MARGIN_ROUNDING,
     )
     blocked = dict(judged.blocking)
@@ -213,10 +214,10 @@ def nearest_standard(
     limits: RobotLimits | None = None,
 ) -> Array:
     """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
-    scale = scales(physical)
-    space, rows = solutions(physical.rows(names), X, scale), limit_rows(physical, limits)
+    scale, unit = scales(physical), units(physical)
+    space, rows = solutions(physical.rows(names), X, unit), limit_rows(physical, limits)
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    reach = np.abs(space.basis).max(axis=1, initial=0.0) / scale
+    reach = np.abs(space.basis).max(axis=1, initial=0.0) / unit
     open_ = tuple(
         c for c in physical.conditions if reach[list(c.numbers)].max() > LIMIT.MARGIN_ROUNDING
     )
@@ -300,6 +301,16 @@ def scales(physical: PhysicalModel) -> Array:
     return np.array(sizes)
 
 
+def units(physical: PhysicalModel) -> Array:
+    """Units of the unknowns, shape (p,): `scales`, of a link with values those of its condition."""
+    sizes = scales(physical)
+    for j, condition in zip(physical.links, physical.conditions, strict=False):
+        second, mass = condition.size[0], condition.size[-1]
+        if all(f"{family}{j}" in physical.values for family in INERTIAL):
+            sizes[physical.link(j)] = [second] * 6 + [np.sqrt(second * mass)] * 3 + [mass]
+    return sizes
+
+
 def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
     """The pull to the values of the robot file; InputError where they are missing or not those of a
     body.
@@ -346,14 +357,14 @@ def with_volume(physical: PhysicalModel, chi: Array) -> Array:
     chi = chi.copy()
     for c in (c for c in physical.conditions if c.name.startswith("link ")):
         P = c.matrix(chi)
-        size = max(float(np.trace(P[:3, :3])), 1e-3)
-        if c.smallest(chi) < -LIMIT.FLAT_LINK * max(size, P[3, 3]):
+        size, least = max(float(np.trace(P[:3, :3])), 1e-3), float(np.linalg.eigvalsh(P)[0])
+        if least < -LIMIT.FLAT_LINK * max(size, P[3, 3]):
             message = (
                 f"the values of {c.name} are those of no body: its pseudo-inertia has the "
-                f"eigenvalue {c.smallest(chi):.3g}; correct them, or use prior: euclidean"
+                f"eigenvalue {least:.3g}; correct them, or use prior: euclidean"
             )
             raise SettingsError(message, path=("estimate", "options", "prior"))
-        if c.smallest(chi) < LIMIT.FLAT_LINK * size:
+        if least < LIMIT.FLAT_LINK * size:
             body = np.diag(
                 [LIMIT.FLAT_LINK * size] * 3 + [LIMIT.FLAT_LINK]
             )  # of a pseudo-inertia: second moments, then the mass

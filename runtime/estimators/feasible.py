@@ -1,7 +1,7 @@
 """Feasible least squares: the parameters nearest to the record that a physical robot can have.
 
     min ||R (z - K chi)||^2 + weight D(chi)      subject to
-            P_j(chi) >= margin 1, forms >= margin 1, Ia, FV, FS >= margin, limits
+            P_j(chi) >= margin S_j, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
 W is factored once and b rows enter the semidefinite program (`runtime.estimators.semidefinite`);
@@ -12,7 +12,8 @@ are free to make a robot of them. `weights` weighs the rows as for ols ("none") 
 squares is feasible, it is the solution.
 
 options (all of `runtime.estimators.feasibility.RobotLimits` too):
-    margin     smallest eigenvalue of every condition, SI; 1e-6
+    margin     smallest eigenvalue of every condition: of a link with values in the robot file as
+               share of its second moment and mass there (S_j), of others in SI; 1e-6
     prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from
                the values of the robot file; "auto": euclidean
                where it has values of links, else none
@@ -61,7 +62,7 @@ from runtime.estimators.feasibility import (
     limit_rows,
     nearest_standard,
     pulled,
-    scales,
+    units,
     unsolved,
 )
 from runtime.estimators.linear import System, assemble, percent
@@ -92,8 +93,9 @@ class FeasibleOptions(RobotLimits):
 
     Attributes
     ----------
-    margin : float, SI
-        Smallest eigenvalue of every condition.
+    margin : float
+        Smallest eigenvalue of every condition: of a link with values in the robot file as share of
+        its second moment and mass there, of others in SI.
     prior : str
         Distance D of the inertial parameters from the values of the robot file: none, euclidean,
         entropic or pullback; auto: euclidean where the
@@ -372,7 +374,7 @@ def mass_ranges(
         rows.r22 / size
     ) ** 2
     radius = max(float(np.sqrt(max(allowed, 0.0))), 1e-6)
-    bounds, space = limit_rows(physical, options), everything(scales(physical))
+    bounds, space = limit_rows(physical, options), everything(units(physical))
     ranges: dict[str, dict[str, float | bool]] = {}
     for j in physical.links:
         place = physical.link(j)[-1]
@@ -456,7 +458,7 @@ def fitted(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weig
     """
     size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
     R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
-    bounds, space = limit_rows(physical, options), everything(scales(physical))
+    bounds, space = limit_rows(physical, options), everything(units(physical))
     pull = pulled(physical, "none" if options.prior == "auto" else options.prior, weight)
 
     def attempt(within: LinearBounds) -> Optimum:

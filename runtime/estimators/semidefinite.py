@@ -1,11 +1,12 @@
 """Semidefinite programs over the standard parameters, as cone programs for Clarabel.
 
     closest     min ||R chi - z||^2 + weight D(chi)    subject to
-            P >= least 1 of every condition, rows, chi in a Space
+            P >= least S of every condition, rows, chi in a Space
     extreme     min d'chi                              subject to  the same, ||R chi - z|| <= radius
     margin      max t                                  subject to
-            P >= t 1 of every condition, rows, chi in a Space
+            P >= t S of every condition, rows, chi in a Space
 
+S = diag(size) of the condition: the cones hold S^-1/2 P S^-1/2, whose entries are near one.
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of
 chi = origin + basis w, with sizes near one as
 interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an
@@ -42,6 +43,7 @@ Array = np.ndarray
 Distance = Literal["none", "euclidean", "entropic", "pullback"]
 
 TOLERANCES = (
+    (1e-14, 1e-12),
     (1e-12, 1e-11),
     (1e-9, 1e-9),
 )  # of the gap and of the constraints, tried in this order
@@ -148,7 +150,7 @@ class Optimum:
         "optimal", "optimal_inaccurate", "infeasible", ..., or the solver's own word.
     chi : ndarray, shape (p,), SI
         Standard parameters; nan without solution.
-    margin : float, SI
+    margin : float
         t of a problem of `margin`; nan of others.
     duals : mapping of str to float
         Trace of the multiplier of each condition, their sum 1 in a problem of `margin`: what stands
@@ -167,16 +169,17 @@ class Optimum:
 
 
 class Program:
-    """A cone program in w of chi = origin + basis w, and in what the criterion adds: P >= least 1
-    of every condition, or P >= t 1 of an unknown t, and the rows; then constraint by constraint.
+    """A cone program in w of chi = origin + basis w, and in what the criterion adds: P >= least S
+    of every condition, or P >= t S of an unknown t, and the rows; then constraint by constraint.
 
     Parameters
     ----------
     space : Space
     rows : LinearBounds
     conditions : sequence of Condition
-    least : float or None, SI
-        Smallest eigenvalue of every condition; None: the unknown t, after w.
+    least : float or None
+        Smallest eigenvalue of every condition, in units of its size; None: the unknown t, after
+        w.
     """
 
     def __init__(
@@ -303,7 +306,7 @@ def closest(
     """chi of `space` nearest to R chi = z, shapes (m, p) and (m,), scaled by the caller so that
     ||z|| is about 1.
 
-    least : smallest eigenvalue of every condition, SI, not zero.
+    least : smallest eigenvalue of every condition, in units of its size, not zero.
     """
     program = Program(space, rows, conditions, least)
     program.add_squares(R, z, 1.0)
@@ -352,7 +355,7 @@ def extreme(
 
 
 def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) -> Optimum:
-    """The largest t with every P - t 1 positive semidefinite: `margin`; negative where no physical
+    """The largest t with every P - t S positive semidefinite: `margin`; negative where no physical
     robot is in `space`.
     """
     program = Program(space, rows, conditions, None)
@@ -374,12 +377,12 @@ def triangle(B: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _triangles(conditions: tuple[Condition, ...], p: int) -> tuple[Array, Array]:
-    """Triangles of the conditions on p standard parameters, one below the other, shape (rows, p),
-    and those of the identity, (rows,).
+    """Triangles of the conditions on p standard parameters in units of their sizes, one below the
+    other, shape (rows, p), and those of the identity, (rows,).
     """
     ones = [triangle(np.eye(c.B.shape[1])[None])[:, 0] for c in conditions]
     return np.vstack(
-        [on_standard(triangle(c.B), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
+        [on_standard(triangle(c.scaled), c.numbers, p) for c in conditions] or [np.zeros((0, p))]
     ), np.concatenate([*ones, []])
 
 

@@ -55,19 +55,30 @@ class Condition:
     numbers : tuple of int
         Standard parameters, by their place.
     B : ndarray, shape (k, m, m)
+    size : ndarray, shape (m,), SI
+        What its eigenvalues are measured in: second moment and mass of the link in the robot file,
+        without values there 1.
     """
 
     name: str
     numbers: tuple[int, ...]
     B: Array
+    size: Array
+
+    @property
+    def scaled(self) -> Array:
+        """B of S^-1/2 P S^-1/2, S = diag(size)."""
+        root = np.sqrt(self.size)
+        return np.asarray(self.B / np.outer(root, root))
 
     def matrix(self, chi: Array) -> Array:
-        """The matrix at chi, shape (m, m)."""
+        """The matrix P at chi, shape (m, m)."""
         return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
 
     def smallest(self, chi: Array) -> float:
-        """Its smallest eigenvalue."""
-        return float(np.linalg.eigvalsh(self.matrix(chi))[0])
+        """The largest t with P >= t S: its smallest eigenvalue in units of `size`."""
+        P = np.tensordot(chi[list(self.numbers)], self.scaled, axes=1)
+        return float(np.linalg.eigvalsh(P)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +121,8 @@ class PhysicalModel:
         return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
 
     def smallest(self, chi: Array) -> dict[str, float]:
-        """The smallest eigenvalue of every condition, by its name: not negative for a physical
-        robot.
+        """The smallest eigenvalue of every condition in units of its size, by its name: not
+        negative for a physical robot.
         """
         return {condition.name: condition.smallest(chi) for condition in self.conditions}
 
@@ -152,7 +163,7 @@ def physical_model(
         ),
         links=tuple(emitted.LINKS),
         conditions=(
-            *_links(emitted.LINKS, standard),
+            *_links(emitted.LINKS, standard, model.VALUES),
             *_forms(elements, standard),
             *_signs(elements, standard),
         ),
@@ -170,12 +181,16 @@ def pseudo_inertia(ten: Array) -> Array:
     return np.block([[np.trace(J) / 2 * np.eye(3) - J, l.T], [l, np.array([[M]])]])
 
 
-def _links(links: Sequence[int], standard: Sequence[str]) -> Iterator[Condition]:
+def _links(
+    links: Sequence[int], standard: Sequence[str], values: Mapping[str, float]
+) -> Iterator[Condition]:
     B = np.array([pseudo_inertia(ten) for ten in np.eye(10)])
     for j in links:
-        yield Condition(
-            f"link {j}", tuple(standard.index(f"{family}{j}") for family in INERTIAL), B
-        )
+        names = [f"{family}{j}" for family in INERTIAL]
+        diagonal = np.diag(pseudo_inertia(np.array([values.get(name, 0.0) for name in names])))
+        second, mass = float(diagonal[:3].sum()), float(diagonal[3])
+        size = np.array([second, second, second, mass]) if min(second, mass) > 0 else np.ones(4)
+        yield Condition(f"link {j}", tuple(standard.index(name) for name in names), B, size)
 
 
 def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
@@ -196,9 +211,8 @@ def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
                 for (i, m), b in own[name].items():
                     B[k, place[i], place[m]] = B[k, place[m], place[i]] = b
             names = ", ".join(map(str, sorted(joints)))
-            yield Condition(
-                f"{kind} of joints {names}", tuple(standard.index(name) for name in members), B
-            )
+            numbers = tuple(standard.index(name) for name in members)
+            yield Condition(f"{kind} of joints {names}", numbers, B, np.ones(len(place)))
 
 
 def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
@@ -217,6 +231,7 @@ def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
                     " + ".join(names),
                     tuple(standard.index(name) for name in names),
                     np.ones((len(names), 1, 1)),
+                    np.ones(1),
                 )
 
 

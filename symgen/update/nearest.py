@@ -23,7 +23,7 @@ import numpy as np
 from runtime.estimators.feasibility import feasibility, limit_rows, scales
 from runtime.estimators.semidefinite import closest, solutions
 from runtime.limits import LIMIT
-from runtime.model.inertia import INERTIAL, Condition, PhysicalModel
+from runtime.model.inertia import INERTIAL, PhysicalModel
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 
@@ -177,8 +177,11 @@ def _of_file(
             j = inertial[named[0]][0] if named[0] in inertial else 0
             numbers = tuple(own.index(name) for name in named)
             conditions.append(
-                Condition(
-                    f"link {leading[j].name!a:.60}" if j else condition.name, numbers, condition.B
+                replace(
+                    condition,
+                    name=f"link {leading[j].name!a:.60}" if j else condition.name,
+                    numbers=numbers,
+                    size=np.ones(len(condition.size)),
                 )
             )
             if j:
@@ -191,8 +194,9 @@ def _of_file(
         standard += [f"{family}{v}" for family in INERTIAL]
         of |= dict(zip(standard[-10:], map(float, link.ten), strict=True))
         columns += [physical.standard.index(f"{family}{link.j}") for family in INERTIAL]
-        B = next(c.B for c in physical.conditions if c.name == f"link {link.j}")
-        conditions.append(Condition(f"link {link.name!a:.60}", tuple(at), B))
+        condition = next(c for c in physical.conditions if c.name == f"link {link.j}")
+        name = f"link {link.name!a:.60}"
+        conditions.append(replace(condition, name=name, numbers=tuple(at), size=np.ones(4)))
         places[link.name] = at
     whole = replace(
         physical,

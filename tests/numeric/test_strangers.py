@@ -204,12 +204,17 @@ def test_a_wrap_is_a_wrap_with_resample_too(tmp_path, resample) -> None:
     assert check.state == "no" and check.remedy.startswith("it wraps"), check
 
 
-def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path) -> None:
-    """Bug 12: they stood first, exit code 0, no reason. Torques of 1e6 N m: the solver leaves a
-    condition violated.
+def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path, monkeypatch) -> None:
+    """Bug 12: they stood first, exit code 0, no reason. Here the solver leaves every condition
+    violated.
     """
+
+    def violated(self, chi):
+        return {condition.name: -1e-9 for condition in self.conditions}
+
+    monkeypatch.setattr("runtime.model.inertia.PhysicalModel.smallest", violated)
     model = symgen.model("planar_2r")
-    written(tmp_path, *motion(model, noise=0.05, values=1e5, seed=1))
+    written(tmp_path, *motion(model, noise=0.05, seed=1))
     asked = said(tmp_path, estimate={"method": "feasible", "options": {"prior": "none"}})
     assert asked.exit_code == 1, asked.output
     assert "not-converged. The solver left a condition violated" in asked.stdout
