@@ -246,20 +246,10 @@ def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBou
         if name not in physical.standard:
             message = f"no standard parameter {name}; there are {', '.join(physical.standard)}"
             raise SettingsError(message, path=("estimate", "options", "bounds", name))
-        entries.append(
-            (
-                f"bounds of {name}",
-                {physical.standard.index(name): 1.0},
-                -np.inf if low is None else low,
-                np.inf if high is None else high,
-            )
-        )
+        bounds = (-np.inf if low is None else low, np.inf if high is None else high)
+        entries.append((f"bounds of {name}", {physical.standard.index(name): 1.0}, *bounds))
     if limits.total_mass is not None:
-        low, high = (
-            limits.total_mass
-            if isinstance(limits.total_mass, tuple)
-            else (limits.total_mass, limits.total_mass)
-        )
+        low, high = np.broadcast_to(limits.total_mass, 2).tolist()
         entries.append(
             ("total_mass", {physical.link(j)[-1]: 1.0 for j in physical.links}, low, high)
         )
@@ -365,9 +355,7 @@ def with_volume(physical: PhysicalModel, chi: Array) -> Array:
             )
             raise SettingsError(message, path=("estimate", "options", "prior"))
         if least < LIMIT.FLAT_LINK * size:
-            body = np.diag(
-                [LIMIT.FLAT_LINK * size] * 3 + [LIMIT.FLAT_LINK]
-            )  # of a pseudo-inertia: second moments, then the mass
+            body = LIMIT.FLAT_LINK * np.diag([size, size, size, 1.0])  # second moments, mass
             chi[list(c.numbers)] += np.linalg.lstsq(
                 c.B.reshape(len(c.B), -1).T, body.ravel(), rcond=None
             )[0]
