@@ -50,6 +50,7 @@ def main() -> None:
             go(page, studio.address + "solve")
             page.run("document.querySelector('[value=feasible]').checked = true")
             page.click("#solve button.main")
+            until(page, "document.querySelector('#jobs').textContent.includes('02-feasible')")
             page.run(
                 "document.querySelector('#resolution [name=delta]').value = '2*pi/10000, 2*pi/2000, 2*pi/500'"
             )
