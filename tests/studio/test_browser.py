@@ -56,6 +56,16 @@ new MutationObserver(() => {
   const state = document.querySelector("#certificate")?.classList[1];
   if (state !== window.states.at(-1)) window.states.push(state);
 }).observe(document.body, { subtree: true, childList: true, attributes: true })"""
+ADDED_AND_TYPED = """(() => {
+  const type = (id, value) => {
+    const field = document.getElementById(id);
+    field.value = value;
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  type("f-1-r", "0.2");
+  document.querySelector("[data-act='add 2']").click();
+  type("f-2-r", "0.3");
+})()"""  # the answer to the click comes while the next edit waits
 JOB = "[...document.querySelectorAll('.job')].map((node) => node.className)"
 
 
@@ -150,8 +160,13 @@ def test_from_nothing_to_a_certified_arm_of_two_joints(
     claim = json.loads((studio.work / "proof.json").read_text())
     assert claim["valid"] and claim["count"] == len(symgen.regrouping(robot).base)
     assert page.run("document.activeElement.id") == "f-2-alpha"  # the focus stays
-    page.click("[data-act='add 2']")
-    until(page, "!!document.getElementById('f-3-theta')")
+    page.run(ADDED_AND_TYPED)
+    file = studio.work / "robot.yaml"
+    wait_for(lambda: all(x in file.read_text() for x in ("q3", "r: 0.2", "r: 0.3")))
+    until(
+        page,
+        "document.getElementById('f-3-theta') && document.getElementById('f-2-r').value === '0.3'",
+    )
     page.click("[data-act='remove 3']")
     until(page, "!document.getElementById('f-3-theta')")
     assert page.run(WEAK_CONTRAST) == []
