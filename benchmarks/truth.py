@@ -481,6 +481,7 @@ def causes(k: int, seed: int, seeds: str) -> list[Row]:
     told = [c for c in found.checks if c.state in ("doubtful", "no")]
     named = [one["cause"] for one in found.named_causes]
     texts = [*(f"{c.question} {c.finding}" for c in told), *named]
+    texts, named = ([re.sub(r"(\d+) joint\1\b", r"\1", x) for x in own] for own in (texts, named))
     pattern = wrong.name.format(j=j + 1, i=(j + 1) % robot.n + 1) if wrong else "nothing is wrong"
     return [
         {

@@ -56,8 +56,9 @@ class Condition:
         Standard parameters, by their place.
     B : ndarray, shape (k, m, m)
     size : ndarray, shape (m,), SI
-        What its eigenvalues are measured in: second moment and mass of the link in the robot file,
-        without values there 1.
+        What its eigenvalues are measured in: second moment and mass of the link in the robot file;
+        of inertias of drives 1000 times the least of these second moments, at most 1; 1 without
+        values, and of friction.
     """
 
     name: str
@@ -155,6 +156,8 @@ def physical_model(
         )
     emitted = cast(Any, model)
     standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
+    links = [*_links(emitted.LINKS, standard, model.VALUES)]
+    least = min([1.0, *(1e3 * float(link.size[0]) for link in links)])
     return PhysicalModel(
         standard=standard,
         base=tuple(model.BASE_PARAMETERS),
@@ -162,11 +165,7 @@ def physical_model(
             emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float
         ),
         links=tuple(emitted.LINKS),
-        conditions=(
-            *_links(emitted.LINKS, standard, model.VALUES),
-            *_forms(elements, standard),
-            *_signs(elements, standard),
-        ),
+        conditions=(*links, *_forms(elements, standard, least), *_signs(elements, standard, least)),
         values=dict(model.VALUES),
     )
 
@@ -193,7 +192,9 @@ def _links(
         yield Condition(f"link {j}", tuple(standard.index(name) for name in names), B, size)
 
 
-def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
+def _forms(
+    elements: Mapping[str, Any], standard: Sequence[str], least: float
+) -> Iterator[Condition]:
     """One condition per kind and per group of joints that forms of that kind couple."""
     for kind in FORMED:
         own = {
@@ -212,10 +213,13 @@ def _forms(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
                     B[k, place[i], place[m]] = B[k, place[m], place[i]] = b
             names = ", ".join(map(str, sorted(joints)))
             numbers = tuple(standard.index(name) for name in members)
-            yield Condition(f"{kind} of joints {names}", numbers, B, np.ones(len(place)))
+            size = least if kind == "inertia" else 1.0
+            yield Condition(f"{kind} of joints {names}", numbers, B, np.full(len(place), size))
 
 
-def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Condition]:
+def _signs(
+    elements: Mapping[str, Any], standard: Sequence[str], least: float
+) -> Iterator[Condition]:
     """c >= 0 along each row; where friction of one direction is set on that of both, their sum in
     either direction.
     """
@@ -223,7 +227,7 @@ def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
     for name, (kind, when, acts) in elements.items():
         if kind in SIGNED and not is_form(acts):
             along.setdefault((kind, *sorted(acts.items())), {}).setdefault(when, []).append(name)
-    for own in along.values():
+    for row, own in along.items():
         both, sided = own.get("both", []), [own.get(when, []) for when in ("positive", "negative")]
         for names in [[*both, *one] for one in sided] if any(sided) else [[name] for name in both]:
             if names:
@@ -231,7 +235,7 @@ def _signs(elements: Mapping[str, Any], standard: Sequence[str]) -> Iterator[Con
                     " + ".join(names),
                     tuple(standard.index(name) for name in names),
                     np.ones((len(names), 1, 1)),
-                    np.ones(1),
+                    np.array([least if row[0] == "inertia" else 1.0]),
                 )
 
 

@@ -649,3 +649,27 @@ def test_bounds_are_told_as_bounds() -> None:
     judged = within_limits(physical, physical.base, X, options)
     assert judged.physical and not judged.feasible
     assert "NOT" not in judged.text and "bounds of masses and centres" in judged.text
+
+
+class Grams:
+    """The arm of a model with a millionth of its masses, a thousandth of its friction and no inertia
+    of drives.
+    """
+
+    def __init__(self, model) -> None:
+        self.VALUES = {
+            name: {"Ia": 0.0, "FV": 1e-3, "FS": 1e-3}.get(name[:2], 1e-6) * value
+            for name, value in model.VALUES.items()
+        }
+        self._model = model
+
+    def __getattr__(self, name: str):
+        return getattr(self._model, name)
+
+
+def test_margin_of_a_drive_takes_nothing_from_a_small_link(arm) -> None:
+    """A margin of the motor inertia in SI, 1e-6 kg m^2, is six times the ZZ2 of such a link."""
+    light = Grams(arm)
+    truth = arm.base_parameters(light.VALUES)
+    found = estimate_of(simulated(arm, truth, 0.0), FEASIBLE, model=light)
+    np.testing.assert_allclose(found.X, truth, rtol=5e-3, atol=1e-9)
