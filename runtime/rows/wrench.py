@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,9 +32,9 @@ from runtime.settings.study import Study
 
 Array = np.ndarray
 
-BIAS = ("BFX", "BFY", "BFZ", "BNX", "BNY", "BNZ")  # offset of the sensor, N and N m
-STATES = 64  # random ones that tell columns apart
-DEPENDENT = 1e-8  # of the norm of a column: less is left of it beside those before
+SENSOR_OFFSETS = ("BFX", "BFY", "BFZ", "BNX", "BNY", "BNZ")  # offset of the sensor, N and N m
+PROBED_STATES = 64  # random ones that tell columns apart
+LEFT_OF_COLUMN = 1e-8  # of the norm of a column: less is left of it beside those before
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class WrenchRows:
         Its rows are those of each joint, then those of FX, FY, FZ, NX, NY, NZ: an estimator with
         weights by joint finds a deviation for each of the six.
     standard : tuple of str
-        Standard parameters, then the offsets BIAS; p + 6 names.
+        Standard parameters, then the offsets SENSOR_OFFSETS; p + 6 names.
     K : ndarray, shape (b, p + 6)
         X = K (chi, b) of the columns of `observation`.
     """
@@ -105,7 +106,7 @@ def observe_wrench(
             file=own.record.name,
         )
     standard, base = physical_model(model).standard, physical_model(model).K
-    random = np.random.default_rng(0).uniform(-np.pi, np.pi, (3, STATES, len(model.JOINTS)))
+    random = np.random.default_rng(0).uniform(-np.pi, np.pi, (3, PROBED_STATES, len(model.JOINTS)))
     rows = [_by_sensor(model, *random)]
     if torques:
         D = model.regressor(*random) @ base
@@ -120,7 +121,7 @@ def observe_wrench(
     decimated = decimated_rows(signals.reshape(len(states), -1), own.selection)[:, used]
     W = decimated.reshape(6, len(kept), number).swapaxes(1, 2).reshape(-1, len(kept))
     Y = decimated_torque(wrench, own.selection)[:, used]
-    names, t = (*standard, *BIAS), np.tile(own.selection.t[used], 6)
+    names, t = (*standard, *SENSOR_OFFSETS), np.tile(own.selection.t[used], 6)
     joints, above = own.observation(model), np.pad(base, ((0, 0), (0, 6)))[:, kept]
     count = sum(joints.rows) if torques else 0
     observation = replace(
@@ -136,7 +137,7 @@ def observe_wrench(
     return WrenchRows(observation, names, K)
 
 
-def _by_sensor(model: GeneratedModel, *states: Array) -> Array:
+def _by_sensor(model: Any, *states: Array) -> Array:
     """Columns of the wrench by standard parameter and by offset, shape (N, 6, p + 6)."""
     WB = np.asarray(model.base_wrench_regressor(*states))
     return np.concatenate([WB, np.broadcast_to(np.eye(6), (len(WB), 6, 6))], axis=2)
@@ -146,11 +147,14 @@ def _independent(A: Array, order: Sequence[int]) -> tuple[list[int], Array]:
     """Columns that do not depend on those before them in `order`, and K, shape (b, p), of A = A_1 K
     with A_1 these columns.
     """
-    Q, kept = np.zeros((len(A), 0)), []
+    Q: Array = np.zeros((len(A), 0))
+    kept: list[int] = []
     for k in order:
         rest = A[:, k] - Q @ (Q.T @ A[:, k])
         rest -= Q @ (Q.T @ rest)  # twice is enough (Giraud, Langou and Rozloznik 2005)
-        if np.linalg.norm(rest) > DEPENDENT * max(np.linalg.norm(A[:, k]), DEPENDENT):
+        if np.linalg.norm(rest) > LEFT_OF_COLUMN * max(
+            float(np.linalg.norm(A[:, k])), LEFT_OF_COLUMN
+        ):
             Q, kept = np.column_stack([Q, rest / np.linalg.norm(rest)]), [*kept, k]
     K = np.linalg.lstsq(A[:, kept], A, rcond=None)[0]
-    return kept, np.where(np.abs(K) > DEPENDENT, K, 0.0)
+    return kept, np.where(np.abs(K) > LEFT_OF_COLUMN, K, 0.0)
