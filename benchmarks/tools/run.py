@@ -1,0 +1,372 @@
+"""Every tool on the same records: `python benchmarks/tools/run.py --work FOLDER [--page PAGE]`.
+
+In FOLDER an environment for each tool is made, by pip, then jobs and answers; PAGE is given the
+tables behind its line `<!-- tables -->`. SYMGEN_DATA names the records; records.py says how they
+are split and treated. `--tools` and `--cases` take some of them; answers that are there stay.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+for thread in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[thread] = "1"
+
+import numpy as np
+from feasible import feasible
+from records import CASES, CUTOFFS, ROBOTS, ROOT, SLOW, Case, Piece, slips, treated
+
+from runtime.errors import InputError
+
+HERE = Path(__file__).resolve().parent
+MARK = "<!-- tables -->"
+SLIPPED = ("tx40", "wrist")
+Array = np.ndarray
+Answer = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Tool:
+    """needs : requirements for pip, into the folder of that name."""
+
+    title: str
+    file: str
+    environment: str
+    needs: tuple[str, ...]
+    function: str = "fit"
+    options: tuple[float, ...] = (0.0,)
+    """Values of the one setting that its users turn, chosen with the cut-off."""
+
+    @property
+    def lines(self) -> int:
+        """Lines of the file that are no comment, no docstring and not blank."""
+        text = (HERE / f"{self.file}.py").read_text(encoding="utf-8")
+        rows: set[int] = set()
+        for node in ast.walk(ast.parse(text)):
+            prose = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            if isinstance(node, ast.stmt) and not prose:
+                last = node.body[0].lineno - 1 if hasattr(node, "body") else node.end_lineno
+                rows |= set(range(node.lineno, max(node.lineno, last or 0) + 1))
+        texts = text.splitlines()
+        return sum(bool(texts[k - 1].strip()) and '"""' not in texts[k - 1] for k in rows)
+
+
+SYMGEN = (f"{ROOT}[mjcf]",)
+TOOLS = {
+    "symgen": Tool("symgen", "tool_symgen", "symgen", SYMGEN),
+    "symgen-ls": Tool("symgen, least squares", "tool_symgen", "symgen", SYMGEN, "least_squares"),
+    "figaroh": Tool("figaroh 1.0.2", "tool_figaroh", "figaroh", ("figaroh==1.0.2",), options=(0.0, 1e-4, 1e-3)),
+    "pinocchio": Tool("pinocchio + lstsq", "tool_pinocchio", "pinocchio", ("pin==4.1.0",), options=(1e-6, 1e-4, 1e-3)),
+    "aurt": Tool("AURT 0.0.4", "tool_aurt", "aurt", ("aurt==0.0.4",)),
+    "flobaroid": Tool("FloBaRoID's method, own text", "tool_flobaroid", "flobaroid", ("pin==4.1.0", "cvxpy", "clarabel")),
+}
+
+
+def environment(tool: Tool, work: Path) -> str:
+    """The Python of the tool, made once; what pip says against it is raised as RuntimeError."""
+    folder = work / "environments" / tool.environment
+    python, log = folder / "bin/python", folder.with_suffix(".log")
+    if not log.exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        pip = [str(python), "-m", "pip", "install", "-q", *tool.needs]
+        done = subprocess.run(pip, capture_output=True, text=True, check=False)
+        log.write_text(done.stderr if done.returncode else "", encoding="utf-8")
+    errors = [line for line in log.read_text(encoding="utf-8").splitlines() if "ERROR" in line]
+    if errors:
+        raise RuntimeError(errors[0])
+    return str(python)
+
+
+class Runs:
+    """One tool on one case.
+
+    Parameters
+    ----------
+    python : str
+    folder : Path
+        Where jobs and answers lie.
+    """
+
+    def __init__(self, tool: Tool, case: Case, python: str, folder: Path) -> None:
+        self.tool, self.case, self.python, self.folder = tool, case, python, folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self.robot, self.urdf = folder / f"robot.{case.suffix}", folder / "robot.urdf"
+        self.robot.write_text(case.robot, encoding="utf-8")
+        self.urdf.write_text(case.urdf(), encoding="utf-8")
+        self.table = case.table()
+        if case.exact:
+            self.states, self.truth = case.exact[:3], case.exact[3]
+        else:
+            *states, self.truth = treated(case.test, case.score)
+            self.states = tuple(states)
+
+    def job(
+        self,
+        name: str,
+        train: tuple[Piece, ...],
+        knobs: tuple[float, float],
+        states: Any,
+        *,
+        final: bool = False,
+    ) -> None:
+        cutoff, option = knobs
+        q, qd, qdd, tau = treated(train, cutoff)
+        np.savez(
+            self.folder / f"{name}.npz",
+            **dict(zip(("q", "qd", "qdd", "tau"), (q, qd, qdd, tau), strict=True)),
+            t=np.concatenate([p.t for p in train]),
+            raw_q=np.concatenate([p.q for p in train]),
+            raw_tau=np.concatenate([p.tau for p in train]),
+            lengths=[len(p.t) for p in train],
+            slow=SLOW * np.abs(qd).max(axis=0),
+            coupled=self.case.coupled,
+            cutoff=cutoff,
+            option=option,
+            final=final,
+            robot=str(self.robot),
+            urdf=str(self.urdf),
+            mdh=self.table,
+            states=np.stack(states),
+        )
+
+    def run(self) -> dict[str, Answer]:
+        """Answers of all jobs in the folder."""
+        command = [self.python, str(HERE / "worker.py"), self.tool.file, self.tool.function]
+        own = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+        if not all(p.with_suffix(".json").exists() for p in self.folder.glob("*.npz")):
+            subprocess.run([*command, str(self.folder)], env=own, check=False)
+        return {
+            p.stem: json.loads(p.with_suffix(".json").read_text())
+            if p.with_suffix(".json").exists()
+            else {"error": "the process ended", "said": ""}
+            for p in self.folder.glob("*.npz")
+        }
+
+    def tuned(self) -> tuple[float, float]:
+        """Cut-off and option by which a fit of one half predicts the other best, both ways; the
+        middle cut-off if none does.
+        """
+        train, score = self.case.train, self.case.score or 20.0
+        halves = [(half,) for half in train[0].halves()] if len(train) == 1 else [train[::2], train[1::2]]
+        rate = (len(train[0].t) - 1) / (train[0].t[-1] - train[0].t[0])
+        cutoffs = [f for f in CUTOFFS if f < 0.4 * rate]
+        knobs = [(f, option) for f in cutoffs for option in self.tool.options]
+        truth = []
+        for k in (0, 1):
+            *states, tau = treated(halves[1 - k], score)
+            truth.append(tau)
+            for i, one in enumerate(knobs):
+                self.job(f"half{k}_{i}", halves[k], one, states)
+        answers = self.run()
+        errors = {}
+        for i, one in enumerate(knobs):
+            both = [answers[f"half{k}_{i}"] for k in (0, 1)]
+            if all("predicted" in answer for answer in both):
+                parts = [relative(tau, a["predicted"]) for tau, a in zip(truth, both, strict=True)]
+                errors[one] = float(np.sum(np.square(parts)))
+        return min(errors, key=errors.__getitem__) if errors else knobs[len(knobs) // 2]
+
+    def results(self) -> Answer:
+        case = self.case
+        knobs = self.tuned()
+        rng = np.random.default_rng(1)
+        size = [np.abs(x).max(axis=0) for x in self.states]
+        random = [s * rng.uniform(-1, 1, (400, len(s))) for s in size]
+        both = [np.concatenate(pair) for pair in zip(self.states, random, strict=True)]
+        self.job("final", case.train, knobs, both, final=True)
+        for k, train in enumerate(case.repeats):
+            self.job(f"repeat{k}", train, knobs, self.states)
+        if case.name in SLIPPED:
+            for k, piece in enumerate(slips(case.train[0]).values()):
+                self.job(f"slip{k}", (piece,), knobs, self.states, final=True)
+        answers = self.run()
+        final = answers["final"]
+        row: Answer = {"knobs": knobs, **{k: final.get(k) for k in ("error", "seconds", "memory")}}
+        if "predicted" not in final:
+            return row
+        K, torque = len(self.truth), np.array(final["predicted"])
+        row["joints"] = relative(self.truth, torque[:K]).tolist()
+        row["whole"] = norm(self.truth - torque[:K]) / norm(self.truth)
+        row["feasible"] = feasible(str(self.urdf), case.coupled, random, torque[K:])
+        repeats = [answers[f"repeat{k}"] for k in range(len(case.repeats))]
+        row["spread"] = spread([a["values"] for a in repeats if a.get("values")])
+        if case.name in SLIPPED:
+            row["slips"] = [
+                said(final, answers[f"slip{k}"]) for k in range(len(slips(case.train[0])))
+            ]
+        return row
+
+
+def norm(x: Array) -> float:
+    return float(np.linalg.norm(x))
+
+
+def relative(truth: Array, predicted: Any) -> Array:
+    """Error of each joint beside the rms of its torque."""
+    left = np.linalg.norm(truth - np.asarray(predicted), axis=0)
+    return np.asarray(left / np.linalg.norm(truth, axis=0))
+
+
+def spread(fits: list[dict[str, list[float]]]) -> float | None:
+    """Median over parameters of the scatter between fits beside what they state."""
+    if len(fits) < 3:
+        return None
+    ratios = []
+    for name in set.intersection(*(set(fit) for fit in fits)):
+        X, s = np.array([fit[name] for fit in fits]).T
+        if np.all(s > 0) and np.all(np.isfinite(s)):
+            ratios.append(np.std(X, ddof=1) / np.sqrt(np.mean(s**2)))
+    return float(np.median(ratios)) if ratios else None
+
+
+CAUSES = (
+    r"twice|2\.0|factor|gain|half",
+    r"degree|\bdeg\b|180/pi|57\.",
+    r"swap|exchang|permut|order of|instead of joint",
+    r"sign|direction|negat",
+    r"delay|late|\b(19|20|21)(\.\d)? ms|lag",
+)
+
+
+def said(right: Answer, slipped: Answer) -> list[str]:
+    """What the tool says of a slipped record and not of the right one, numbers apart."""
+    if slipped.get("error"):
+        return [slipped["error"]]
+    usual = {plain(line) for line in right["said"].splitlines()}
+    new = slipped["said"].splitlines()
+    return [line.strip() for line in new if plain(line) not in usual and line.strip()]
+
+
+def plain(line: str) -> str:
+    return re.sub(r"[-+]?\d[\d.,e+-]*|nan|inf|-{3,}", "#", re.sub(r"\s+", " ", line.strip()))
+
+
+def verdict(lines: list[str], cause: str) -> str:
+    """Whether words, not a table of numbers, name the cause."""
+    words = [line for line in lines if not re.fullmatch(r"[\w +*.()-]+ +-?[\d.]+%?", line)]
+    if any(re.search(cause, line, re.IGNORECASE) for line in words):
+        return "named"
+    if words:
+        return "other words"
+    return "numbers alone" if lines else "nothing"
+
+
+def table(head: list[str], rows: list[list[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)] + [""]
+
+
+def percent(x: float) -> str:
+    return f"{100 * x:.3g}"
+
+
+def tables(rows: dict[str, dict[str, Answer]], missing: dict[str, str]) -> str:
+    """The tables of the page; what depends on the machine comes last."""
+    names = [name for name in TOOLS if any(name in row for row in rows.values())]
+    title = {name: TOOLS[name].title for name in TOOLS}
+
+    def cells(show: Any) -> list[list[str]]:
+        return [
+            [title[name], *(show(row[name]) if name in row else "" for row in rows.values())]
+            for name in names
+        ]
+
+    def show_error(row: Answer) -> str:
+        return percent(row["whole"]) if "whole" in row else "-"
+
+    out = ["### Error on unseen data, % of the rms torque", ""]
+    out += table(["tool", *rows], cells(show_error))
+    failed = [
+        f"- {title[name]}, {case}: {row[name]['error']}"
+        for case, row in rows.items()
+        for name in names
+        if row.get(name, {}).get("error")
+    ]
+    out += [*(f"- {title[k]} was not installed: {v}" for k, v in missing.items()), *failed, ""]
+    out += ["### By joint, %", ""]
+    for case, row in rows.items():
+        some = [name for name in names if "joints" in row.get(name, {})]
+        if some:
+            head = [case, *(str(j + 1) for j in range(len(row[some[0]]["joints"])))]
+            out += table(head, [[title[k], *map(percent, row[k]["joints"])] for k in some])
+    out += ["### A physical robot can have the parameters", ""]
+    out += table(["tool", *rows], cells(lambda row: row.get("feasible", "-")))
+    out += ["### Scatter between records beside the deviation that is stated", ""]
+    repeated = [case for case in rows if case == "go2" or case in ROBOTS]
+    out += table(
+        ["tool", *repeated],
+        [
+            [title[k], *(f"{x:.2f}" if (x := rows[c].get(k, {}).get("spread")) else "-" for c in repeated)]
+            for k in names
+        ],
+    )
+    out += ["### The cut-off that each chose, Hz (and its setting)", ""]
+    out += table(
+        ["tool", *rows],
+        cells(lambda row: f"{row['knobs'][0]:g}" + (f" ({row['knobs'][1]:g})" if row["knobs"][1] else "")),
+    )
+    out += ["### Five slips in the record", ""]
+    for case in (case for case in SLIPPED if case in rows):
+        listed = list(slips(CASES[case]().train[0]))
+        own = [name for name in names if "slips" in rows[case].get(name, {})]
+        out += table(
+            [case, *(title[k] for k in own)],
+            [
+                [slip, *(verdict(rows[case][k]["slips"][i], CAUSES[i]) for k in own)]
+                for i, slip in enumerate(listed)
+            ],
+        )
+    out += ["### Lines, seconds of processor and peak memory (MB) of one fit", ""]
+    lines = [[row[0], str(TOOLS[k].lines), *row[1:]] for k, row in zip(names, cells(cost), strict=True)]
+    out += table(["tool", "lines", *rows], lines)
+    return "\n".join(out)
+
+
+def cost(row: Answer) -> str:
+    return f"{row['seconds']:.2g}, {row['memory']:.0f}" if row.get("seconds") else "-"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--work", type=Path, required=True)
+    parser.add_argument("--page", type=Path)
+    parser.add_argument("--tools", nargs="*", default=list(TOOLS), choices=list(TOOLS))
+    parser.add_argument("--cases", nargs="*", default=list(CASES), choices=list(CASES))
+    arguments = parser.parse_args()
+    rows: dict[str, dict[str, Answer]] = {}
+    missing: dict[str, str] = {}
+    pythons: dict[str, str] = {}
+    for name in arguments.tools:
+        try:
+            pythons[name] = environment(TOOLS[name], arguments.work)
+        except RuntimeError as e:
+            missing[name] = str(e)
+    for case_name in arguments.cases:
+        try:
+            case = CASES[case_name]()
+        except (InputError, OSError) as e:
+            sys.exit(f"{case_name}: {e}")
+        rows[case_name] = {}
+        for name, python in pythons.items():
+            folder = arguments.work / "jobs" / case_name / name
+            rows[case_name][name] = Runs(TOOLS[name], case, python, folder).results()
+            print(f"{case_name}: {TOOLS[name].title} done", flush=True)
+    text = tables(rows, missing)
+    (arguments.work / "tables.md").write_text(text, encoding="utf-8")
+    if arguments.page:
+        before = arguments.page.read_text(encoding="utf-8").partition(MARK)[0]
+        arguments.page.write_text(f"{before}{MARK}\n\n{text}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
