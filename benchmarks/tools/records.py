@@ -100,11 +100,8 @@ class Case:
             path.write_text(self.robot, encoding="utf-8")
             text = write_robot(load_robot(str(path)), "robot.urdf")[0]
         for j in range(1, 10):
-            text = text.replace(f'"joint{j}"', f'"joint0{j}"').replace(
-                f'"link{j}"', f'"link0{j}"'
-            )
+            text = text.replace(f'"joint{j}"', f'"joint0{j}"').replace(f'"link{j}"', f'"link0{j}"')
         return text
-
 
     def table(self) -> Array:
         """d, a, alpha and angle of the frames, (n + 1, 4), modified Denavit and Hartenberg, a and
@@ -199,7 +196,11 @@ def simulated(name: str) -> Case:
     other = world.fourier(robot, SEED + 1)
     tau, encoder = truth.torque(move), world.Encoder(2 * np.pi / 20_000)
     records = tuple(
-        (Piece(move.t, world.encoded(robot, move, encoder, s), tau + world.noise(tau, 0.9, 0.01, s)),)
+        (
+            Piece(
+                move.t, world.encoded(robot, move, encoder, s), tau + world.noise(tau, 0.9, 0.01, s)
+            ),
+        )
         for s in range(SEED, SEED + SEEDS)
     )
     exact = tuple(x[::10] for x in (other.q, other.qd, other.qdd, truth.torque(other)))

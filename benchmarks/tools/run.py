@@ -21,11 +21,11 @@ from typing import Any
 for thread in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[thread] = "1"
 
-import numpy as np
-from feasible import feasible
-from records import CASES, CUTOFFS, ROBOTS, ROOT, SLOW, Case, Piece, slips, treated
+import numpy as np  # noqa: E402
+from feasible import feasible  # noqa: E402
+from records import CASES, CUTOFFS, ROBOTS, ROOT, SLOW, Case, Piece, slips, treated  # noqa: E402
 
-from runtime.errors import InputError
+from runtime.errors import InputError  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
 MARK = "<!-- tables -->"
@@ -64,10 +64,23 @@ SYMGEN = (f"{ROOT}[mjcf]",)
 TOOLS = {
     "symgen": Tool("symgen", "tool_symgen", "symgen", SYMGEN),
     "symgen-ls": Tool("symgen, least squares", "tool_symgen", "symgen", SYMGEN, "least_squares"),
-    "figaroh": Tool("figaroh 1.0.2", "tool_figaroh", "figaroh", ("figaroh==1.0.2",), options=(0.0, 1e-4, 1e-3)),
-    "pinocchio": Tool("pinocchio + lstsq", "tool_pinocchio", "pinocchio", ("pin==4.1.0",), options=(1e-6, 1e-4, 1e-3)),
+    "figaroh": Tool(
+        "figaroh 1.0.2", "tool_figaroh", "figaroh", ("figaroh==1.0.2",), options=(0.0, 1e-4, 1e-3)
+    ),
+    "pinocchio": Tool(
+        "pinocchio + lstsq",
+        "tool_pinocchio",
+        "pinocchio",
+        ("pin==4.1.0",),
+        options=(1e-6, 1e-4, 1e-3),
+    ),
     "aurt": Tool("AURT 0.0.4", "tool_aurt", "aurt", ("aurt==0.0.4",)),
-    "flobaroid": Tool("FloBaRoID's method, own text", "tool_flobaroid", "flobaroid", ("pin==4.1.0", "cvxpy", "clarabel")),
+    "flobaroid": Tool(
+        "FloBaRoID's method, own text",
+        "tool_flobaroid",
+        "flobaroid",
+        ("pin==4.1.0", "cvxpy", "clarabel"),
+    ),
 }
 
 
@@ -156,7 +169,11 @@ class Runs:
         middle cut-off if none does.
         """
         train, score = self.case.train, self.case.score or 20.0
-        halves = [(half,) for half in train[0].halves()] if len(train) == 1 else [train[::2], train[1::2]]
+        halves = (
+            [(half,) for half in train[0].halves()]
+            if len(train) == 1
+            else [train[::2], train[1::2]]
+        )
         rate = (len(train[0].t) - 1) / (train[0].t[-1] - train[0].t[0])
         cutoffs = [f for f in CUTOFFS if f < 0.4 * rate]
         knobs = [(f, option) for f in cutoffs for option in self.tool.options]
@@ -229,12 +246,13 @@ def spread(fits: list[dict[str, list[float]]]) -> float | None:
 
 
 CAUSES = (
-    r"twice|2\.0|factor|gain|half",
-    r"degree|\bdeg\b|180/pi|57\.",
-    r"swap|exchang|permut|order of|instead of joint",
-    r"sign|direction|negat",
-    r"delay|late|\b(19|20|21)(\.\d)? ms|lag",
+    r"joint 2\b.*(twice|half|2\.0|0\.50|factor of 2)|(twice|half|2\.0|0\.50).*joint 2\b",
+    r"degree|\bdeg\b",
+    r"(joints|columns|torques)( of)?( joints)? (1 and 2|2 and 1)|swapped|exchanged",
+    r"(sign|axis|turns|direction).*joint 2\b|joint 2\b.*(sign|axis|turns|direction|wrong way)",
+    r"\blate by|delay|\b(19|20|21)(\.\d+)? ms",
 )
+"""What names each slip, in the order of `slips`."""
 
 
 def said(right: Answer, slipped: Answer) -> list[str]:
@@ -252,12 +270,17 @@ def plain(line: str) -> str:
 
 def verdict(lines: list[str], cause: str) -> str:
     """Whether words, not a table of numbers, name the cause."""
-    words = [line for line in lines if not re.fullmatch(r"[\w +*.()-]+ +-?[\d.]+%?", line)]
+    words = [line for line in lines if not number(line)]
     if any(re.search(cause, line, re.IGNORECASE) for line in words):
         return "named"
     if words:
         return "other words"
     return "numbers alone" if lines else "nothing"
+
+
+def number(line: str) -> bool:
+    """Whether a line is a name beside numbers."""
+    return re.fullmatch(r"[\w +*.()-]+ +-?[\d.]+%?", line) is not None
 
 
 def table(head: list[str], rows: list[list[str]]) -> list[str]:
@@ -282,7 +305,19 @@ def tables(rows: dict[str, dict[str, Answer]], missing: dict[str, str]) -> str:
     def show_error(row: Answer) -> str:
         return percent(row["whole"]) if "whole" in row else "-"
 
-    out = ["### Error on unseen data, % of the rms torque", ""]
+    out = ["### Where symgen is not the best", ""]
+    for case, row in rows.items():
+        whole = {k: row[k]["whole"] for k in names if "whole" in row.get(k, {})}
+        best = min(whole, key=whole.__getitem__, default="symgen")
+        if "symgen" in whole and best != "symgen":
+            joints = np.array(row["symgen"]["joints"]), np.array(row[best]["joints"])
+            worse = [str(j + 1) for j in np.flatnonzero(joints[0] > 1.05 * joints[1])]
+            out.append(
+                f"- {case}: {title[best]} {percent(whole[best])} %, symgen "
+                f"{percent(whole['symgen'])} %; joints where symgen is worse by more than a "
+                f"twentieth: {', '.join(worse) or 'none'}"
+            )
+    out += ["", "### Error on unseen data, % of the rms torque", ""]
     out += table(["tool", *rows], cells(show_error))
     failed = [
         f"- {title[name]}, {case}: {row[name]['error']}"
@@ -304,14 +339,21 @@ def tables(rows: dict[str, dict[str, Answer]], missing: dict[str, str]) -> str:
     out += table(
         ["tool", *repeated],
         [
-            [title[k], *(f"{x:.2f}" if (x := rows[c].get(k, {}).get("spread")) else "-" for c in repeated)]
+            [
+                title[k],
+                *(f"{x:.2f}" if (x := rows[c].get(k, {}).get("spread")) else "-" for c in repeated),
+            ]
             for k in names
         ],
     )
     out += ["### The cut-off that each chose, Hz (and its setting)", ""]
     out += table(
         ["tool", *rows],
-        cells(lambda row: f"{row['knobs'][0]:g}" + (f" ({row['knobs'][1]:g})" if row["knobs"][1] else "")),
+        cells(
+            lambda row: (
+                f"{row['knobs'][0]:g}" + (f" ({row['knobs'][1]:g})" if row["knobs"][1] else "")
+            )
+        ),
     )
     out += ["### Five slips in the record", ""]
     for case in (case for case in SLIPPED if case in rows):
@@ -324,8 +366,20 @@ def tables(rows: dict[str, dict[str, Answer]], missing: dict[str, str]) -> str:
                 for i, slip in enumerate(listed)
             ],
         )
+        out += ["What they said, at most three lines each:", ""]
+        for i, slip in enumerate(listed):
+            for k in own:
+                lines = [line for line in rows[case][k]["slips"][i] if not number(line)][:3]
+                out += (
+                    [f"- {slip}, {title[k]}: {' / '.join(line[:160] for line in lines)}"]
+                    if lines
+                    else []
+                )
+        out += [""]
     out += ["### Lines, seconds of processor and peak memory (MB) of one fit", ""]
-    lines = [[row[0], str(TOOLS[k].lines), *row[1:]] for k, row in zip(names, cells(cost), strict=True)]
+    lines = [
+        [row[0], str(TOOLS[k].lines), *row[1:]] for k, row in zip(names, cells(cost), strict=True)
+    ]
     out += table(["tool", "lines", *rows], lines)
     return "\n".join(out)
 

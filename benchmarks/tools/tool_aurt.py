@@ -57,6 +57,8 @@ def fit(job):
     def predict(q, qd, qdd):
         states = np.empty((3 * q.shape[1], len(q)))
         states[0::3], states[1::3], states[2::3] = (q + job.mdh[: q.shape[1], 3]).T, qd.T, qdd.T
-        return np.stack([model.observation_matrix_joint(j, states) @ X for j in range(q.shape[1])], axis=1)
+        return np.stack(
+            [model.observation_matrix_joint(j, states) @ X for j in range(q.shape[1])], axis=1
+        )
 
     return predict, {}

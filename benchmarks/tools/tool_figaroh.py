@@ -36,7 +36,7 @@ class Identification(BaseIdentification):
         job = self.job
         keys = ("timestamps", "positions", "velocities", "accelerations", "torques")
         values = (np.arange(len(job.q))[:, None] / 100, job.q, job.qd, job.qdd, job.tau)
-        return dict(zip(keys, values))
+        return dict(zip(keys, values, strict=True))
 
     def filter_kinematics_data(self, filter_config=None):
         self.processed_data = dict(self.raw_data)
@@ -77,4 +77,5 @@ def fit(job):
         W = np.delete(found.columns(q, qd, qdd), found._idx_eliminated, axis=1)
         return (W[:, found._base_indices] @ X).reshape(q.shape[1], -1).T
 
-    return predict, dict(zip(found.params_base, zip(X, np.abs(X) * relative / 100)))
+    deviations = zip(X, np.abs(X) * relative / 100, strict=True)
+    return predict, dict(zip(found.params_base, deviations, strict=True))

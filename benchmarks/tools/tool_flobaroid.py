@@ -34,7 +34,9 @@ def fit(job):
     model = pin.buildModelFromUrdf(job.urdf)
     n, rng = model.nv, np.random.default_rng(0)
     known = np.concatenate([I.toDynamicParameters() for I in model.inertias[1:]])
-    random = [rng.uniform(-1, 1, (5000 // n, n)) * np.abs(x).max(axis=0) for x in (job.q, job.qd, job.qdd)]
+    random = [
+        rng.uniform(-1, 1, (5000 // n, n)) * np.abs(x).max(axis=0) for x in (job.q, job.qd, job.qdd)
+    ]
     _, s, Vt = np.linalg.svd(np.linalg.qr(columns(model, *random))[1])
     base = Vt[: np.sum(s > 1e-4 * s[0])]  # W x = (W base') (base x)
     Q, R = np.linalg.qr(columns(model, job.q, job.qd, job.qdd) @ base.T)

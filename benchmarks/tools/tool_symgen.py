@@ -10,11 +10,9 @@ import symgen
 
 def fit(job, chosen="model_estimate"):
     model = symgen.model(job.robot)
-    ends = np.cumsum([0, *job.lengths])
-    records = [
-        runtime.Record(job.t[a:b], job.raw_q[a:b], job.raw_tau[a:b])
-        for a, b in zip(ends, ends[1:], strict=False)
-    ]
+    ends = np.cumsum(job.lengths)[:-1]
+    pieces = (np.split(x, ends) for x in (job.t, job.raw_q, job.raw_tau))
+    records = [runtime.Record(*piece) for piece in zip(*pieces, strict=True)]
     study = runtime.Study(
         signals={"median": 1, "lowpass": {"cutoff": job.cutoff}},
         rows={"low_speed": job.slow.tolist()},
@@ -23,9 +21,11 @@ def fit(job, chosen="model_estimate"):
     variants = symgen.variants(job.robot) if job.final else None
     result = runtime.identify(model, records, study, variants=variants)
     if result.plausibility:
+        for trial in result.plausibility.named:
+            print(trial.alternative.cause)
         for check in result.plausibility.checks:
-            if check.state != "yes":
-                print(f"{check.finding}. {check.remedy}")
+            if check.state in ("no", "doubtful"):
+                print(check.finding)
     found = getattr(result, chosen)
     X = np.zeros(len(model.BASE_PARAMETERS))
     X[[model.BASE_PARAMETERS.index(name) for name in found.names]] = found.X
@@ -33,7 +33,9 @@ def fit(job, chosen="model_estimate"):
     def predict(q, qd, qdd):
         return model.inverse_dynamics(q, qd, qdd, X)
 
-    return predict, dict(zip(found.names, zip(found.X, found.sigma_corrected)))
+    return predict, {
+        name: (found[name], s) for name, s in zip(found.names, found.sigma_corrected, strict=True)
+    }
 
 
 def least_squares(job):
