@@ -81,6 +81,7 @@ TOOLS = {
         "flobaroid",
         ("pin==4.1.0", "cvxpy", "clarabel"),
     ),
+    "mujoco": Tool("mujoco 4.0.0, sysid", "tool_mujoco", "mujoco", ("mujoco[sysid]==4.0.0",)),
 }
 
 
@@ -165,8 +166,8 @@ class Runs:
         }
 
     def tuned(self) -> tuple[float, float]:
-        """Cut-off and option by which a fit of one half predicts the other best, both ways; the
-        middle cut-off if none does.
+        """Cut-off and option by which a fit of one half predicts the other best, both ways; raises
+        RuntimeError with what the tool said where no fit does.
         """
         train, score = self.case.train, self.case.score or 20.0
         halves = (
@@ -190,11 +191,16 @@ class Runs:
             if all("predicted" in answer for answer in both):
                 parts = [relative(tau, a["predicted"]) for tau, a in zip(truth, both, strict=True)]
                 errors[one] = float(np.sum(np.square(parts)))
-        return min(errors, key=errors.__getitem__) if errors else knobs[len(knobs) // 2]
+        if not errors:
+            raise RuntimeError(answers["half0_0"].get("error", "no fit predicts"))
+        return min(errors, key=errors.__getitem__)
 
     def results(self) -> Answer:
         case = self.case
-        knobs = self.tuned()
+        try:
+            knobs = self.tuned()
+        except RuntimeError as e:
+            return {"error": str(e)}
         rng = np.random.default_rng(1)
         size = [np.abs(x).max(axis=0) for x in self.states]
         random = [s * rng.uniform(-1, 1, (400, len(s))) for s in size]
@@ -246,7 +252,8 @@ def spread(fits: list[dict[str, list[float]]]) -> float | None:
 
 
 CAUSES = (
-    r"joint 2\b.*(twice|half|2\.0|0\.50|factor of 2)|(twice|half|2\.0|0\.50).*joint 2\b",
+    r"joint 2\b.*(twice|half|2\.0|0\.50|factor of 2)|(twice|half|2\.0|0\.50).*joint 2\b"
+    r"|joint 2 is to be multiplied by 0\.[45]",
     r"degree|\bdeg\b",
     r"(joints|columns|torques)( of)?( joints)? (1 and 2|2 and 1)|swapped|exchanged",
     r"(sign|axis|turns|direction).*joint 2\b|joint 2\b.*(sign|axis|turns|direction|wrong way)",
