@@ -1,7 +1,8 @@
 """What may be wrong with a study, a robot file or a log, one thing at a time, as maps of the
 samples and entries of the table of frames.
 
-    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,  tau' = T tau - s known,
+    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,
+    tau' = T tau - s known - (a q + b sin q + c cos q),
     free_... = another value
 
 A robot of n joints has some 10 n^2 of them. Each is tried at the cost of the regressor
@@ -50,6 +51,8 @@ class Alternative:
         Factor on the sampling rate.
     known_factor : float or ndarray, shape (n,)
         Factor s on the known torques.
+    spring : ndarray, shape (n, 3), or 0
+        a, b, c of a torque that each joint has by its position.
     constants : mapping of str to float
         Entries of the table of frames, SI.
     of : str
@@ -64,6 +67,7 @@ class Alternative:
     T: Array
     rate: float = 1.0
     known_factor: Array | float = 1.0
+    spring: Array | float = 0.0
     constants: Mapping[str, float] = field(default_factory=dict)
     of: str = ""
 
@@ -82,12 +86,22 @@ class Alternative:
 
     def torque(self, samples: Samples) -> Array:
         """Torques left for the model, shape (K, n)."""
-        return np.asarray(samples.tau @ self.T.T - self.known_factor * samples.tau_known)
+        return np.asarray(samples.tau @ self.T.T - self.known(samples))
+
+    def known(self, samples: Samples) -> Array:
+        """Torques known beside the model, shape (K, n)."""
+        by_position = (self.spring * springs(samples.q)).sum(axis=2)
+        return np.asarray(self.known_factor * samples.tau_known + by_position)
 
     @property
     def on_data(self) -> bool:
         """Whether the table of frames stays."""
         return not self.constants
+
+
+def springs(q: Array) -> Array:
+    """q, sin q and cos q of every joint: what springs and counterbalances do, shape (K, n, 3)."""
+    return np.stack([q, np.sin(q), np.cos(q)], axis=2)
 
 
 def unchanged(n: int, **changed: Any) -> Alternative:

@@ -1,5 +1,5 @@
 """One number that the study takes as known, fitted beside the model: a factor of a joint, its zero,
-a length, an angle, the direction of gravity.
+a length, an angle, the direction of gravity, the size of a spring or counterbalance.
 
 Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of
 barrier and values, J = d(W chi)/d xi the effect of
@@ -11,6 +11,9 @@ the number,
 
 rows over their sigma. Only what this first step finds worth it is searched: fits of a physical
 robot at values of the number, by golden section.
+
+A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c of
+the same step.
 
 The direction of gravity, |g| fixed, is two such numbers, and tells the sign and the axis of the
 base. W is linear in gravity, W(g) = W_0 + sum_a g_a W_a. From the best of the given direction and
@@ -32,6 +35,7 @@ from runtime.checks.alternatives import (
     Alternative,
     coupled,
     neighbours,
+    springs,
     times,
     unchanged,
 )
@@ -58,7 +62,7 @@ class Quantity:
     Attributes
     ----------
     kind : str
-        factor, zero, rate, coupling, length, angle.
+        factor, zero, rate, coupling, length, angle, spring.
     of : str
         What it is, in words.
     span : float
@@ -93,8 +97,8 @@ class Step:
 
 
 def quantities(problem: Problem) -> list[Quantity]:
-    """Factors of all joints, zeros of those that turn, the sampling rate, couplings of neighbours;
-    lengths and angles of the table where it is free.
+    """Factors of all joints, zeros and springs of those that turn, the sampling rate, couplings of
+    neighbours; lengths and angles of the table where it is free.
     """
     plain = unchanged(problem.samples.n)
     joints, units = list(joint_labels(problem.model)), joint_units(problem.model)
@@ -116,6 +120,9 @@ def quantities(problem: Problem) -> list[Quantity]:
             which.append(
                 ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
             )
+        if units[j] == "rad" and (ratios := _ratios(problem, j)) is not None:
+            of = f"a spring or counterbalance of joint {joint}"
+            which.append(("spring", of, 2.0, partial(_spring, of, number == j, ratios)))
     for i, k in neighbours(units):
         of = f"the coupling of joints {joints[min(i, k)]} and {joints[max(i, k)]}"
         for columns in ("positions and torques", "torques"):
@@ -162,6 +169,26 @@ def _rate(xi: float) -> dict[str, Any]:
         "remedy": "correct record.rate, or the unit of the time column (record.units.t)",
         "rate": factor,
     }
+
+
+def _spring(of: str, chosen: Array, ratios: Array, xi: float) -> dict[str, Any]:
+    return {
+        "cause": f"{of} is missing, a torque that depends on its position",
+        "remedy": f"give {of} as a known torque (record.columns.tau_known), or as an element of the "
+        "robot file (kind: stiffness, or a column of your own)",
+        "spring": xi * np.where(chosen[:, None], ratios, 0.0),
+    }
+
+
+def _ratios(problem: Problem, j: int) -> Array | None:
+    """a, b, c of a spring or counterbalance of a joint beside the model, to first order; None where
+    the samples do not tell them from it.
+    """
+    D, now, mask = _rows(problem, unchanged(problem.samples.n))
+    size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))  # a, b, c in this unit
+    J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j], problem.F[:, j])
+    found = _step(problem, D, J, problem.given, problem.tau - now + D @ problem.given.X, mask)
+    return None if found is None else size * found[0]
 
 
 def _angle(key: str, name: str, frame: str, value: float, xi: float) -> dict[str, Any]:
@@ -214,7 +241,8 @@ def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
         J = J / sigma * mask
         WJ = np.einsum("kjp,kj->p", D, J / sigma)
         left = float((J * J).sum() - WJ @ solved(H, WJ))
-        if within or left <= 0:
+        told = quantity.kind == "spring" and problem.barrier.near_values  # by the values alone
+        if (within and not told) or left <= 0:
             steps.append(Step(0.0, np.inf, 0.0, within))
             continue
         xi = float((J * e).sum()) / left
@@ -266,7 +294,7 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
         return scores[xi]
 
     near, far = (float(np.clip(x, -quantity.span, quantity.span)) for x in (step.xi, 1.6 * step.xi))
-    for xi in sorted({near * 0.5, near, far}):
+    for xi in sorted({near * 0.25, near * 0.5, near, far}):
         score(xi)
     enough = problem.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
     if min(scores.values(), default=np.inf) > enough:
@@ -281,7 +309,8 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     grams = problem.grams(quantity.change(xi))
     assert grams is not None
     trial = problem.fitted(quantity.change(xi), grams)
-    return replace(trial, gain=trial.gain - 0.5 * float(np.log(problem.N)))  # one parameter more
+    more = 3 if quantity.kind == "spring" else 1  # parameters
+    return replace(trial, gain=trial.gain - 0.5 * more * float(np.log(problem.N)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,7 +380,8 @@ def gravity_direction(problem: Problem) -> Gravity | None:
     for _ in range(LIMIT.GRAVITY_PASSES):
         tangents = np.linalg.svd(u[None])[2][1:]
         turn = np.tensordot(tangents, size * by_axis, axes=1)
-        found = _step(problem, along(u), turn, now, Y, mask)
+        moved = np.einsum("akjp,p->akj", turn, now.X)
+        found = _step(problem, along(u), moved, now, Y, mask)
         if found is None:
             return None
         step, C = found
@@ -371,13 +401,13 @@ def gravity_direction(problem: Problem) -> Gravity | None:
 
 
 def _step(
-    problem: Problem, D: Array, turn: Array, fit: Fit, Y: Array, mask: Array
+    problem: Problem, D: Array, J: Array, fit: Fit, Y: Array, mask: Array
 ) -> tuple[Array, Array] | None:
-    """Step of the two angles, rad, and their covariance; None where gravity acts on nothing that
-    the samples show.
+    """Step of some numbers of effect J, shape (a, K, n), and their covariance; None where they act
+    on nothing that the samples show.
     """
     weight = mask / fit.sigma
-    J = np.einsum("akjp,p->akj", turn, fit.X) * weight
+    J = J * weight
     e = (Y - D @ fit.X) * weight
     A, _ = Grams.of(D, Y, mask).weighted(fit.sigma)
     H = A + problem.barrier.derivatives(fit.X, LIMIT.BARRIER[-1])[1]

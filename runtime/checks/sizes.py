@@ -140,7 +140,10 @@ def torques(case: Case) -> Answer:
     largest = np.abs(case.samples.tau).max(axis=0)
     if (out := largest > 1.5 * limits).any():
         units = np.where(case.turning, "N m", "N").tolist()
-        return Answer("no", case.reaching(largest, units, out))
+        text = (
+            f"{case.reaching(largest, units, out)}, {(largest / limits).max():.3g} times the limits"
+        )
+        return Answer("no", text)
     share = 100 * float((largest / limits).max())
     if share < 1:
         return Answer("doubtful", f"They reach {share:.2g} % of limits.tau at most")

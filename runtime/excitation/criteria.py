@@ -32,7 +32,7 @@ import numpy as np
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
 from runtime.loop.dry_friction import dry_friction
-from runtime.model.generated import GeneratedModel, base_columns, require
+from runtime.model.generated import GeneratedModel, base_columns, joint_labels, require
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
@@ -142,15 +142,15 @@ class Excess:
     ----------
     what : str
         Quantity.
-    joint : int
-        From 1.
+    joint : str
+        What results call it.
     value, limit : float, SI
         Largest value, and its limit.
     time : float, s
     """
 
     what: str
-    joint: int
+    joint: str
     value: float
     limit: float
     time: float
@@ -295,7 +295,7 @@ def excesses(
     require(model, "inverse_dynamics")
     t, q, qd, qdd = motion.sampled(settings.rate if rate is None else rate)
     tau = model.inverse_dynamics(q, qd, qdd, X)
-    free = np.full(q.shape[1], np.inf)
+    free, labels = np.full(q.shape[1], np.inf), joint_labels(model)
     bounds = [
         ("position", q, limits.lower, limits.upper),
         ("velocity", qd, -limits.qd, limits.qd),
@@ -328,7 +328,7 @@ def excesses(
             k = int(np.argmax(beyond[:, j]))
             if beyond[k, j] > 1e-9 * max(1.0, abs(x[k, j])):
                 limit = upper[j] if x[k, j] > upper[j] else lower[j]
-                exceeded.append(Excess(what, j + 1, float(x[k, j]), float(limit), float(t[k])))
+                exceeded.append(Excess(what, labels[j], float(x[k, j]), float(limit), float(t[k])))
     return exceeded
 
 

@@ -16,7 +16,7 @@ from runtime.excitation.criteria import MotionLimits, Weights, usage
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.loop.result import csv_text
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import to_mapping
 from runtime.settings.trajectories import Motion
@@ -171,8 +171,8 @@ class Excitation(Result):
     def torques(self) -> str:
         """What is not limited, a sentence; "" where every torque is."""
         free = [
-            str(j)
-            for j, limit in zip(self.model.JOINTS, self.limits.tau, strict=True)
+            j
+            for j, limit in zip(joint_labels(self.model), self.limits.tau, strict=True)
             if not np.isfinite(limit)
         ]
         if not free:
@@ -260,7 +260,7 @@ class Excitation(Result):
         note = "At the controller rate. 100 is the limit; the optimiser keeps a margin."
         return Table(
             "Share of the limits used, %",
-            ("", *(f"joint {j}" for j in self.model.JOINTS)),
+            ("", *(f"joint {j}" for j in joint_labels(self.model))),
             rows,
             note,
         )

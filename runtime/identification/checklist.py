@@ -81,14 +81,11 @@ class Checklist(Result):
     @property
     def next(self) -> str:
         """What to do, in a sentence."""
-        check = self.worst or next(
-            (check for check in self.checks if check.state == "open" and check.remedy), None
-        )
-        return (
-            check.remedy
-            if check is not None
-            else "use the parameters printed first with their corrected deviations"
-        ) + "."
+        if self.worst is not None:
+            return f"{self.worst.remedy}."
+        asked = [c.remedy for c in self.checks if c.state == "open" and c.remedy][:1]
+        use = "use the parameters printed first together, with their corrected deviations"
+        return "; for what was not judged, ".join([use, *asked]) + "."
 
     def _repr_html_(self) -> str:
         rows = [
@@ -203,6 +200,10 @@ def checklist_of(
             physical(fit if "standard" in fit.details else estimate, feasibility),
             resolved(advice),
         ]
+    if any(c.state == "no" for c in plausible) and fit.relative_error <= LIMIT.TOTAL_ERROR[0]:
+        use += (
+            " A small error alone says little: wrong units, signs and sides move into the values."
+        )
     return Checklist(tuple(check for check in checks if check is not None), use, expected)
 
 
@@ -210,7 +211,8 @@ def remark(check: Check, counts: bool) -> Check:
     """The check, a remark where it does not count and has something to tell."""
     if counts or check.state == "good":
         return check
-    return replace(check, state="open", finding=f"Single values are not asked for. {check.finding}")
+    finding = f"Single values are not asked for. {check.finding}; {check.remedy}"
+    return replace(check, state="open", finding=finding, remedy="")
 
 
 @Question(

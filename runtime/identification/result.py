@@ -39,7 +39,7 @@ from runtime.json_documents import json_text
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.drives import Coupling
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream
@@ -359,7 +359,8 @@ class Identification:
         )
         lost = lost_joints(self.estimate, self.model_estimate)
         unit = torque_unit_doubt(self.model, self.observation, by_law)
-        unused = unused_joints(self.observation.rows, self.observation.dropped, self.model.JOINTS)
+        joints = joint_labels(self.model)
+        unused = unused_joints(self.observation.rows, self.observation.dropped, joints)
         sentences = (
             unused,
             signs if self.negative else "",

@@ -41,7 +41,7 @@ from runtime.limits import LIMIT
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
 from runtime.loop.result import Simulation
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.progress import at
 from runtime.records.record import Record
 from runtime.rows.observation import LoopRows, Observation, stack
@@ -288,7 +288,7 @@ def closed_loop(
         parts.append(LoopPart(own, followed, selection, torque, *torques))
     if asked.reference == "measured":
         return ClosedLoop(model, study, simulator, tuple(parts), ASSUMED)
-    fits = law_fits(simulator.law, parts, controller, model.JOINTS)
+    fits = law_fits(simulator.law, parts, controller, joint_labels(model))
     at(law_text(fits))
     return ClosedLoop(model, study, simulator, tuple(parts), "", fits)
 

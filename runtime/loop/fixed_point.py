@@ -221,9 +221,8 @@ def _simulated(
             if J is not None:
                 g = loop.inertia(full(names, X, every)) / J
                 if not np.all(g > 0):
-                    raise InputError(
-                        f"inertia of negative sign about joint {int(np.argmin(g)) + 1}"
-                    )
+                    least = joint_labels(loop.model)[int(np.argmin(g))]
+                    raise InputError(f"inertia of negative sign about joint {least}")
             return X, g, loop.run(full(names, X, every), g), ""
         except InputError as e:
             reason = str(e)

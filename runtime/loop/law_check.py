@@ -56,7 +56,7 @@ class LawFit:
 
 
 def law_fits(
-    law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[int]
+    law: Any, parts: Sequence[Any], controller: Controller, joints: Sequence[str]
 ) -> tuple[LawFit, ...]:
     """Each joint of the records; parts : of `ClosedLoop`, references at the rate of the
     controller.
@@ -75,7 +75,7 @@ def law_fits(
         share, factor, _ = shares[0]
         lag = int(np.argmax([best for _, _, best in shares]))
         fits.append(
-            LawFit(str(label), share, shares[lag][1] if lag else factor, lag / rate, shares[lag][2])
+            LawFit(label, share, shares[lag][1] if lag else factor, lag / rate, shares[lag][2])
         )
     return tuple(fits)
 

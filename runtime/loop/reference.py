@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.formats.table import open_table
 from runtime.records.record import Record
 from runtime.settings.controller import Controller, Points
@@ -137,7 +137,7 @@ def reference_of(
             path=("controller", "reference"),
         )
     if settings.limits == "refuse":
-        check_limits(reference, model.LIMITS, model.JOINTS)
+        check_limits(reference, model.LIMITS, joint_labels(model))
     return reference
 
 
@@ -219,7 +219,7 @@ def require_rate(record: Record, controller: Controller) -> None:
     )
 
 
-def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[int]) -> None:
+def check_limits(reference: Reference, limits: Mapping[str, Any], joints: Sequence[str]) -> None:
     """Raise InputError with joint, value, limit and instant at the first reference value outside
     LIMITS of a model.
     """

@@ -25,6 +25,7 @@ from runtime.estimators.linear import percent
 from runtime.limits import LIMIT
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.law_check import law_text
+from runtime.model.generated import joint_labels
 from runtime.rows.observation import Observation
 
 Array = np.ndarray
@@ -95,7 +96,7 @@ def simulated_motion(
     rms, size, tracking = (np.sqrt(np.nanmean(x**2, axis=0)) for x in (error, moved, lag))
     return tuple(
         JointMotion(
-            str(label),
+            label,
             float(rms[j]),
             100 * float(rms[j] / size[j]) if size[j] > 0 else float("inf"),
             100 * float(rms[j] / tracking[j])
@@ -105,7 +106,7 @@ def simulated_motion(
                 (tau - observation.Y)[observation.joint(j)], observation.Y[observation.joint(j)]
             ),
         )
-        for j, label in enumerate(loop.model.JOINTS)
+        for j, label in enumerate(joint_labels(loop.model))
     )
 
 

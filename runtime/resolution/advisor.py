@@ -43,7 +43,7 @@ from runtime.estimators.linear import assemble
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.advice import (
@@ -268,7 +268,8 @@ def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str
         raise InputError(
             f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}"
         )
-    return {label: every[label] for label in labels}
+    names = dict(zip(list(every)[1:], joint_labels(model), strict=True))
+    return {names.get(label, label): every[label] for label in labels}
 
 
 def _advice(

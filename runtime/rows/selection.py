@@ -224,7 +224,7 @@ def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
 
 
 def unused_joints(
-    rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[int]
+    rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[str]
 ) -> str:
     """The joints of which no row is used, and what leaves most of them out, a sentence; "" where
     every joint has rows.
@@ -235,15 +235,15 @@ def unused_joints(
         Rows used, by joint.
     dropped : mapping of str to sequence of int
         Rows left out, by reason and joint.
-    joints : sequence of int
-        Their numbers.
+    joints : sequence of str
+        What results call them.
     """
     bare = [j for j, count in enumerate(rows) if not count]
     if not bare or not dropped:
         return ""
     reason = max(dropped, key=lambda name: sum(dropped[name][j] for j in bare))
     return (
-        f"No row of joint {', '.join(str(joints[j]) for j in bare)} is used: "
+        f"No row of joint {', '.join(joints[j] for j in bare)} is used: "
         f"{LEAVES_OUT.get(reason, reason)} leaves them out."
     )
 

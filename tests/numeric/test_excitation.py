@@ -52,7 +52,7 @@ def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, str, np.nd
         (folder / name).write_text(text, encoding="utf-8")
     model = load_model(folder / "planar_2r.py", trust=True)
     standard = {name: {**VALUES, **FRICTION}.get(name, 0.0) for name in model.STANDARD_PARAMETERS}  # type: ignore[attr-defined]
-    model.VALUES = standard
+    model.VALUES, model.LABELS = standard, {1: "shoulder"}
     return model, str(folder / "planar_2r_casadi.py"), np.asarray(model.base_parameters(standard))  # type: ignore[attr-defined]
 
 
@@ -162,6 +162,10 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     )
 
 
+def test_joints_have_the_names_of_the_file(free: object) -> None:
+    assert free.usage_table().header == ("", "joint 1 shoulder", "joint 2")  # type: ignore[attr-defined]
+
+
 def test_prediction_is_what_identification_finds(planar: tuple, free: object) -> None:
     """60 draws of white torque noise at the raw rate: scatter of the weighted estimate against the
     predicted %sigma, within 20 %.
@@ -235,9 +239,10 @@ def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple, free: ob
         settings(torque_rate=[0.9 * largest[0], 1.01 * largest[1]]),
         X,
     )
-    assert (excess.what, excess.joint) == ("rate of torque", 1) and excess.value == pytest.approx(
-        largest[0]
-    )
+    assert (excess.what, excess.joint) == (
+        "rate of torque",
+        "1 shoulder",
+    ) and excess.value == pytest.approx(largest[0])
     limited = search(planar, settings(torque_rate=(0.8 * largest).tolist(), iterations=100))
     t, q, qd, qdd, _ = limited.sampled()
     rate = np.gradient(

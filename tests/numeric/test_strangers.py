@@ -399,3 +399,61 @@ def test_a_cut_off_that_is_given_is_left_alone() -> None:
     record = runtime.Record(*motion(model, 10.0), name="run")
     result = runtime.identify(model, record, given, plausible=True)
     assert "lowpass" not in result.estimate.provenance
+
+
+def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
+    """It ended in "Next: do not use these values one by one" though no single value was asked for;
+    a unit wrong by 20 ended in No beside an error of 0.0 %, without a word on how that goes
+    together.
+    """
+    model = symgen.model("planar_2r")
+    right = runtime.identify(model, runtime.Record(*motion(model), name="run"), plausible=True)
+    assert right.checklist.answer.startswith("Yes")
+    assert right.checklist.next.startswith("use the parameters printed first together")
+    assert "do not use these values one by one" not in right.brief()
+    wrong = runtime.Record(*motion(model, noise=0.0, values=20.0), name="run")
+    said_so = runtime.identify(model, wrong, plausible=True).checklist
+    assert said_so.answer == "No" and "A small error alone says little" in said_so.use
+    assert "15.6 times the limits" in said_so.doubt
+
+
+def test_names_of_joints_stand_in_limits_and_advice() -> None:
+    """They had numbers alone there."""
+    from runtime.loop.reference import Reference, check_limits
+    from runtime.model.generated import joint_labels
+    from runtime.resolution.advisor import advise
+
+    text = (files("symgen.description.robots") / "planar_2r.yaml").read_text()
+    named = parse_robot((text + "labels: {1: shoulder, 2: elbow}\n").encode(), "named.yaml")
+    model = symgen.model(named)
+    assert joint_labels(model) == ("1 shoulder", "2 elbow")
+    t, q, tau = motion(model, 5.0)
+    record = runtime.Record(t, q, tau, name="run")
+    labels = [
+        [one.label for one in advise(model, record, confirm=False, encoders=asked).encoders]
+        for asked in (None, ("2",))
+    ]
+    assert labels == [["all", "1 shoulder", "2 elbow"], ["2 elbow"]]
+    study = runtime.Study(rows={"low_speed": [0.0, 100.0]})
+    bare = runtime.identify(model, record, study)
+    assert "No row of joint 2 elbow is used" in bare.brief()
+    far = Reference(200.0, 0 * q + [0.0, 9.0], 0 * q, 0 * q)
+    with pytest.raises(runtime.InputError, match="limits of joint 2 elbow"):
+        check_limits(far, {"q": [[-3, 3], [-3, 3]]}, joint_labels(model))
+
+
+def test_a_reading_beside_another_one_is_that_of_a_search() -> None:
+    """The advisor reads one motion by counts of many phases: knots and errors of the first reading
+    serve the others, which took half of its time.
+    """
+    from runtime.signals.counts.reading import read_counts
+
+    t = np.arange(3000) / 1000
+    x = np.stack([np.sin(3 * t) + 0.3 * np.cos(7 * t), 0.2 * np.sin(2 * t)], axis=1)
+    step, phase = 2e-3, 0.7e-3
+    first = read_counts(step * np.round(x / step), 1000.0, step)
+    moved = phase + step * np.round((x - phase) / step)
+    alone, beside = (read_counts(moved, 1000.0, step, near=near) for near in (None, first))
+    off = np.abs(beside.q - alone.q) / alone.s_q
+    assert off.max() < 1.0 and np.abs(beside.qd - alone.qd).max() < alone.s_qd.max()
+    assert np.allclose(beside.s_qd, alone.s_qd, rtol=0.2)
