@@ -12,8 +12,8 @@ the number,
 rows over their sigma. Only what this first step finds worth it is searched: fits of a physical
 robot at values of the number, by golden section.
 
-A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c of
-the same step.
+A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c
+of the same step.
 
 The direction of gravity, |g| fixed, is two such numbers, and tells the sign and the axis of the
 base. W is linear in gravity, W(g) = W_0 + sum_a g_a W_a. From the best of the given direction and
@@ -174,8 +174,8 @@ def _rate(xi: float) -> dict[str, Any]:
 def _spring(of: str, chosen: Array, ratios: Array, xi: float) -> dict[str, Any]:
     return {
         "cause": f"{of} is missing, a torque that depends on its position",
-        "remedy": f"give {of} as a known torque (record.columns.tau_known), or as an element of the "
-        "robot file (kind: stiffness, or a column of your own)",
+        "remedy": f"give {of} as a known torque (record.columns.tau_known), or in the robot file "
+        "(an element of kind stiffness, or a column of your own)",
         "spring": xi * np.where(chosen[:, None], ratios, 0.0),
     }
 
