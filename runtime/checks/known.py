@@ -74,6 +74,14 @@ class KnownValues(Result):
         )
 
     @property
+    def heavy(self) -> bool:
+        """Whether all gravity torques are larger, or all smaller, than LIMIT.CAD_RATIOS allow: no
+        time stamp does that.
+        """
+        ratios, (low, high) = self.gravity[np.isfinite(self.gravity)], LIMIT.CAD_RATIOS
+        return len(ratios) > 0 and bool((ratios < low).all() or (ratios > high).all())
+
+    @property
     def off(self) -> tuple[str, ...]:
         """The ratios outside LIMIT.CAD_RATIOS, and errors above LIMIT.CAD_ERROR, in words."""
         texts = []

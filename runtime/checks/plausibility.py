@@ -200,6 +200,8 @@ def plausibility(
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
         trials = _ranked([*tried(case.problem, case.sides), *searched(case.problem)])
+        if case.robot_values is not None and case.robot_values.heavy:
+            trials = [t for t in trials if t.alternative.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"

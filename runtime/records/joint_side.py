@@ -118,7 +118,7 @@ def column_names(
     q_ref = (
         _meant(first, "qr", "", given.q_ref, joints)
         if given.q_ref
-        else _numbered("qr", first)
+        else _numbered("qr", first, joints)
         if "qr1" in first.names
         else ()
     )
@@ -172,7 +172,7 @@ def _meant(
         return joint_columns(table, quantity, joints if ours else names)
     if names == BY_NAME:
         return named_columns(table, key, joints)
-    return tuple(names) or _numbered(key, table)
+    return tuple(names) or _numbered(key, table, joints)
 
 
 def require_alike(
@@ -205,7 +205,7 @@ def require_alike(
         )
 
 
-def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
+def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, ...]:
     found = sorted(
         (int(m[1]), name)
         for name in table.names
@@ -220,7 +220,7 @@ def _numbered(quantity: str, table: Table) -> tuple[str, ...]:
                 f"a study file, record.columns.{quantity}"
             ),
             file=table.file,
-            remedy=likely_columns(table.names),
+            remedy=likely_columns(table.names, joints),
         )
     return tuple(name for _, name in found)
 

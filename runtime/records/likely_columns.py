@@ -2,6 +2,7 @@
 for a study that a person looks at.
 
     actual_q_0 ... actual_q_5    one quantity: a stem, and the numbers behind it
+    elbow_pos, wrist_pos         or the names of the joints, in the order of the robot
     actual, q                    words of the stem
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 QUANTITY_WORDS = {  # the first words are taken before the others
@@ -20,11 +22,16 @@ NAMED_UNITS = {"t": "ms", "q": "deg", "tau": "mA"}
 NOT_MEASURED = {"target", "desired", "ref", "reference", "cmd", "command", "setpoint", "window"}
 
 
-def likely_columns(names: Sequence[str]) -> dict[str, Any]:
+def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
     """Settings of a record: columns t, q, tau, and units that names tell (currents are in A unless
-    they say mA); {} where names do not tell positions and as many torques.
+    they say mA); {} where names do not tell positions and as many torques. joints : their names in
+    the robot file.
     """
     stems: dict[str, list[str]] = {}
+    for joint, name in product(joints, names):
+        stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "", name)
+        if found:
+            stems.setdefault(stem, []).append(name)
     for name in names:
         if match := re.fullmatch(r"(.*?)[\s_.(\[-]*\d+[)\]]?", name):
             stems.setdefault(match[1], []).append(name)

@@ -342,6 +342,32 @@ def test_names_that_tell_nothing_are_refused_as_before(tmp_path) -> None:
     command = ["identify", "planar_2r", str(tmp_path / "run.csv"), "--suggest", str(study)]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2 and "no columns q1" in result.stderr and not study.exists()
+    assert "--suggest" not in result.stderr
+
+
+def test_columns_that_carry_the_names_of_joints_are_suggested() -> None:
+    """As ROS logs have them; in the order of the robot, whatever that of the file."""
+    from runtime.records.likely_columns import likely_columns
+
+    joints = ("joint_1", "elbow", "joint_10")
+    names = [f"{j}{end}" for end in ("_pos", "_effort") for j in ("elbow", "joint_10", "joint_1")]
+    assert likely_columns(["time", *names], joints)["columns"] == {
+        "t": "time",
+        "q": ["joint_1_pos", "elbow_pos", "joint_10_pos"],
+        "tau": ["joint_1_effort", "elbow_effort", "joint_10_effort"],
+    }
+    assert likely_columns(["time", *names]) == {}
+
+
+def test_currents_read_as_torques_are_no_wrong_rate() -> None:
+    """Another constant on every joint: "the sampling rate is 0.717 of the stated one"."""
+    model, free = symgen.model("planar_2r"), symgen.variants("planar_2r")
+    t, q, tau = motion(model)
+    found = runtime.plausibility(
+        model, runtime.Record(t, q, tau / [11.7, 6.4], name="run"), variants=free
+    )
+    assert not any(trial.alternative.kind == "rate" for trial in found.trials)
+    assert found.robot_values.heavy and "gravity torque of joint 1 0.0" in found.to_text()
 
 
 @pytest.mark.parametrize(
