@@ -483,3 +483,21 @@ def test_a_reading_beside_another_one_is_that_of_a_search() -> None:
     off = np.abs(beside.q - alone.q) / alone.s_q
     assert off.max() < 1.0 and np.abs(beside.qd - alone.qd).max() < alone.s_qd.max()
     assert np.allclose(beside.s_qd, alone.s_qd, rtol=0.2)
+
+
+@pytest.mark.parametrize("kind", ["none", "counterbalance", "spring"])
+def test_a_torque_by_position_that_nobody_told_is_named(kind) -> None:
+    """A forgotten counterbalance was told as "d of frame 2 is 0.043 m rather than 0.1 m", or not at
+    all.
+    """
+    model, free = symgen.model("planar_2r"), symgen.variants("planar_2r")
+    t, q, tau = motion(model)
+    forgotten = {
+        "none": 0 * t,
+        "counterbalance": -9 * np.cos(q[:, 0] + 0.3),
+        "spring": -6 * q[:, 0],
+    }
+    tau[:, 0] += forgotten[kind]
+    found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"), variants=free)
+    named = [trial.alternative.subject for trial in found.named]
+    assert named[:1] == ([] if kind == "none" else ["a spring or counterbalance of joint 1"]), named
