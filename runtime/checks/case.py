@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from runtime.checks.continuous import Gravity, gravity_direction
 from runtime.checks.delay import Delay, delay
 from runtime.checks.fits import Grams
+from runtime.checks.gravity import Gravity, gravity_direction
 from runtime.checks.known import KnownValues, known_values
 from runtime.checks.samples import Samples
 from runtime.checks.trials import Problem, problem_of

@@ -1,5 +1,5 @@
 """One number that the study takes as known, fitted beside the model: a factor of a joint, its zero,
-a length, an angle, the direction of gravity, the size of a spring or counterbalance.
+a length, an angle, the size of a spring or counterbalance.
 
 Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of
 barrier and values, J = d(W chi)/d xi the effect of
@@ -14,10 +14,6 @@ robot at values of the number, by golden section.
 
 A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c
 of the same step.
-
-The direction of gravity, |g| fixed, is two such numbers, and tells the sign and the axis of the
-base. W is linear in gravity, W(g) = W_0 + sum_a g_a W_a. From the best of the given direction and
-the six axes, Gauss-Newton over the two angles by the same step.
 """
 
 from __future__ import annotations
@@ -39,7 +35,8 @@ from runtime.checks.alternatives import (
     times,
     unchanged,
 )
-from runtime.checks.fits import Fit, Grams, quick_fit, solved
+from runtime.checks.fits import Grams, quick_fit, solved
+from runtime.checks.gravity import gauss_newton_step
 from runtime.checks.trials import Problem, Trial
 from runtime.limits import LIMIT
 from runtime.model.generated import joint_labels, joint_units
@@ -187,7 +184,9 @@ def _ratios(problem: Problem, j: int) -> Array | None:
     D, now, mask = _rows(problem, unchanged(problem.samples.n))
     size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))  # a, b, c in this unit
     J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j], problem.F[:, j])
-    found = _step(problem, D, J, problem.given, problem.tau - now + D @ problem.given.X, mask)
+    found = gauss_newton_step(
+        problem, D, J, problem.given, problem.tau - now + D @ problem.given.X, mask
+    )
     return None if found is None else size * found[0]
 
 
@@ -311,113 +310,3 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     trial = problem.fitted(quantity.change(xi), grams)
     more = 3 if quantity.kind == "spring" else 1  # parameters
     return replace(trial, gain=trial.gain - 0.5 * more * float(np.log(problem.N)))
-
-
-@dataclass(frozen=True, eq=False)
-class Gravity:
-    """Direction of gravity in frame 0.
-
-    Attributes
-    ----------
-    given, fitted : ndarray, shape (3,)
-        Unit vectors: of the robot file, and the one that explains the record best.
-    angle : float, degrees
-        Between them.
-    sigma : float, degrees
-        Deviation of the fitted direction, the larger of the two angles.
-    gain : float, nats
-        What the fitted direction gains over that of the robot file.
-    """
-
-    given: Array
-    fitted: Array
-    angle: float
-    sigma: float
-    gain: float
-
-    @property
-    def text(self) -> str:
-        """The fitted direction with its deviation."""
-        x, y, z = self.fitted
-        return (
-            f"({x:+.2f}, {y:+.2f}, {z:+.2f}) in frame 0, {self.angle:.0f} degrees from that of "
-            f"the robot file, deviation {self.sigma:.0f} degrees"
-        )
-
-
-def gravity_direction(problem: Problem) -> Gravity | None:
-    """The direction fitted freely; None without free gravity, or where the samples do not show it
-    to 60 degrees.
-    """
-    if problem.variants is None:
-        return None
-    free = problem.variants.CONSTANTS
-    given = np.array([free[f"free_g{axis}"] for axis in "xyz"])
-    size = float(np.linalg.norm(given))
-    if not size:
-        return None
-
-    def rows(g: Array) -> tuple[Array, Array, Array] | None:
-        constants = dict(zip(("free_gx", "free_gy", "free_gz"), map(float, g), strict=True))
-        return problem.rows(unchanged(problem.samples.n, constants=constants))
-
-    weightless, *axes = (rows(g) for g in (np.zeros(3), *np.eye(3)))
-    if weightless is None:
-        return None
-    rest, Y, mask = weightless
-    by_axis = np.stack([axis[0] - rest for axis in axes if axis is not None])
-
-    def along(u: Array) -> Array:
-        return np.asarray(rest + size * np.tensordot(u, by_axis, axes=1))
-
-    def fit(u: Array) -> Fit:
-        return problem.fit(Grams.of(along(u), Y, mask, problem.tau), rounds=2)
-
-    starts = [given / size, *(sign * np.eye(3)[a] for a in range(3) for sign in (1.0, -1.0))]
-    fits = [fit(u) for u in starts]
-    u, now = min(zip(starts, fits, strict=True), key=lambda one: one[1].score)
-    sigma = np.inf
-    for _ in range(LIMIT.GRAVITY_PASSES):
-        tangents = np.linalg.svd(u[None])[2][1:]
-        turn = np.tensordot(tangents, size * by_axis, axes=1)
-        moved = np.einsum("akjp,p->akj", turn, now.X)
-        found = _step(problem, along(u), moved, now, Y, mask)
-        if found is None:
-            return None
-        step, C = found
-        sigma = float(np.degrees(np.sqrt(np.linalg.eigvalsh(C)[-1])))
-        length = float(np.linalg.norm(step))
-        step = step * min(1.0, 0.5 / length) if length else step
-        turned = u + step @ tangents
-        turned = turned / np.linalg.norm(turned)
-        better = fit(turned)
-        if better.score > now.score - 0.05:
-            break
-        u, now = turned, better
-    if not sigma < 60:
-        return None
-    angle = float(np.degrees(np.arccos(np.clip(u @ given / size, -1, 1))))
-    return Gravity(given / size, u, angle, sigma, fits[0].score - now.score)
-
-
-def _step(
-    problem: Problem, D: Array, J: Array, fit: Fit, Y: Array, mask: Array
-) -> tuple[Array, Array] | None:
-    """Step of some numbers of effect J, shape (a, K, n), and their covariance; None where they act
-    on nothing that the samples show.
-    """
-    weight = mask / fit.sigma
-    J = J * weight
-    e = (Y - D @ fit.X) * weight
-    A, _ = Grams.of(D, Y, mask).weighted(fit.sigma)
-    H = A + problem.barrier.derivatives(fit.X, LIMIT.BARRIER[-1])[1]
-    WJ = np.einsum("kjp,akj->pa", D, J * weight)
-    left = np.einsum("akj,bkj->ab", J, J) - WJ.T @ np.column_stack(
-        [solved(H, column) for column in WJ.T]
-    )
-    share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
-    eigenvalues, V = np.linalg.eigh(left)
-    if not eigenvalues[0] * share > 0.1:
-        return None
-    inverse = (V / eigenvalues) @ V.T
-    return inverse @ np.einsum("akj,kj->a", J, e), inverse / share

@@ -19,8 +19,9 @@ import numpy as np
 
 from runtime.checks.case import Case
 from runtime.checks.check import WORST, Check, worst_of
-from runtime.checks.continuous import Gravity, searched
+from runtime.checks.continuous import searched
 from runtime.checks.delay import Delay
+from runtime.checks.gravity import Gravity
 from runtime.checks.known import KnownValues
 from runtime.checks.motion import motion_excites, recorded_speeds, rest
 from runtime.checks.physics import (
