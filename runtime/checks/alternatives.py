@@ -86,9 +86,9 @@ class Alternative:
 
     def torque(self, samples: Samples) -> Array:
         """Torques left for the model, shape (K, n)."""
-        return np.asarray(samples.tau @ self.T.T - self.known(samples))
+        return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
 
-    def known(self, samples: Samples) -> Array:
+    def subtracted(self, samples: Samples) -> Array:
         """Torques known beside the model, shape (K, n)."""
         by_position = (self.spring * springs(samples.q)).sum(axis=2)
         return np.asarray(self.known_factor * samples.tau_known + by_position)

@@ -122,7 +122,7 @@ class Problem:
         back = self.F @ np.linalg.inv(alternative.T)
         still = ~moving(alternative.states(self.samples)[1])
         mask = still @ (np.abs(back) > 1e-12).T == 0
-        return back @ D, self.tau - alternative.known(self.samples) @ back.T, mask
+        return back @ D, self.tau - alternative.subtracted(self.samples) @ back.T, mask
 
     @property
     def tau(self) -> Array:
