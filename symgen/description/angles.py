@@ -17,7 +17,7 @@ from fractions import Fraction
 from symgen.description.expression import PI, twelfths
 
 SNAP = 1e-4  # rad: angles of a URDF this close to a multiple of pi/12 are taken as that
-SEEN = 1e-8  # rad: changes of less are nine digits of pi, and are not listed in the warning
+LISTED = 1e-8  # rad: changes of less are nine digits of pi, and are not listed in the warning
 SHOWN = 20  # angles, or names, in a message
 
 ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
@@ -84,7 +84,7 @@ class Angles:
         text = f"{near} taken as these{way}"
         shown = [*notes[:SHOWN], *[f"and {len(notes) - SHOWN} more"] * (len(notes) > SHOWN)]
         most = max(abs(k * (math.pi / 12) - angle) for _, angle, k, _ in self.near)
-        each = f": {'; '.join(shown)}" if most > SEEN else ""
+        each = f": {'; '.join(shown)}" if most > LISTED else ""
         warnings.warn(
             f"{file}: {text}; exact=True or --exact keeps them{each}",
             AngleWarning,
