@@ -1,6 +1,7 @@
 """Laws of columns with known truth, and on measured records.
 
     python benchmarks/columns.py truth --records 400      # bias, scatter, coverage; pinocchio
+    python benchmarks/columns.py loaded --records 400     # the same of friction by the load
     python benchmarks/columns.py measured                 # TX40, EMPS, KR300: do laws earn anything
     python benchmarks/columns.py kr300                    # the counterbalance as columns and as a law
 
@@ -28,6 +29,8 @@ import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime.estimators.projection import LawProblem
 from runtime.identification.laws import fit_laws, fitted_laws
+from runtime.identification.transmitted import transmitted
+from runtime.loop.methods import estimate_of
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.rows.prepared import prepared
@@ -41,6 +44,7 @@ PLAIN = study_from_mapping(
     {"signals": {"median": 1, "lowpass": None, "decimate": None}, "rows": {"trim": 3}}
 )
 RATE, SECONDS, NOISE = 250.0, 24.0, 0.02
+LOAD = 0.15  # friction per transmitted torque
 TRUE = {"stribeck": {"vs": 0.08}, "tanh": {"vs": 0.05}, "cogging": {"phase": 0.7}}
 FIT = {
     "stribeck": {"vs": LawScalar((0.01, 1.0))},
@@ -140,6 +144,69 @@ def truth(records, kinds, robots):
                     flush=True,
                 )
             print(f"<!-- {records} records, {time.time() - started:.0f} s -->", flush=True)
+
+
+def loaded(records, robots):
+    """Friction in proportion to the transmitted torque: by the torque of the model, and by the
+    measured one.
+    """
+    print(
+        "| robot | torque | quantity | true | mean | bias/scatter | scatter | stated | coverage % |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    study = replace(PLAIN, estimate=replace(PLAIN.estimate, method="wls", weights="joint"))
+    for name in robots:
+        plain = with_law(symgen.load_robot(name), "", ())
+        joints = plain.joints[:2]
+        model = symgen.model(with_law(plain, "load_dependent", joints))
+        t, (q, qd, qdd) = motion(len(plain.joints), 7)
+        rng = np.random.default_rng(3)
+        chi = {p: rng.uniform(0.2, 1.0) for p in plain.parameters}
+        chi |= {f"FS{j}": 2.0 for j in joints} | {f"FV{j}": 1.0 for j in joints}
+        vector, oracle = np.array([chi[p] for p in plain.parameters]), PinocchioModel(plain)
+        tau = np.array([oracle.regressor(*s) @ vector for s in zip(q, qd, qdd, strict=True)])
+        k = [plain.joints.index(j) for j in joints]
+        tau[:, k] += LOAD * np.abs(tau[:, k]) * np.sign(qd[:, k])
+        true = {f"LAW{joints[0]}": LOAD, f"FS{joints[0]}": 2.0, f"FV{joints[0]}": 1.0}
+        found = {(way, key): [] for way in ("of the model", "measured") for key in true}
+        refused = 0
+        for number in range(records):
+            noise = (
+                NOISE
+                * tau.std(axis=0)
+                * np.random.default_rng([number, 5]).standard_normal(tau.shape)
+            )
+            record = runtime.Record(t, q, tau + noise, rate=RATE)
+            channels = {f"tau_model{j}": record.tau[:, i] for j, i in zip(joints, k, strict=True)}
+            own = {"measured": prepared(model, replace(record, channels=channels), study)}
+            try:
+                (own["of the model"],), _, _ = transmitted(
+                    model, [prepared(model, record, study)], [], True
+                )
+            except runtime.InputError:
+                refused += 1
+            for way, one in own.items():
+                fit = estimate_of(one.observation(model), study.estimate, model=model)
+                for key in true:
+                    at = fit.names.index(key) if key in fit.names else None
+                    if at is not None and np.isfinite(fit.sigma_corrected[at]):
+                        found[way, key].append((fit.X[at], fit.sigma_corrected[at]))
+        for (way, key), values in found.items():
+            if len(values) < records / 2:
+                print(f"| {name} | {way} | {key} | {true[key]:g} | not determined | | | | |")
+                continue
+            x, deviation = np.array(values).T
+            scatter = x.std(ddof=1)
+            covered = 100 * np.mean(np.abs(x - true[key]) < 1.96 * deviation)
+            print(
+                f"| {name} | {way} | {key} | {true[key]:g} | {x.mean():.4f} | "
+                f"{(x.mean() - true[key]) / scatter:+.2f} | {scatter:.4f} | "
+                f"{np.sqrt(np.mean(deviation**2)):.4f} | {covered:.1f} |"
+            )
+        print(
+            f"<!-- {records} records, {refused} whose torque of the model does not settle -->",
+            flush=True,
+        )
 
 
 def sources():
@@ -255,13 +322,15 @@ def counterbalance():
 
 if __name__ == "__main__":
     arguments = argparse.ArgumentParser()
-    arguments.add_argument("what", choices=["truth", "measured", "kr300"])
+    arguments.add_argument("what", choices=["truth", "loaded", "measured", "kr300"])
     arguments.add_argument("--records", type=int, default=400)
     arguments.add_argument("--kinds", nargs="*", default=["stribeck", "tanh", "cogging"])
     arguments.add_argument("--robots", nargs="*", default=["emps", "planar_2r", "scara"])
     given = arguments.parse_args()
     if given.what == "truth":
         truth(given.records, given.kinds, given.robots)
+    elif given.what == "loaded":
+        loaded(given.records, given.robots)
     elif given.what == "measured":
         measured()
     else:

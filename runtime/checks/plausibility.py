@@ -49,7 +49,7 @@ from runtime.checks.trials import Trial, decisive, tried
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.progress import at
 from runtime.records.stream import Stream
 from runtime.rows.prepared import Source, prepared, record_of
@@ -237,6 +237,7 @@ def _case(
         for part in (excerpts(record, study) if isinstance(record, Stream) else [record])
     ]
     try:
+        require_no_channels(model, "a trial of another reading")
         whole = [unwrapped(one.record, study.signals, one.drives) for one in own]
         straight = [
             one if record is one.record else replace(one, record=record)

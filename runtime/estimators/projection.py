@@ -18,7 +18,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, channels_of
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared
 
@@ -67,11 +67,12 @@ class LawProblem:
         model, rng = cast(Any, self.model), np.random.default_rng(3)
         q, qd, qdd = rng.uniform(-1, 1, (3, 200, len(model.JOINTS)))
         qd = qd * 10 ** rng.uniform(-3, 0, qd.shape)
+        timed = {c: rng.uniform(0.5, 2, 200) for c in channels_of(self.model)}
         place = [model.BASE_PARAMETERS.index(name) for name in self.names]
         middle = (self.lower + self.upper) / 2
 
         def columns(u: Array) -> Array:
-            D = model.regressor(q, qd, qdd, **self.constants(u))[..., place]
+            D = model.regressor(q, qd, qdd, **self.constants(u), **timed)[..., place]
             return np.array(D)
 
         here, result = columns(middle), []

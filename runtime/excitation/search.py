@@ -37,7 +37,7 @@ from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.methods import estimate_of
 from runtime.model.casadi import casadi_path
-from runtime.model.generated import GeneratedModel, require
+from runtime.model.generated import GeneratedModel, require, require_no_channels
 from runtime.model.loading import is_trusted
 from runtime.parallel import results
 from runtime.records.record import Record
@@ -84,6 +84,7 @@ def excite(
         neither from a record nor from the robot file.
     """
     records = (records,) if isinstance(records, Record) else tuple(records)
+    require_no_channels(model, "a motion that is sought")
     study, _ = resolved(study or Study(), records)
     settings = study.excitation or ExcitationSettings()
     known = _known(model, records, study, settings)

@@ -27,7 +27,7 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
 from runtime.estimators.method import linear_companion, linear_system
 from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_units
+from runtime.model.generated import GeneratedModel, channels_of, joint_units
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.records.stream import Stream
 from runtime.rows.observation import Observation
@@ -60,7 +60,7 @@ def expected_error(
     records : sequence of Prepared or Stream
     """
     states = reference_states(model, records)
-    if states is None:
+    if states is None or channels_of(model):
         return float("nan")
     try:
         D = np.asarray(model.regressor(*states))

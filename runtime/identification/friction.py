@@ -54,6 +54,7 @@ from runtime.model.generated import GeneratedModel, elements_of, joint_labels, r
 from runtime.model.inertia import physical_model
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.regressor import in_time
 from runtime.settings.study import Study
 from runtime.signals.filters import decimated
 from runtime.table import Table
@@ -247,7 +248,9 @@ def _terms(model: GeneratedModel, own: Prepared, fit: Estimate, number: int) -> 
         0.0  # each acts on its own joint alone
     )
     transmitted = np.abs(
-        cast(Any, model).inverse_dynamics(window.q, window.qd, window.qdd, frictionless)
+        cast(Any, model).inverse_dynamics(
+            window.q, window.qd, window.qdd, frictionless, **in_time(model, window)
+        )
     )
 
     def at_rows(signal: Array, j: int) -> Array:

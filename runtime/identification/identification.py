@@ -32,6 +32,7 @@ from runtime.identification.parameter_sets import SetName, best_set, parameter_s
 from runtime.identification.payload_study import payload_study
 from runtime.identification.result import Identification
 from runtime.identification.torque_law import completed, gain_doubt
+from runtime.identification.transmitted import transmitted
 from runtime.identification.uncertainty import uncertainty
 from runtime.identification.validation import (
     CrossValidation,
@@ -135,6 +136,12 @@ def identify(
         record if isinstance(record, Stream) else prepared(model, record, study)
         for record in records
     )
+    if further is None:
+        further = records_or_streams(
+            study.validate.record, model, study.stream, missing=study.signals.admits_missing
+        )
+    weighted = study.estimate.weights != "none"
+    own, further, load = transmitted(model, own, further, weighted)
     laws = None
     if hasattr(model, "FIT"):
         if study.estimate.method in SIMULATING:
@@ -143,18 +150,13 @@ def identify(
                 "loop with those of the file; fit them by ols, then fix them: fit: {vs: 0.08}"
             )
         at("scalars of laws")
-        asked_columns = study.estimate.columns
-        columns = model.BASE_PARAMETERS if asked_columns == "all" else tuple(asked_columns)
-        weights = study.estimate.weights != "none"
-        laws = fit_laws(model, whole_records(own), columns, weights=weights)
+        columns = None if study.estimate.columns == "all" else tuple(study.estimate.columns)
+        laws = fit_laws(model, whole_records(own), columns, weights=weighted)
         model = cast(GeneratedModel, BoundModel(model, laws.constants))
+        own, further, load = transmitted(model, own, further, weighted)
     chosen = {"lowpass": lowpass} if lowpass else {}
     provenance = {**origin(records), **chosen, **(provenance or {})}
     simulator = simulator or simulator_of(model, study)
-    if further is None:
-        further = records_or_streams(
-            study.validate.record, model, study.stream, missing=study.signals.admits_missing
-        )
     asked = variants is not None if plausible is None else plausible
     own, further, law = completed(model, study, own, further)
     if law is not None:
@@ -167,9 +169,8 @@ def identify(
         )
         observed = partial(method_observation, model, study=study, workers=processes)
         observation = observed(own, simulator=simulator)
-        if law is not None:
-            findings = (*observation.findings, law.text)
-            observation = replace(observation, findings=findings)
+        told = (*observation.findings, *([law.text] if law else []), *([load] if load else []))
+        observation = replace(observation, findings=told)
         memory = [one for one in own if isinstance(one, Prepared)]
         short = sum(len(one.record) for one in memory) <= LIMIT.CUTOFF_SAMPLES
         low = asked_study.signals.lowpass

@@ -15,7 +15,7 @@ from runtime.estimators.method import linear_companion
 from runtime.identification.drive_gains import DriveGains, drive_gains, scaled
 from runtime.identification.payload import Payload, payload
 from runtime.json_documents import Result
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared, resolved
@@ -80,6 +80,7 @@ def payload_study(
             "a load needs all base parameters; remove estimate.columns",
             path=("estimate", "columns"),
         )
+    require_no_channels(model, "the study of a load")
     study, _ = resolved(study, [*without, *loaded])
     without, loaded = (
         [prepared(model, record, study) for record in records] for records in (without, loaded)

@@ -38,7 +38,7 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Sensitivity, Simulation, SimulationError
 from runtime.loop.sensitivity import tangent_along, tangent_function
 from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
-from runtime.model.generated import GeneratedModel, constants_of
+from runtime.model.generated import GeneratedModel, constants_of, require_no_channels
 from runtime.records.provenance import SIMULATED
 from runtime.records.reading import read_records
 from runtime.settings.controller import Controller
@@ -73,6 +73,7 @@ class Simulator:
         constants: Mapping[str, float] | None = None,
         in_c: bool = True,
     ) -> None:
+        require_no_channels(model, "a simulated motion")
         constants_of(model, constants or {})
         self.model, self.controller, self.constants = model, controller, dict(constants or {})
         self.law: ControlLaw = control_law(controller, model)

@@ -33,7 +33,7 @@ from runtime.model.compile_cache import (
     NotCompiledError,
     shared_object,
 )
-from runtime.model.generated import GeneratedModel, check_states, constants_of
+from runtime.model.generated import GeneratedModel, channels_of, check_states, constants_of
 from runtime.model.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
 from runtime.model.narrowing import narrowed_source
 
@@ -71,6 +71,8 @@ def compiled_model(
     """
     kind = CompiledSignals if signals else CompiledModel
     try:
+        if channels := channels_of(model):
+            raise NotCompiledError(f"{', '.join(channels)}: one value a call in C")
         path = source or _beside(model)
         text, folder = _text(path), cache or cache_folder()
         if not (is_trusted(model) or is_emitted(text)):

@@ -206,6 +206,23 @@ def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[
     return {**model.CONSTANTS, **constants}
 
 
+def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
+    """{constant that is a function of time: base parameters whose columns read it}."""
+    return cast(Mapping[str, tuple[str, ...]], getattr(model, "CHANNELS", {}))
+
+
+def require_no_channels(model: GeneratedModel, what: str) -> None:
+    """InputError, in one sentence, where laws of the model read functions of time, which `what`
+    does not have.
+    """
+    if channels := channels_of(model):
+        names = sorted({name for own in channels.values() for name in own})
+        raise InputError(
+            f"{what} does not have {', '.join(channels)}, which {', '.join(names)} of "
+            f"{model.NAME} read at every sample; take these laws out of the robot file for it"
+        )
+
+
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
     """What results call the joints: the number of each, and its name where the robot file has
     one.

@@ -302,6 +302,7 @@ def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
         "tau": names.tau,
         "tau_ff": names.tau_ff,
         "tau_known": tuple(name for name in names.tau_known if name != NONE),
+        **{name: (column,) for name, column in names.channels.items()},
     }
 
 
@@ -311,6 +312,7 @@ def groups_of(
     """Each file once, with the columns that it is asked for, by quantity."""
     first, last, other = tables
     place = {**dict.fromkeys(IN_FIRST, first), "tau": last, "tau_ff": last, "tau_known": other}
+    place |= dict.fromkeys(names.channels, first)
     asked = {key: columns for key, columns in asked_columns(names).items() if columns}
     groups = {
         table: {key: columns for key, columns in asked.items() if place[key] is table}

@@ -182,6 +182,7 @@ class RecordFiles:
         sides |= dict.fromkeys(("q", "q_r"), self.side.position)
         sides |= dict.fromkeys(("qd", "qd_ref"), self.side.velocity)
         sides |= {"tau_ff": self.side.torque, "q_link": self._behind_gears}
+        sides |= dict.fromkeys(self.columns.channels, np.asarray)
         x: dict[str, Array] = {}
         for table, groups in groups_of(self.columns, self.tables):
             for key, names in groups.items():
@@ -192,7 +193,7 @@ class RecordFiles:
                     most = LIMIT.LARGEST_NUMBER
                     y = y[:, ~np.isnan(y).all(axis=0)] if key == "q_link" else y
                     require_finite(y, names, table.file, table.row, start, largest=most)
-        channels = {key: x[key] for key in JOINT_CHANNELS if key in x}
+        channels = {k: x[k] for k in (*JOINT_CHANNELS, *self.columns.channels) if k in x}
         samples = Samples(x.get("t"), x["q"], x.get("tau"), missing, x.get("tau_known"), channels)
         return samples, parts["q"][-1]
 

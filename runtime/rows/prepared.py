@@ -24,7 +24,7 @@ from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, check_states, drives_of
 from runtime.records.missing import COUNTS, require_positions
-from runtime.records.record import Record
+from runtime.records.record import JOINT_CHANNELS, Record
 from runtime.records.stream import PieceReader, Stream
 from runtime.rows.observation import Observation, column_numbers
 from runtime.rows.regressor import decimated_columns
@@ -70,7 +70,8 @@ class Prepared:
     def filtered(self) -> States:
         """q, qd, qdd of the positions as they are, shape (N, n) each; straight lines over gaps."""
         record, v = self.record, self.record.channels.get("qd")
-        return filtered_states(record.q, record.rate, self.study.signals, v)
+        states = filtered_states(record.q, record.rate, self.study.signals, v)
+        return replace(states, channels=self.channels)
 
     @cached_property
     def states(self) -> States:
@@ -79,7 +80,7 @@ class Prepared:
         if signals.reader == "lowpass":
             require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
             return self.filtered
-        return observed_states(
+        states = observed_states(
             record.q,
             record.rate,
             signals,
@@ -87,6 +88,13 @@ class Prepared:
             missing=record.missing,
             name=record.name,
         )
+        return replace(states, channels=self.channels)
+
+    @property
+    def channels(self) -> dict[str, Array]:
+        """Channels of one column that are no joint's, shape (N,)."""
+        given = self.record.channels.items()
+        return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
 
     @cached_property
     def selection(self) -> Selection:

@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.compiled import CompiledSignals
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, channels_of
 from runtime.signals.decimation import PIECE, Plan, decimated_pieces
 from runtime.signals.filters import States
 
@@ -110,8 +111,9 @@ def _signals(
         if np.array_equal(entries.place, np.arange(len(values))):
             return values
     else:
+        timed = in_time(model, states)
         try:
-            D = model.regressor(states.q, states.qd, states.qdd, out=values, **constants)
+            D = model.regressor(states.q, states.qd, states.qdd, out=values, **constants, **timed)
         except ValueError as e:  # what an emitted module of a general loop raises
             raise InputError(
                 f"{model.NAME}: {e}; look at units and zeros of the positions, and at the "
@@ -119,6 +121,21 @@ def _signals(
             ) from None
         values = D.transpose(2, 1, 0).reshape(-1, B)
     return np.take(values, entries.place, axis=0, out=signals, mode="clip")
+
+
+def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
+    """The channels that laws of the model read, shape (N,); InputError where the states have
+    none.
+    """
+    channels = channels_of(model)
+    if missing := [c for c in channels if c not in states.channels]:
+        read = ", ".join(channels[missing[0]])
+        raise InputError(
+            f"{model.NAME}: {read} read {missing[0]}, which these states do not have; "
+            f"name its column, record.columns: {{channels: {{{missing[0]}: COLUMN}}}}, of a whole "
+            "record (stream: off)"
+        )
+    return {c: states.channels[c] for c in channels}
 
 
 def distinct_entries(
@@ -171,11 +188,15 @@ def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:
     """The store at random states, shape (b, n, PROBES); nan where a loop does not close at one of
     them.
     """
-    q, qd, qdd = np.random.default_rng(0).uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
+    timed: dict[str, Any] = {c: rng.uniform(0.5, 2, PROBES) for c in channels_of(model)}
     try:
         with np.errstate(all="ignore"):
             return np.asarray(
-                model.regressor(q, qd, qdd, out=model.store(PROBES), **constants).transpose(2, 1, 0)
+                model.regressor(
+                    q, qd, qdd, out=model.store(PROBES), **constants, **timed
+                ).transpose(2, 1, 0)
             )
     except ValueError:  # what an emitted module of a general loop raises
         return np.full((len(model.BASE_PARAMETERS), len(model.JOINTS), PROBES), np.nan)

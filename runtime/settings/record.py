@@ -4,7 +4,7 @@ time stamps. Part of a Study.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
@@ -53,6 +53,7 @@ TorqueUnit = Annotated[Text, _known(torque_unit)]
 Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
 
 
+QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "q_link", "tau_ff", "tau_known", "law_v")
 BY_NAME = ("names",)  # columns found by the names of the joints
 
 
@@ -93,6 +94,9 @@ class Columns(Settings):
         Torques of the drives that do not come from the model (a counterbalance, a cable), computed
         elsewhere; N m or N, joint side. They are
         subtracted from tau. 0 in place of a name: none on this joint.
+    channels : mapping of str to str
+        Column of each channel.NAME of the laws of the robot file, in the file of the positions, as
+        it is: {temperature: T_motor}.
     """
 
     t: Text | None = None
@@ -105,8 +109,12 @@ class Columns(Settings):
     q_link: SomeNames = ()
     tau_ff: Names = ()
     tau_known: SomeNames = ()
+    channels: Mapping[Text, Text] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require(
+            not {*self.channels} & {*QUANTITIES}, "channels are called as constants are", "channels"
+        )
         require(
             not (self.qr and self.q_ref), "given beside q_ref; it is the same, leave it out", "qr"
         )

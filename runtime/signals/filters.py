@@ -10,7 +10,8 @@ MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import floor
 
@@ -58,6 +59,7 @@ class States:
 
     errors : what is known of errors of the velocities; None: they count as exact.
     findings : what the reader says of the encoders.
+    channels : functions of time that laws of the model read, (N,) by name.
     """
 
     q: Array
@@ -65,10 +67,13 @@ class States:
     qdd: Array
     errors: SpeedErrors | None = None
     findings: tuple[str, ...] = ()
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     def __getitem__(self, samples: slice | Array) -> States:
         errors = None if self.errors is None else self.errors[samples]
-        return States(self.q[samples], self.qd[samples], self.qdd[samples], errors, self.findings)
+        states, channels = (self.q, self.qd, self.qdd), self.channels.items()
+        q, qd, qdd = (x[samples] for x in states)
+        return States(q, qd, qdd, errors, self.findings, {c: x[samples] for c, x in channels})
 
     def __len__(self) -> int:
         return len(self.q)

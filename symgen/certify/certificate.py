@@ -423,7 +423,8 @@ def independent(robot: Robot) -> Sample:
         sampled,
     )  # CasADi, loaded late
 
-    return sampled(in_one_mode(robot), 3 * len(robot.parameters) // len(robot.joints) + 10, seed=5)
+    count = 3 * len(robot.parameters) // len(robot.joints) + 10
+    return sampled(in_one_mode(robot), count, seed=5, in_time=bool(robot.channels))
 
 
 def numeric_rank(W: Array, *, tolerance: float = 1e-9, proved: int = 0) -> tuple[int, float]:

@@ -14,7 +14,7 @@ from symgen.certify.witness import Witness
 from symgen.derive.columns import acting, element_names, unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
-from symgen.emit.header import scalars
+from symgen.emit.header import channels, scalars
 from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping
 
@@ -117,6 +117,7 @@ def _expected(witness: Witness) -> dict[str, Any]:
         "LIMITS": robot.limits,
         "VALUES": robot.values,
         **({"FIT": fit} if (fit := scalars(robot)) else {}),
+        **({"CHANNELS": read} if (read := channels(regrouping)) else {}),
     }
 
 

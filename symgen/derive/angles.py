@@ -18,7 +18,7 @@ from functools import lru_cache
 from math import gcd, lcm
 
 from symgen.description.expression import Call, Expression, Monomial, Number, quarter_turns
-from symgen.description.kinds import STATE
+from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import REVOLUTE, Robot
 
 PI: Monomial = (("pi", 1),)
@@ -211,7 +211,7 @@ def varies(a: str | Number | Call) -> bool:
     if isinstance(a, Call):
         exact = a.function in ("cos", "sin", "inv")
         return not exact or any(varies(b) for e in a.operands for b in e.atoms)
-    return not isinstance(a, Number) and bool(STATE.match(a))
+    return not isinstance(a, Number) and (a.startswith(CHANNEL) or bool(STATE.match(a)))
 
 
 def rows_of(robot: Robot) -> list[Expression]:

@@ -15,7 +15,7 @@ from symgen.derive.angles import varies
 from symgen.derive.newton_euler import Motion
 from symgen.derive.scalar import AT_ZERO, Scalar, Turn, add, linear, mul
 from symgen.description.expression import ONE, ZERO, Atom, Call, Expression
-from symgen.description.kinds import STATE
+from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import Element, Form, Row, parameter
 
 NODES = {"cos": "cosine", "sin": "sine", "sqrt": "root", "pow": "power"}
@@ -78,6 +78,8 @@ class _Law:
     def _atom(self, a: Atom) -> Scalar:
         if isinstance(a, Call):
             return self._call(a)
+        if str(a).startswith(CHANNEL):
+            return self.motion.algebra.channel(str(a).removeprefix(CHANNEL))
         state, joint = STATE.match(str(a)).groups()  # type: ignore[union-attr]
         coordinate = getattr(self.motion, state)
         if joint:

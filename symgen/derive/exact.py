@@ -149,6 +149,7 @@ class Draw(Unnamed):
             if self.complete:
                 break
         self._rate: dict[tuple[int, int], Array] = {}
+        self._channels: dict[str, Array] = {}
         self._directions: dict[tuple[tuple[int, tuple[int, ...]], ...], Array] = {}
         self._q = {j: self._random(samples) for j in robot.moving}
         self._qd = {j: self._random(samples) for j in robot.moving}
@@ -313,6 +314,9 @@ class Draw(Unnamed):
 
     def qdd(self, j: int) -> Fp:
         return self._fp(self._qdd[j])
+
+    def channel(self, name: str) -> Fp:
+        return self._fp(self._channels.setdefault(name, self._random(self.samples)))
 
     def rate(self, u: int, i: int) -> Scalar:
         """Any value: a general loop does not close over F_p, so this proves identities of the open

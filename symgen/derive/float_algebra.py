@@ -82,6 +82,9 @@ class FloatAlgebra(Unnamed):
     def qdd(self, j: int) -> Scalar:
         return self._qdd[j]
 
+    def channel(self, name: str) -> Scalar:
+        return self.constants[name]
+
     def rate(self, u: int, i: int) -> Scalar:
         return self._rate[u, i]
 

@@ -103,6 +103,9 @@ class GraphAlgebra:
     def qdd(self, j: int) -> Scalar:
         return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
+    def channel(self, name: str) -> Scalar:
+        return self.graph.symbol(Symbol("channel", name))
+
     def rate(self, u: int, i: int) -> Scalar:
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 

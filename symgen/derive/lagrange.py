@@ -47,6 +47,7 @@ import numpy as np
 from symgen.derive.loop_residual import inertia_of, newton
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
+from symgen.description.kinds import CHANNEL
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
 from symgen.errors import DescriptionError
 
@@ -156,6 +157,12 @@ class Lagrange:
 
     def _floats(self, name: str, *arguments: Array) -> Array:
         return _floats(self._functions[name], *arguments, self._values)
+
+    def vary(self, rng: np.random.Generator, states: int) -> None:
+        """Draw channels, functions of time, at each of so many states."""
+        self._values = np.tile(self._values, (states, 1))
+        for name in self.robot.channels:
+            self._values[:, [*self.constants].index(name)] = rng.uniform(0.5, 2, states)
 
     def poses(self, q: Array) -> Array:
         """0Tj of every frame in file order, (..., frames, 4, 4)."""
@@ -418,6 +425,7 @@ def _law(
     states = {"q": ca.dot(G, q), "qd": ca.dot(G, qd)}
     for k, i in enumerate(robot.moving):
         states |= {f"q{i}": q[k], f"qd{i}": qd[k]}
+    states |= {f"{CHANNEL}{name}": constants[name] for name in e.channels(j)}
     U = _symbolic(e.potential(j), states, constants)
     return ca.gradient(U, q) + G * _symbolic(e.law(j), states, constants), U
 
@@ -472,15 +480,19 @@ def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
 
 
 def sampled(
-    robot: Robot, states: int, seed: int = 0, constants: Mapping[str, float] | None = None
+    robot: Robot,
+    states: int,
+    seed: int = 0,
+    constants: Mapping[str, float] | None = None,
+    in_time: bool = False,
 ) -> Sample:
     """The standard regressor at `states` random states: q within pi rad or 1 m, general loops
     within 0.5 of their start.
 
     Velocities and accelerations are standard normal; in every other state each velocity is divided
     by its leverage, so that the sign of
-    q4 + 101.25 q5 is not that of q5 alone. Raises DescriptionError where the loops close in too few
-    of the states.
+    q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels are drawn at every state. Raises
+    DescriptionError where the loops close in too few of the states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
@@ -496,6 +508,8 @@ def sampled(
     )
     centre = np.array([robot.start.get(j, 0.0) for j in robot.joints])
     n, leverage = len(robot.joints), _leverage(robot, model.constants)
+    if in_time:
+        model.vary(np.random.default_rng(seed + 1), states)
     state, D = np.empty((3, 0, n)), np.empty((0, n, len(robot.parameters)))
     for _ in range(DRAWS):
         q, qd, qdd = (

@@ -51,6 +51,9 @@ class Algebra(Protocol):
     def qdd(self, j: int) -> Scalar:
         """Acceleration of joint j."""
 
+    def channel(self, name: str) -> Scalar:
+        """A constant that is a function of time."""
+
     def rate(self, u: int, i: int) -> Scalar:
         """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint
         i.

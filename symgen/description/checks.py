@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from symgen.description.advice import degrees_advice
-from symgen.description.element import Element, check_law
+from symgen.description.element import Element, check_channels, check_law
 from symgen.description.expression import ONE, Call, Expression
 from symgen.description.fields import Path, dotted
 from symgen.description.kinds import KINDS, OWN_LAWS
@@ -45,6 +45,7 @@ def check_robot(robot: Any) -> None:
     _check_geometry(robot)
     for e in robot.elements:
         _check_element(e, robot)
+    check_channels(robot)
     _check_loops(robot)
     _check_drives(robot)
     _check_limits(robot)

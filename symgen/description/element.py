@@ -7,6 +7,8 @@ The laws are the expressions of KINDS, in which q, qd, qdd stand for s, sd, sdd;
 user's has its own, over s, sd, q1, qd1 ... of any joints, constants and scalars, as a torque or as
 an energy, Gamma += c dU/dq. Forms are for laws that are qdd, qd or q. With `when`, viscous and
 coulomb elements act in motion along s in this direction only. Parameter c is called family + key.
+channel.NAME in a law is the constant NAME as a function of time, and tau_model the torque that the
+rest of the model transmits at the joint.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from symgen.description.expression import ZERO, Expression
+from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.fields import CONFIG, UNWRITTEN, Numeric, Path, Text, Whole, Written
 from symgen.description.grammar import LAWS, parse
-from symgen.description.kinds import KINDS, OWN_LAWS, STATE, USUAL_KINDS
+from symgen.description.kinds import CHANNEL, KINDS, OWN_LAWS, STATE, TRANSMITTED, USUAL_KINDS
 from symgen.description.parts import DIRECTIONS, Form, Row, form_of, parameter, reduced, rows
 from symgen.errors import DescriptionError, ExpressionError
 
@@ -142,20 +144,31 @@ class Element:
 
     @property
     def constants(self) -> dict[str, float]:
-        """Names and values of its scalars that are fitted: one of each key, vs3."""
-        free = {name: x for name, x in self.scalars.items() if not x.fixed}
-        return {parameter(name, j): x.value for name, x in free.items() for j in self.keys}
+        """Names and values of its scalars that are fitted, one of each key, vs3, and of transmitted
+        torques, zero.
+        """
+        values = {name: x.value for name, x in self.scalars.items() if not x.fixed}
+        if TRANSMITTED in (self.torque or KINDS.get(self.kind, KINDS["column"]).torque).symbols:
+            values[TRANSMITTED] = 0.0
+        return {parameter(name, j): x for name, x in values.items() for j in self.keys}
 
     def _of_key(self, law: Expression, j: int) -> Expression:
         """A law with the scalars of a key: symbols, and numbers where they are fixed."""
+        torque = Expression.symbol(f"{CHANNEL}{parameter(TRANSMITTED, j)}")
         return law.substitute(
-            {
+            {TRANSMITTED: torque}
+            | {
                 name: Expression.number(repr(x.value))
                 if x.fixed
                 else Expression.symbol(parameter(name, j))
                 for name, x in self.scalars.items()
             }
         )
+
+    def channels(self, j: int) -> list[str]:
+        """Names of the functions of time in the law of key j."""
+        names = self.law(j).symbols if j in self.along else ()
+        return sorted(name.removeprefix(CHANNEL) for name in names if name.startswith(CHANNEL))
 
     def law(self, j: int) -> Expression:
         """Torque along s of key j for parameter 1; zero where it is that of an energy."""
@@ -223,14 +236,24 @@ def check_law(e: Element, robot: Any) -> None:
             raise DescriptionError(
                 f"{e.family}: fit.{name} is no scalar of {law}", path=(*where, "fit", name)
             )
-    declared = [*states, *e.scalars, *robot.constants]
+    channels = {f"{CHANNEL}{name}": x for name, x in robot.constants.items()}
+    declared = [*states, *e.scalars, *robot.constants, *channels, TRANSMITTED]
     if e.energy is not None:
-        declared = [name for name in declared if not name.startswith("qd")]
+        timed = ("qd", CHANNEL, TRANSMITTED)
+        declared = [name for name in declared if not name.startswith(timed)]
+    for j in e.keys if TRANSMITTED in law.symbols else ():
+        if e.along.get(j) != {j: ONE} or j not in robot.joints:
+            raise DescriptionError(
+                f"{e.family}{j}: {TRANSMITTED} is the torque at one actuated joint; expected "
+                f"`along: {j}` of a joint among {list(robot.joints)}",
+                path=(*where, "along", j),
+            )
     if unknown := sorted(law.symbols - {*declared}):
         raise DescriptionError(
             f"{e.family}: {key}: {unknown[0]!r} is unknown there; expected q, qd, q1, qd1 ... of "
             f"the joints{' (an energy: positions only)' * bool(e.energy)}, scalars of `fit`, "
-            f"constants ({', '.join(robot.constants) or 'none'})",
+            f"constants ({', '.join(robot.constants) or 'none'}), {TRANSMITTED}, and {CHANNEL} "
+            "before a constant that the record gives",
             path=(*where, key),
         )
     for j in e.along:
@@ -239,7 +262,8 @@ def check_law(e: Element, robot: Any) -> None:
             values = {name: speed if name.startswith("qd") else 0.7 for name in states}
             try:
                 along, others = e.laws(j)
-                torque = [f.value({**values, **robot.constants}) for f in (along, *others.values())]
+                values |= {**robot.constants, **channels}
+                torque = [f.value(values) for f in (along, *others.values())]
                 finite = all(map(math.isfinite, torque))
             except (ArithmeticError, ValueError) as error:
                 finite, reason = False, f" ({error})"
@@ -249,3 +273,22 @@ def check_law(e: Element, robot: Any) -> None:
                     f"constants of the file; a law is finite at rest and in motion{reason}",
                     path=(*where, key),
                 )
+
+
+def check_channels(robot: Any) -> None:
+    """What a record gives as a function of time is no constant of anything else."""
+    of_frames = [
+        getattr(f, name)
+        for f in robot.frames
+        for name in ("gamma", "b", "alpha", "d", "theta", "r")
+    ]
+    rows = [c for e in robot.elements for row in e.along.values() for c in row.values()]
+    every = [*of_frames, *rows, *robot.gravity, *robot.constraints.values()]
+    laws = set().union(*(e.symbols for e in robot.elements if e.is_own))
+    for name in robot.channels:
+        if name in laws or any(name in x.symbols for x in every):
+            raise DescriptionError(
+                f"{CHANNEL}{name} is a function of time, and {name} is read as a constant beside "
+                f"it; write {CHANNEL}{name} in every law, and another constant elsewhere",
+                path=("constants", name),
+            )

@@ -73,6 +73,12 @@ KINDS = {
         dissipative=True,
         fit={**SLOW, "vo": 0},
     ),
+    "load_dependent": Kind(
+        "abs(tau_model)*sign(qd)",
+        ("1", "1"),
+        "Coulomb friction per transmitted torque",
+        dissipative=True,
+    ),
     "cogging": Kind(
         "sin(order*q + phase)", ("N*m", "N"), "cogging of the motor", fit={"order": 1, "phase": 0}
     ),
@@ -82,4 +88,8 @@ KINDS = {
 OWN_LAWS = ("column", "dissipative")  # kinds whose law the file gives
 STATE = re.compile(r"(q|qd|qdd)([1-9][0-9]*)?\Z")
 """Names of a law: of s and its rates, and of those of a joint."""
+CHANNEL = "channel."
+"""Before the name of a function of time in a law: a constant whose value the record gives."""
+TRANSMITTED = "tau_model"
+"""In a law, the torque that the rest of the model transmits at its joint: channel.tau_model3."""
 USUAL_KINDS = dict(zip((*JOINT_FAMILIES, "K"), KINDS, strict=False))

@@ -305,6 +305,13 @@ class Robot:
                 names += [parameter(e.family, j) for j in e.keys]
         return tuple(names)
 
+    @cached_property
+    def channels(self) -> dict[str, tuple[str, ...]]:
+        """{constant that is a function of time: parameters whose laws read it}."""
+        read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
+                for c in e.channels(j)]  # fmt: skip
+        return {c: tuple(name for own, name in read if own == c) for c, _ in read}
+
     def root(self, loop: Loop) -> int:
         """The last frame that carries both ends of a loop: what is before it turns the whole."""
         twin = self.path(loop.twin)

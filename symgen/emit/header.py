@@ -11,6 +11,7 @@ from typing import Any
 from symgen.derive.closure import Closure
 from symgen.derive.columns import element_names, unit
 from symgen.derive.names import FAMILIES, families_of
+from symgen.description.kinds import TRANSMITTED
 from symgen.description.robot import FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text
 from symgen.emit.render import WIDTH
@@ -44,6 +45,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
             "MX MY MZ first moments",
         ),
         *(f"Element     {line}" for line in element_lines(robot)),
+        *(line for text in channel_lines(robot) for line in line_of("Channel", text)),
         *(
             line
             for text in loop_lines(robot, spec.derivation.closure)
@@ -163,6 +165,18 @@ def element_lines(robot: Robot) -> list[str]:
     return lines
 
 
+def channel_lines(robot: Robot) -> list[str]:
+    """Constants that are functions of time, and what the transmitted torques are."""
+    own = [c for c in robot.channels if not c.startswith(TRANSMITTED)]
+    torques = [c for c in robot.channels if c not in own]
+    array = "an array (N,), one value a sample; one value a call in C"
+    return [
+        *([f"{', '.join(own)} may be {array}"] if own else []),
+        *([f"{', '.join(torques)}: torque that the other parameters give at that joint, which the "
+           f"caller computes; {array}"] if torques else []),
+    ]  # fmt: skip
+
+
 def _law_text(e: Element) -> str:
     """The law of an element that is not inertia, linear friction, offset or spring."""
     if not e.is_own:
@@ -240,6 +254,7 @@ def data(spec: ModuleSpec) -> list[str]:
         *literal("LIMITS", dict(robot.limits)),
         *literal("VALUES", dict(robot.values)),
         *(literal("FIT", fit) if (fit := scalars(robot)) else ()),
+        *(literal("CHANNELS", read) if (read := channels(spec.regrouping)) else ()),
     ]
 
 
@@ -251,6 +266,14 @@ def scalars(robot: Robot) -> dict[str, tuple[tuple[float, float], int, str]]:
         for j in e.keys
         for name, x in e.scalars.items()
         if not x.fixed
+    }
+
+
+def channels(regrouping: Regrouping) -> dict[str, tuple[str, ...]]:
+    """{constant that is a function of time: base parameters whose columns read it}."""
+    return {
+        c: tuple(b.name for b in regrouping.base if b.own in read)
+        for c, read in regrouping.robot.channels.items()
     }
 
 

@@ -34,6 +34,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             "tables": [*tables(spec), *_loop_tables(spec, slides)],
             "data": [*literal("LINKS", spec.robot.links), *data(spec)],
             "slides": slides,
+            "channels": spec.robot.channels,
             "closed": 1e-13 if spec.robot.longest > IN_METRES else 1e-16,
             "store_constants": list(constant_entries(spec.functions["regressor"], "zeros")),
             "elements": element_lines(spec.robot, NUMPY),
@@ -71,8 +72,11 @@ def _evaluation(spec: ModuleSpec, block: Block) -> Iterator[str]:
         available = (*available, "G") if f.model.of_loops else ("q", "qd", "qdd", "G")
     read = ", ".join(f"states[{available.index(s)}]" for s in f.states)
     states = "states" if f.states == available else f"({read}{',' * (len(f.states) == 1)})"
-    rest = "".join(f", {a}" for a in block.arguments[len(f.states) :])
-    yield f"_fill(_{f.model.name}_block, result, {states}{rest})"
+    every = block.arguments[len(f.states) :]
+    rest = "".join(f", {a}" for a in every if a not in spec.robot.channels)
+    timed = [a for a in every if a in spec.robot.channels]
+    channels = f", channels=({', '.join(timed)}{',' * (len(timed) == 1)})" if timed else ""
+    yield f"_fill(_{f.model.name}_block, result, {states}{rest}{channels})"
 
 
 def constant_entries(f: Function, result: str) -> Iterator[str]:

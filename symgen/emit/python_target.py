@@ -116,6 +116,7 @@ def _block(
         else:
             inputs += [f"{name} = {component(source, k)}" for k, name in wanted]
     constants = f.constants(spec.regrouping.constants)
+    constants = tuple(sorted(constants, key=spec.robot.channels.__contains__))
     states = [rates if state == "G" else state for state in f.states]
     X = ["X"] if f.reads("parameter") else []
     return Block(f, text, names, result, (*states, *X, *constants), constants, tuple(inputs))
@@ -239,8 +240,15 @@ class Heads:
 
     def __init__(self, regrouping: Regrouping, array: str, quote: str) -> None:
         free = regrouping.constants
-        self.constants = [f"{name}: float = {value!r}" for name, value in free.items()]
         self.array, self.quote = array, quote
+        self.constants = [
+            f"{name}: {self._of(name, regrouping.robot)} = {value!r}"
+            for name, value in free.items()
+        ]
+
+    def _of(self, name: str, robot: Robot) -> str:
+        """The hint of a constant."""
+        return self.hint(f"{self.array} | float") if name in robot.channels else "float"
 
     def hint(self, kind: str) -> str:
         """A hint, quoted where its names are no classes of the module."""

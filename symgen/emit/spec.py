@@ -60,7 +60,8 @@ class Function:
 
     def constants(self, free: Iterable[str]) -> tuple[str, ...]:
         """What it reads of the constants that may have other values, in their order."""
-        return tuple(name for name in free if Symbol("constant", name) in self.inputs)
+        read = {symbol.name for symbol in self.inputs if symbol.kind in ("constant", "channel")}
+        return tuple(name for name in free if name in read)
 
     def places(self, entry: Entry) -> tuple[Place, ...]:
         """Where an entry stands in the array: twice beside the diagonal of a symmetric matrix."""

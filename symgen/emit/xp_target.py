@@ -87,7 +87,9 @@ def _laid_out(block: Block) -> dict[str, object]:
     results = aligned(rows)
     lines = [*(line for s in block.text.sections for line in s.lines), *results]
     inputs = list(block.inputs)
-    if any(re.search(r"\bzero\b", line) for line in lines):
+    timed = [s.name for s in f.inputs if s.kind == "channel"]
+    inputs += [f"{c} = {c} + zero" for c in block.constants if c in timed]
+    if any(re.search(r"\bzero\b", line) for line in (*inputs, *lines)):
         inputs.insert(0, "zero = xp.zeros_like(q[..., 0])")
     needs_package = any("xp." in line for line in (*inputs, *lines))  # found by q
     read = dict.fromkeys([*(["q"] if needs_package else []), *block.arguments])

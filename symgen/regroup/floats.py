@@ -9,6 +9,7 @@ start of the loops.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,8 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
             states[0] *= np.pi
             states[1] *= 10 ** rng.uniform(*DECADES, states[1].shape)
         q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in states)
-        D = _columns(closure, FloatAlgebra(robot, q, qd, qdd), names, count)
+        algebra = FloatAlgebra(robot, q, qd, qdd, constants=_in_time(robot, rng, count))
+        D = _columns(closure, algebra, names, count)
         return D.reshape(-1, len(names))
     system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
     blocks: list[Array] = []
@@ -118,8 +120,14 @@ def _columns_near_start(
     rate = {
         (u, i): G[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(robot.joints)
     }
-    algebra = FloatAlgebra(robot, joints(q), joints(qd), joints(qdd), rate)
+    drawn = _in_time(robot, rng, len(q))
+    algebra = FloatAlgebra(robot, joints(q), joints(qd), joints(qdd), rate, constants=drawn)
     return _columns(closure, algebra, names, len(q))
+
+
+def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:
+    """Values of the channels of laws at so many states."""
+    return {name: rng.uniform(0.5, 2, count) for name in robot.channels}
 
 
 def float_base(W: Array) -> tuple[list[int], Array]:

@@ -99,10 +99,11 @@ class Regrouping:
 
     @property
     def constants(self) -> Mapping[str, float]:
-        """Constants of the robot that may have other values: none where coefficients are numbers,
-        which hold for those of the file alone.
+        """Constants of the robot that may have other values: channels alone where coefficients are
+        numbers, which hold for the constants of the file.
         """
-        return self.robot.constants if self.method == EXACT else {}
+        every, channels = self.robot.constants, self.robot.channels
+        return every if self.method == EXACT else {c: every[c] for c in every if c in channels}
 
     def __len__(self) -> int:
         return len(self.base)

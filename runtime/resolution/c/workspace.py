@@ -18,7 +18,7 @@ from runtime.errors import InputError
 from runtime.estimators.solution import Solution, solve
 from runtime.model.compile_cache import FallbackWarning
 from runtime.model.compiled import CompiledSignals, compiled_model
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.resolution.c import kernels
 from runtime.resolution.c.self_test import unavailable
 from runtime.resolution.perturbed import (
@@ -36,8 +36,9 @@ Array = np.ndarray
 
 def usable(model: GeneratedModel) -> GeneratedModel:
     """`model`, or the NumPy module of a compiled one, with a FallbackWarning saying why, where the
-    kernels of studies cannot be had.
+    kernels of studies cannot be had; InputError for one that reads channels.
     """
+    require_no_channels(model, "a study of encoders")
     if isinstance(model, CompiledSignals) and (reason := unavailable()):
         warnings.warn(f"{model.NAME}: NumPy in place of C: {reason}", FallbackWarning, stacklevel=3)
         return model.module

@@ -1,0 +1,118 @@
+"""Laws that read the torque that the rest of the model transmits at their joint: bilinear in the
+parameters, since
+
+    Y = D_r X_r + D_l(tau_m) X_l + rho,        tau_m = D_r X_r
+
+with D_l the columns of these laws and D_r all others. Least squares with tau_m of the estimate
+before, until tau_m settles. The measured torque in its place would carry the noise of Y into D_l,
+which biases X_l; tau_m has that of the estimate alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, channels_of
+from runtime.records.record import Record
+from runtime.records.stream import Stream
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import Prepared, prepared
+
+Array = np.ndarray
+
+TRANSMITTED = "tau_model"
+"""Beginning of the channels that are torques of the model, before the number of the joint."""
+PASSES = 50
+SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
+
+
+def transmitted(
+    model: GeneratedModel,
+    fitted: Sequence[Prepared | Stream],
+    further: Sequence[Record | Stream],
+    weights: bool,
+) -> tuple[tuple[Prepared | Stream, ...], list[Record | Stream], str]:
+    """The records with the torque of the model where laws read it, and what was done, a sentence;
+    as they are, and "", where none does.
+
+    Raises
+    ------
+    InputError
+        A record that is read by blocks, or a torque that does not settle.
+    """
+    read = {c: own for c, own in channels_of(model).items() if c.startswith(TRANSMITTED)}
+    if not read:
+        return tuple(fitted), list(further), ""
+    records = [one for one in fitted if isinstance(one, Prepared)]
+    others = [one for one in further if isinstance(one, Record)]
+    names = ", ".join(sorted({name for own in read.values() for name in own}))
+    if len(records) < len(fitted) or len(others) < len(further):
+        raise InputError(f"{names}: the torque of the model needs whole records; set stream: off")
+    torque = _Torque(model, read)
+    X, records = np.zeros(len(model.BASE_PARAMETERS)), [torque.given(r, None) for r in records]
+    before = np.zeros(0)
+    for k in range(PASSES):
+        X = _solved([r.observation(model) for r in records], weights)
+        records = [torque.given(r, X) for r in records]
+        tau = np.concatenate([r.record.channels[c] for r in records for c in read])[:, 0]
+        if k and np.linalg.norm(tau - before) <= SAME_TORQUE * np.linalg.norm(tau):
+            break
+        before = tau
+    else:
+        raise InputError(
+            f"{names}: the torque of the model does not settle in {PASSES} passes; is the friction "
+            "larger than the torque that causes it?"
+        )
+    told = (
+        f"{names}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, "
+        f"not the measured one; it settled in {k + 1} passes."
+    )
+    study, drives = records[0].study, records[0].drives
+    seen = [torque.given(replace(prepared(model, r, study), drives=drives), X) for r in others]
+    return tuple(records), [one.record for one in seen], told
+
+
+def _solved(observations: Sequence[Observation], weights: bool) -> Array:
+    """Least squares of all columns, with rows of each joint divided by the deviation of its
+    residual where `weights`.
+    """
+    W = np.vstack([o.W for o in observations])
+    Y = np.concatenate([o.Y for o in observations])
+    X = np.linalg.lstsq(W, Y, rcond=1e-10)[0]
+    if weights:
+        _, joint = np.unique(np.concatenate([o.joints for o in observations]), return_inverse=True)
+        exact = LIMIT.EXACT_FIT**2 * np.bincount(joint, Y**2)
+        squares = np.bincount(joint, (Y - W @ X) ** 2) + exact
+        scale = np.sqrt(squares / np.bincount(joint))[joint]
+        X = np.linalg.lstsq(W / scale[:, None], Y / scale, rcond=1e-10)[0]
+    return np.asarray(X)
+
+
+class _Torque:
+    """The torque of the columns that do not read it; `read` : {channel: parameters that do}."""
+
+    def __init__(self, model: GeneratedModel, read: dict[str, tuple[str, ...]]) -> None:
+        self.model, self.read = model, read
+        own = {name for names in read.values() for name in names}
+        self.rest = [k for k, name in enumerate(model.BASE_PARAMETERS) if name not in own]
+        self.place = {c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED))) for c in read}
+
+    def given(self, one: Prepared, X: Array | None) -> Prepared:
+        """The record with tau_m of X; 0 for None."""
+        tau = np.zeros((len(one.record), len(self.model.JOINTS)))
+        if X is not None:
+            s = one.states
+            timed = {c: s.channels[c] for c in channels_of(self.model) if c not in self.read}
+            D = cast(Any, self.model).regressor(s.q, s.qd, s.qdd, **timed)
+            tau = D[..., self.rest] @ X[self.rest]
+        channels = {**one.record.channels, **{c: tau[:, [k]] for c, k in self.place.items()}}
+        other = replace(one, record=replace(one.record, channels=channels))
+        states = replace(one.states, channels=other.channels)
+        vars(other).update(states=states, selection=one.selection, torque=one.torque)
+        return other
