@@ -92,7 +92,7 @@ LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be m
 BUDGET = {
     "symgen": {
         "": 69,
-        "description": 3205,
+        "description": 3204,
         "derive": 3004,
         "regroup": 991,
         "emit": 1069,
@@ -110,17 +110,17 @@ BUDGET = {
         "model": 960,
         "records": 2398,
         "signals": 1636,
-        "rows": 1366,
+        "rows": 1367,
         "estimators": 1579,
         "loop": 1662,
         "excitation": 535,
         "resolution": 1866,
         "checks": 1966,
-        "identification": 2706,
+        "identification": 2704,
         "reporting": 960,
     },
 }
-TOTAL = {"symgen": 13_725, "runtime": 19_589}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_724, "runtime": 19_588}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is
