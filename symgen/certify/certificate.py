@@ -38,6 +38,7 @@ import numpy as np
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
 from symgen.derive.angles import rows_of, units_of
+from symgen.derive.closure import parts
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
@@ -351,7 +352,8 @@ def degree(regrouping: Regrouping) -> int:
 
     def frame(f: Frame) -> int:
         turn = (
-            2 * sum(abs(n) for _, n in closure.turn(f.j)[0]) + angle(closure.offset[f.j])
+            2 * parts(robot) * sum(int(abs(n)) + 1 for _, n in closure.turn(f.j)[0])
+            + angle(closure.offset[f.j])
             if f.sigma == REVOLUTE
             else 1
         )

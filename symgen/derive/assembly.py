@@ -75,8 +75,7 @@ class Assembly:
             self.c[k] = constant.value(self.constants)
             for i, g in row.items():
                 self.N[k, self.free.index(i)] = g.value(self.constants)
-        lengths = [abs(e.value(self.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)]
-        self.scale = np.array([1 / max([*lengths, 1e-3])] * 3 + [1.0] * 9)
+        self.scale = np.array([1 / max(robot.longest, 1e-3)] * 3 + [1.0] * 9)
 
     @property
     def unknown(self) -> tuple[int, ...]:

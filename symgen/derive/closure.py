@@ -17,12 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import prod
 
 from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
 from symgen.description.expression import ONE, ZERO, Expression
-from symgen.description.robot import Robot
+from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError
 
+FINEST = 360  # parts of an angle at most: 12, 15 and 8 are among its divisors
 ActiveRow = tuple[tuple[int, Expression], ...]
 Relation = tuple[Mapping[int, Expression], Expression]  # row and constant
 
@@ -61,22 +63,25 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """The angle of revolute joint j: whole multiples of independent angles, and a constant."""
-        turn = []
+        """The angle of revolute joint j: multiples of independent angles, and a constant. Fractions
+        of an angle are whole multiples of its `parts`.
+        """
+        turn, whole = [], 1 if self.tied else parts(self.robot)
         for i, g in sorted(self.row[j].items()):
             c = g.constant
-            if c is None or c.denominator != 1:
+            if c is None or whole % c.denominator:
                 theirs, other = (
                     f"{label!a:.60} (q{k})" if (label := self.robot.labels.get(k)) else f"q{k}"
                     for k in (j, i)
                 )
                 raise DescriptionError(
                     f"constraints.q{j}: {theirs} turns {g} times with {other}; a passive angle "
-                    "needs whole multiples of other angles",
+                    "needs whole multiples of other angles, or fractions of them with small "
+                    "denominators outside of general loops (write 1/3, not 0.333)",
                     path=("constraints", f"q{j}"),
                     file=self.robot.file or None,
                 )
-            turn.append((i, int(c)))
+            turn.append((i, int(c) if c.denominator == 1 else c))
         return tuple(turn), self.offset[j]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
@@ -104,6 +109,20 @@ class Closure:
             for u in self.tied:
                 total[i] = add(total[i], mul(algebra.rate(u, i), total[u]))
         return {i: total[i] for i in self.robot.joints}
+
+
+def parts(robot: Robot) -> int:
+    """D, so that every passive angle is a whole multiple of q_i/D: the product of the denominators
+    of the declared relations between angles; 1 where it is beyond FINEST.
+    """
+    joints = {f"q{j}" for j in robot.moving}
+    D = prod(
+        c.denominator
+        for j, e in robot.constraints.items()
+        for m, c in e.terms.items()
+        if robot.frame(j).sigma == REVOLUTE and joints & {a for a, _ in m}
+    )
+    return D if D <= FINEST else 1
 
 
 def open_tree(robot: Robot) -> Closure:

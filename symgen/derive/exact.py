@@ -50,6 +50,7 @@ from symgen.derive.angles import (
     radicands,
     units_of,
 )
+from symgen.derive.closure import parts
 from symgen.derive.scalar import Scalar, Turn, Unnamed
 from symgen.description.expression import Call, Expression, Number, call, quarter_turns
 from symgen.description.robot import Robot
@@ -154,7 +155,8 @@ class Draw(Unnamed):
         self._q = {j: self._random(samples) for j in robot.moving}
         self._qd = {j: self._random(samples) for j in robot.moving}
         self._qdd = {j: self._random(samples) for j in robot.moving}
-        self._point = {j: self._circle(samples) for j in robot.moving}
+        self.parts = parts(robot)
+        self._point = {j: self._circle(samples) for j in robot.moving}  # of q_j/parts
 
     def _random(self, size: int) -> Array:
         return self.rng.integers(1, self.p, size)
@@ -303,7 +305,7 @@ class Draw(Unnamed):
             return c, s
         point = self._angle(offset)
         for j, n in turn:
-            point = self._turned(point, self._multiple(self._point[j], n))
+            point = self._turned(point, self._multiple(self._point[j], int(n * self.parts)))
         return self._fp(point[0]), self._fp(point[1])
 
     def q(self, j: int) -> Fp:

@@ -70,7 +70,7 @@ class FloatAlgebra(Unnamed):
         """sum n_j q_j + offset."""
         total = self.value(offset)
         for j, n in turn:
-            total = total + n * self._q[j]
+            total = total + float(n) * self._q[j]
         return total
 
     def q(self, j: int) -> Scalar:

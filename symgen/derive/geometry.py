@@ -13,6 +13,8 @@ joint axes) is taken from the carrier in one step, which is where C23 and S23 co
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
+from fractions import Fraction
 
 from symgen.derive.closure import Closure
 from symgen.derive.scalar import (
@@ -171,7 +173,7 @@ class Geometry:
 
 def summed(turn: Turn) -> Turn:
     """Equal joints of a turn added up; what cancels is left out."""
-    total: dict[int, int] = {}
+    total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n
     return tuple((j, n) for j, n in sorted(total.items()) if n)

@@ -87,10 +87,10 @@ class GraphAlgebra:
         return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
     def _label(self, turn: Turn) -> str:
-        """23 for q2 + q3, 5m2 for q5 - q2, 2x3 for 2 q3."""
+        """23 for q2 + q3, 5m2 for q5 - q2, 2x3 for 2 q3, 2o5x3 for 2/5 q3."""
         text = ""
         for j, n in turn:
-            times = f"{abs(n)}x" if abs(n) != 1 else ""
+            times = f"{abs(n)}x".replace("/", "o") if abs(n) != 1 else ""
             text += ("m" if n < 0 else self.named.separator if text else "") + times + str(j)
         return text
 

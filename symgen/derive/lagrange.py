@@ -496,10 +496,7 @@ def sampled(
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
-    longest = max(
-        [abs(e.value(model.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)], default=0.0
-    )
-    slide = 1.0 if free else min(0.5, longest / 4)
+    slide = 1.0 if free else min(0.5, robot.longest / 4)
     reach = np.array(
         [
             (np.pi if free else 0.5) if robot.frame(j).sigma == REVOLUTE else slide

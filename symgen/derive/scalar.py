@@ -11,6 +11,7 @@ receives the name of each step.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import Any, Protocol, TypeVar
 
 from symgen.description.expression import Expression
@@ -20,7 +21,7 @@ K = TypeVar("K")
 Scalar = Any
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]  # rows
-Turn = tuple[tuple[int, int], ...]  # ((j, n), ...): the angle sum_j n q_j
+Turn = tuple[tuple[int, int | Fraction], ...]  # ((j, n), ...): the angle sum_j n q_j
 
 AT_ZERO = {"sign": 0, "tanh": 0, "sine": 0, "root": 0, "power": 0, "exp": 1, "cosine": 1}
 """Values of `Algebra.function` at the structural zero."""

@@ -269,10 +269,13 @@ class Robot:
 
     @cached_property
     def longest(self) -> float:
-        """The longest length of the frames at the constants of the file, m; 1 where all are
-        zero.
+        """The longest length of the frames at the constants of the file, m; of those around the
+        loops where there are some, which may be far smaller than the arm that carries them. 1
+        where all are zero.
         """
-        lengths = (e.value(self.constants) for f in self.frames for e in (f.b, f.d, f.r0))
+        around = {j for l in self.loops for j in {*self.path(l.cut)} ^ {*self.path(l.twin)}}
+        frames = [f for f in self.frames if not around or f.j in around]
+        lengths = (e.value(self.constants) for f in frames for e in (f.b, f.d, f.r0))
         return max(map(abs, lengths)) or 1.0
 
     @cached_property

@@ -28,7 +28,7 @@ def with_relations(seed: int) -> str:
 
     def factor(*joints: str) -> str:
         whole = not slides & set(joints)
-        return repr(float(rng.choice([-2, -1, 1, 2] if whole else [-1.5, 0.3, 2.25])))
+        return repr(float(rng.choice([-2, -1, -0.5, 1, 1.5] if whole else [-1.5, 0.3, 2.25])))
 
     for k in range(int(rng.integers(1, 4))):
         kind = rng.choice(["joint", "constant", "tendon", "curved", "connect", "weld"],

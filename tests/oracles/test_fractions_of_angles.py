@@ -1,0 +1,84 @@
+"""Hinges that turn a fraction of another one: fingers that follow by -1/2 and -2/3, on axes of
+their own and on parallel ones where the angles meet in one sine. Lagrange multipliers are the
+oracle.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from oracles.multipliers import Multipliers
+from oracles.random_robots import random_parameters
+from oracles.test_loops_agree import whole
+from oracles.test_random_loops import module_of
+from symgen.certify.modules import certify
+from symgen.cli.main import app
+from symgen.description import Robot, parse_robot
+from symgen.emit.generate import generate_module
+from symgen.errors import DescriptionError
+from symgen.regroup.regrouping import EXACT, regroup
+
+HAND = """symgen: 1
+name: hand
+gravity: [0, -g, 0]
+constants: {{L: 0.08, D: 0.05, g: 9.81}}
+frames:
+  1: {{ant: 0, sigma: 0, alpha: {tilt}, d: 0, theta: q1, r: 0}}
+  2: {{ant: 1, sigma: 0, alpha: pi/2, d: L, theta: q2, r: 0}}
+  3: {{ant: 2, sigma: 0, mu: 0, alpha: {alpha}, d: D, theta: q3, r: 0}}
+  4: {{ant: 1, sigma: 0, mu: 0, alpha: {alpha}, d: D, theta: q4, r: 0}}
+constraints: {{q3: {ratio}, q4: {other}}}
+elements:
+  Ia: {{kind: inertia, along: all}}
+  FV: {{kind: viscous, along: all}}
+"""
+
+
+def hand(ratio: str, other: str, alpha: str = "0", tilt: str = "0") -> Robot:
+    text = HAND.format(ratio=ratio, other=other, alpha=alpha, tilt=tilt)
+    return parse_robot(text.encode(), "hand.yaml")
+
+
+@pytest.mark.parametrize("alpha", ["0", "pi/3"])
+@pytest.mark.parametrize(
+    ("ratio", "other"),
+    [("-q2/2", "q1/2 + 0.3"), ("-2/3*q2", "-q3"), ("q2/4", "q3/3"), ("2*q2/5 - q1/2", "-q2/2")],
+)
+def test_torques_and_rank(ratio: str, other: str, alpha: str, tmp_path: Path) -> None:
+    """To 1e-10 of the largest torque, at all angles; the number of base parameters is the rank of
+    the oracle's regressor.
+    """
+    robot, rng = hand(ratio, other, alpha), np.random.default_rng(2)
+    found = regroup(robot)
+    certificate = certify(found)
+    assert found.method == EXACT and certificate.valid, str(certificate)
+    module = module_of(generate_module(robot), tmp_path)
+    q = rng.uniform(-np.pi, np.pi, (60, 2))
+    qd, qdd = rng.standard_normal((2, *q.shape))
+    oracle = Multipliers(robot, whole(robot, q, module.passive_joints(q)), qd, qdd)
+    chi = random_parameters(robot, seed=7)
+    X, torque = module.base_parameters(chi), oracle.torque(chi)
+    for tau in (module.inverse_dynamics(q, qd, qdd, X), module.regressor(q, qd, qdd) @ X):
+        assert np.abs(tau - torque).max() < 1e-10 * np.abs(torque).max()
+    W = oracle.regressor().reshape(-1, len(chi))
+    assert np.linalg.matrix_rank(W, tol=1e-9 * np.linalg.norm(W)) == len(found)
+
+
+@pytest.mark.parametrize("form", ["closed", "recursive"])
+def test_models_are_shown(form: str, tmp_path: Path) -> None:
+    file = tmp_path / "hand.yaml"
+    file.write_text(HAND.format(ratio="-q2/2", other="-2/3*q1", alpha="0", tilt="0"))
+    command = ["show", str(file), "--model", "inverse_dynamics", "--form", form]
+    for more in ("text", "latex", "sympy"):
+        result = CliRunner().invoke(app, [*command, "--format", more])
+        assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("ratio", ["0.333*q2", "L*q2", "pi*q2", "q2/361"])
+def test_other_ratios_are_refused_by_name(ratio: str) -> None:
+    with pytest.raises(DescriptionError, match=r"constraints\.q3: q3 turns .* with q2"):
+        regroup(hand(ratio, "q1"))
