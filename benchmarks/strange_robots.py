@@ -13,6 +13,8 @@ Each case runs in a process of its own with at most LIMIT seconds of processor t
   agrees   the certificate holds, inverse dynamics and regressor of the emitted text give the
            torques of Lagrange multipliers (of pinocchio for trees) to TOLERANCE of the largest, and
            the rank of the oracle's regressor is the number of base parameters
+           (in the half of the random states that is farthest from dead points; ranks where loops
+           are not APART times smaller than the arm that carries them)
   refused  one sentence (SymgenError, or a certificate that says why it does not hold)
   wrong    anything else: other torques, another rank, a traceback, a case without an end
 """
@@ -40,13 +42,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import numpy as np
+
 from oracles.multipliers import Multipliers
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_loops import KINDS, random_loop
 from oracles.random_robots import random_parameters
 from oracles.test_loops_agree import whole
 from oracles.test_random_loops import closes, module_of
-
 from symgen.certify.modules import certify
 from symgen.derive.loops import close
 from symgen.description import Robot, parse_robot
@@ -56,12 +58,13 @@ from symgen.regroup.regrouping import regroup
 
 LIMIT = 120  # s of processor time of a case
 TOLERANCE = 1e-9  # of the largest torque; states near dead points cost digits of the closure
-SINGULAR = (
-    0.02  # smallest singular value of the passive joints, relative: states nearer are left out
-)
-SAMPLES = 40
+SAMPLES, APART = 40, 100
 FILLED = 1e-9  # of the longest column: shorter ones hold what is left of a closure by Newton
-RANK = 1e-8  # of the largest singular value of the oracle's regressor, columns scaled to length 1
+FEWEST, MOST = (
+    1e-14,
+    1e-9,
+)  # singular values of the oracle's regressor, its columns scaled to length
+# 1: the last one that counts is above, the next one below, relative to the largest
 
 Case = tuple[str, Callable[[], Robot], int]
 
@@ -147,11 +150,17 @@ def verdict(make: Callable[[], Robot], behind: int) -> tuple[str, str]:
     length = np.linalg.norm(W, axis=0)
     there = length > FILLED * length.max()
     s = np.linalg.svd(W[:, there] / length[there], compute_uv=False)
-    rank, exact = int(sum(s > RANK * s[0])), found.method.partition(",")[0]
+    exact, n = found.method.partition(",")[0], len(found)
     if off > TOLERANCE:
         return "wrong", f"torques off by {off:.1e} of the largest ({exact})"
-    if rank != len(found) and len(W) >= 2 * len(found):
-        return "wrong", f"{len(found)} base parameters, rank {rank} ({exact}), torques {off:.1e}"
+    lengths = [abs(e.value(robot.constants)) for f in robot.frames for e in (f.b, f.d, f.r0)]
+    if len(W) >= 2 * n and max(lengths) <= APART * robot.longest:
+        last, beyond = (s[k] / s[0] if k < len(s) else 0.0 for k in (n - 1, n))
+        if last < FEWEST or beyond > MOST:
+            return (
+                "wrong",
+                f"{n} base parameters, singular values {last:.1e}, {beyond:.1e} ({exact})",
+            )
     return "agrees", f"{off:.1e} {exact}"
 
 

@@ -261,7 +261,7 @@ def certify_formulas(
                 f"{len(regrouping)} elsewhere; {AT_VALUES}"
             )
             if gap > CLEAR and robot.constants and not nearly_round(robot, WITHIN)
-            else hair_off(robot, f"{len(regrouping) - rank} base parameters")
+            else hair_off(robot, _too_small(witness.W[:, base]))
         )
     sizes = sorted(
         x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants)))
@@ -293,6 +293,12 @@ def certify_formulas(
         rank_in_floats=len(ranks) < draws,
         error_probability=bound**draws if primes else 1.0,
     )
+
+
+def _too_small(W: Array) -> str:
+    """How many directions of the base parameters act by less than 1e-9 of the largest."""
+    s = np.linalg.svd(W, compute_uv=False)
+    return f"{np.sum(s < 1e-9 * s[0])} combinations of base parameters"
 
 
 def hair_off(robot: Robot, what: str) -> str:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from fractions import Fraction
 
 from symgen.derive.closure import Closure
 from symgen.derive.scalar import (

@@ -92,17 +92,22 @@ def newton(
 ) -> Array:
     """Where r(q) = 0, from q (..., n), by steps of least squares of at most STEP in `columns`.
 
-    Ends early below the tolerance, or where STALLED steps make no progress. The caller looks at the
-    residual where it ends.
+    A state ends early below the tolerance, or where STALLED steps make no progress, whatever states
+    stand beside it. The caller looks at the residual where it ends.
     """
-    q, best, stalled = q.copy(), np.inf, 0
+    q, best, stalled = q.copy(), np.full(q.shape[:-1], np.inf), np.zeros(q.shape[:-1])
+    going = np.ones(q.shape[:-1], dtype=bool)
     for _ in range(steps):
         r, J = differences(residual, q, columns)
-        gap = float(np.abs(r).max(initial=0.0))
-        best, stalled = (gap, 0) if gap < 0.95 * best else (best, stalled + 1)
-        if gap < tolerance or stalled > STALLED:
+        gap = np.abs(r).max(axis=-1, initial=0.0)
+        best, stalled = (
+            np.where(gap < 0.95 * best, gap, best),
+            np.where(gap < 0.95 * best, 0, stalled + 1),
+        )
+        going &= (gap >= tolerance) & (stalled <= STALLED)
+        if not going.any():
             break
         step = (np.linalg.pinv(J, rcond) @ r[..., None])[..., 0]
         longest = np.abs(step).max(axis=-1, initial=STEP, keepdims=True)
-        q[..., columns] -= step * (STEP / longest)
+        q[..., columns] -= step * (STEP / longest) * going[..., None]
     return q

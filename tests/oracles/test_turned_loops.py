@@ -15,9 +15,11 @@ from oracles.random_loops import KINDS, random_loop
 from oracles.random_robots import random_parameters
 from oracles.test_loops_agree import whole
 from oracles.test_random_loops import SEEDS, module_of, torques_agree
+from symgen.certify.modules import certify
 from symgen.derive.loops import close
 from symgen.description import parse_robot
 from symgen.emit.generate import generate_module
+from symgen.regroup.regrouping import regroup
 
 WITH_COUNTERBALANCE = """symgen: 1
 name: balanced
@@ -60,6 +62,14 @@ def check_behind(kind: str, seed: int, behind: int, folder: Path) -> None:
 @pytest.mark.parametrize("kind", sampled(KINDS, 2))
 def test_behind_turning_joints(kind: str, tmp_path: Path) -> None:
     check_behind(kind, KINDS.index(kind), 1 + KINDS.index(kind) % 3, tmp_path)
+
+
+def test_a_jack_in_millimetres_on_an_arm_in_metres(tmp_path: Path) -> None:
+    """Its stroke is drawn at the size of the loop: no state closed at that of the arm."""
+    robot = random_loop("jack", 0, behind=1)
+    assert 100 * robot.longest < max(abs(f.d.value(robot.constants)) for f in robot.frames)
+    assert certify(regroup(robot)).valid
+    check_behind("jack", 0, 1, tmp_path)
 
 
 @campaign

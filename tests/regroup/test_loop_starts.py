@@ -7,9 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from symgen.certify.modules import certify
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description import Robot, parse_robot
+from symgen.regroup.regrouping import regroup
 
 HEAD = "symgen: 1\nname: strange\ngravity: [0, -g, 0]\n"
 JACK = """constants: {a: 0.5, d1: 0.35, g: 9.81}
@@ -91,3 +93,34 @@ def test_a_start_that_closes_nowhere_near_is_told() -> None:
     assert doubts(robot(SLIDER, "q1: 0.65, q2: 1.15")) == []
     (note,) = doubts(robot(SLIDER, "q1: 1.65, q2: 1.15"))
     assert "nowhere near q1 = 1.65" in note  # beyond its reach of 0.8 m
+
+
+THREE_LEGS = """constants: {L: 0.377, Lp: 0.146, W0: 0.548, g: 9.81}
+frames:   # planar 3-RRR near its reach
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: L, theta: q2, r: 0}
+  3: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L, theta: q3, r: 0}
+  4: {ant: 0, sigma: 0, alpha: 0, d: W0, theta: q4, r: 0}
+  5: {ant: 4, sigma: 0, mu: 0, alpha: 0, d: L, theta: q5, r: 0}
+  6: {ant: 5, sigma: 0, mu: 0, alpha: 0, d: L, theta: q6, r: 0}
+  7: {ant: 3, sigma: 2, alpha: 0, d: Lp, theta: 0, r: 0}
+  8: {ant: 0, sigma: 0, gamma: pi/3, alpha: 0, d: W0, theta: q8, r: 0}
+  9: {ant: 8, sigma: 0, mu: 0, alpha: 0, d: L, theta: q9, r: 0}
+  10: {ant: 9, sigma: 0, mu: 0, alpha: 0, d: L, theta: q10, r: 0}
+  11: {ant: 3, sigma: 2, gamma: pi/3, alpha: 0, d: Lp, theta: 0, r: 0}
+loops:
+  - {cut: 6, twin: 7, start: {q1: 1.4, q2: -1.6, q3: 0.2, q4: 2.0, q5: -1.2}}
+  - {cut: 10, twin: 11, start: {q8: -0.4, q9: 1.0}}
+elements:
+  Ia: {kind: inertia, along: all}
+  FV: {kind: viscous, along: all}
+  FS: {kind: coulomb, along: all}
+  OFFSET: {kind: offset, along: all}
+"""
+
+
+def test_what_closes_does_not_hang_on_the_states_beside_it() -> None:
+    """States out of reach, in which Newton stalls, end no other one; before, states that closed
+    when drawn did not when looked at again, and a traceback ended the certificate.
+    """
+    assert certify(regroup(robot(THREE_LEGS))).valid
