@@ -358,7 +358,7 @@ def degree(regrouping: Regrouping) -> int:
 
     def frame(f: Frame) -> int:
         turn = (
-            2 * parts(robot) * sum(int(abs(n)) + 1 for _, n in closure.turn(f.j)[0])
+            2 * int(sum(abs(Fraction(n)) * parts(robot) for _, n in closure.turn(f.j)[0]))
             + angle(closure.offset[f.j])
             if f.sigma == REVOLUTE
             else 1
