@@ -19,7 +19,7 @@ from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping
 
 EVALUATED_TWICE = 1e-9  # of the largest: formulas and rows evaluated twice
-ROUNDING = 1e-13  # of the largest: an entry that is zero, evaluated once
+ZERO_ENTRY = 1e-13  # of the largest: an entry that is zero, evaluated once
 
 
 def table_errors(module: ModuleType, witness: Witness) -> dict[str, float]:
@@ -70,7 +70,7 @@ def _right(module: ModuleType, name: str, witness: Witness) -> bool:
                 (np.abs(D).max(axis=0) > rounding * np.abs(D).max()).T
                 for D, rounding in (
                     (witness.own, EVALUATED_TWICE),
-                    (_free_columns(witness), ROUNDING),
+                    (_free_columns(witness), ZERO_ENTRY),
                 )
             )
             return marked.shape == closed.shape and np.array_equal(
