@@ -170,6 +170,8 @@ class Pages:
     async def _view(self, request: Request) -> Response:
         """What is derived from robot, record or run, as a part of a page or as JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
+        if name == "formulas" and self.folder.read(DRAFT):  # those of the last robot stay
+            return PlainTextResponse("", headers={"hx-reswap": "none"})
         path: Path | None = self.folder.measured("record") if name == "preview" else self._source()
         if name not in VIEWS or path is None:
             raise InputError("no such view")
@@ -237,8 +239,10 @@ class Pages:
         return "table"
 
     async def _prove(self, form: dict[str, str]) -> str:
-        words = ("symgen", "check", self._source().name, "--certificate", "proof.json")
-        self.jobs.add("certificate", words)
+        self.jobs.add(
+            "certificate",
+            ("symgen", "check", self._source().name, "--certificate", "proof.json"),
+        )
         return "certificate"
 
     async def _study(self, form: dict[str, str]) -> str:
@@ -255,8 +259,7 @@ class Pages:
         return self._source().name, "study.yaml"
 
     async def _check(self, form: dict[str, str]) -> str:
-        words = ("check", *self._command(), "check.json")
-        self.jobs.add("check of the record", words)
+        self.jobs.add("check of the record", ("check", *self._command(), "check.json"))
         return "findings"
 
     async def _solve(self, form: dict[str, str]) -> str:

@@ -265,6 +265,8 @@ def test_an_error_stands_beside_its_cell_and_the_last_robot_stays(studio: Any) -
     assert said.value.message.replace("'", "&#39;") in answer.text  # type: ignore[attr-defined]
     assert (studio.path / "robot.yaml").read_text() == TEXT
     assert studio.get("certificate").text.count("No certificate")
+    late = studio.get("view/formulas")  # asked for before the edit, answered after it
+    assert late.status_code == 200 and late.headers["hx-reswap"] == "none"
     assert 'value="pi/"' in studio.get("robot").text  # reloaded
 
 

@@ -254,8 +254,8 @@
     }, 1500);
   });
   document.addEventListener("htmx:afterSettle", () => {
-    const robot = one("#figure")?.dataset.digest || "";
-    if (robot !== shownRobot && one("#figure").dataset.figure) { shownRobot = robot; htmx.trigger(document.body, "robot"); }
+    const { figure, digest } = one("#figure")?.dataset || {}, robot = figure ? digest : ""; // "" for a draft
+    if (robot !== shownRobot) { shownRobot = robot; if (robot) htmx.trigger(document.body, "robot"); }
   });
   read();
   all("[data-series]").forEach(replay);
