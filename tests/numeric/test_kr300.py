@@ -87,6 +87,42 @@ def test_errors_are_those_of_a_careful_identification(robot):
     assert "Values of the robot file as prior, euclidean" in known.message
 
 
+JACK = """  8:  {ant: 1, sigma: 0, mu: 0, alpha: pi/2,  d: A1 + H, theta: q8, r: 0}
+  9:  {ant: 8, sigma: 1, mu: 0, alpha: pi/2,  d: 0, theta: 0, r: q9}
+  10: {ant: 9, sigma: 0, mu: 0, alpha: -pi/2, d: 0, theta: q10, r: 0}
+  11: {ant: 2, sigma: 2, gamma: 95*pi/180, b: 0, alpha: 0, d: R, theta: 0, r: 0}
+loops: [{cut: 10, twin: 11, start: {q2: 0}}]
+columns:
+  GAS: {along: {9: q9}, torque: 1/(V - (abs(q) - 0.6)*A), unit: J}
+massless: [7, 8, 9, 10]
+"""  # the piston of the README, from 0.8 m to 0.2 m beside axis 2, and the gas in it
+
+
+@campaign
+def test_the_counterbalance_as_a_jack(tmp_path) -> None:
+    """A loop with the gas law along its slide has the torque of the README over all of axes 1 and
+    2, and the fit of A predicts B as well as with that torque known.
+    """
+    area = np.pi * (0.055**2 - 0.030**2) / 4
+    text = kr300.robot_text(150.0).replace("massless: [7]\n", JACK)
+    text = text.replace("constants: {", f"constants: {{H: 0.8, R: 0.2, V: 0.00096, A: {area!r}, ")
+    (tmp_path / "jack.yaml").write_text(text)
+    model = symgen.model(tmp_path / "jack.yaml")
+    q = np.random.default_rng(0).uniform(-1, 1, (200, 6))
+    q[:, 0] = np.radians(np.linspace(-147, 147, 200))
+    q[:, 1] = np.radians(np.linspace(-50, 85, 200)[::-1])
+    gas = model.regressor(q, 0 * q, 0 * q)[:, :, model.BASE_PARAMETERS.index("GAS9")]
+    known = kr300.counterbalance(q)
+    charge = 1.01 * 296.8 * 328 * 0.159 * area
+    np.testing.assert_allclose(charge * gas, known, atol=1e-10 * np.abs(known).max())
+    study = study_from_mapping(kr300.study())
+    A, B = (read_records(study_from_mapping(kr300.study(name)).record, model)[0] for name in "AB")
+    _, other, fit = errors(model, A, B, study, "feasible")
+    assert other < 4
+    k = fit.names.index("GAS9")
+    assert abs(fit.X[k] - charge) < fit.sigma_corrected[k]  # which A alone does not determine
+
+
 def test_a_mass_that_the_record_does_not_determine_is_told(robot, tmp_path):
     """Without values: no motion of axis 1 tells the mass of link 1, and every physical robot within
     the range explains A as well.
