@@ -224,13 +224,16 @@ def require_no_channels(model: GeneratedModel, what: str) -> None:
 
 
 def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
-    """What results call the joints: the number of each, and its name where the robot file has
-    one.
+    """What results call the joints: the number of each, and its name where the robot file has one
+    that says more ("2 elbow", but "2" of "joint_2").
     """
     names = getattr(model, "LABELS", {})
-    return tuple(
-        f"{j} {name}" if isinstance(name := names.get(j), str) else str(j) for j in model.JOINTS
-    )
+    more = {
+        j: f" {name}"
+        for j, name in names.items()
+        if isinstance(name, str) and not re.fullmatch(rf"(?i)(joint|axis|[ajq])[ _-]?0*{j}", name)
+    }
+    return tuple(f"{j}{more.get(j, '')}" for j in model.JOINTS)
 
 
 def elements_of(

@@ -453,6 +453,8 @@ def test_names_of_joints_stand_in_limits_and_advice() -> None:
     named = parse_robot((text + "labels: {1: shoulder, 2: elbow}\n").encode(), "named.yaml")
     model = symgen.model(named)
     assert joint_labels(model) == ("1 shoulder", "2 elbow")
+    numbered = parse_robot((text + "labels: {1: joint_2, 2: J2}\n").encode(), "named.yaml")
+    assert joint_labels(symgen.model(numbered)) == ("1 joint_2", "2")
     t, q, tau = motion(model, 5.0)
     record = runtime.Record(t, q, tau, name="run")
     labels = [
