@@ -62,7 +62,7 @@ class Expansion:
     ) -> None:
         self.algebra, self.limit = algebra, limit
         self.names = self._names({*parameters, *algebra.robot.constants})
-        ranks: dict[Any, tuple[int, ...]] = {
+        ranks: dict[Any, tuple[int | Fraction, ...]] = {
             x: (TURN, *(j for j, _ in turn), *(n for _, n in turn), k)
             for (turn, _), names in self.names.items()
             for k, x in enumerate(names)
