@@ -38,7 +38,7 @@ from runtime.rows.observation import Observation, stack
 from runtime.rows.prepared import Prepared, observation_from_states
 from runtime.rows.selection import Selection, certain_rows
 from runtime.settings.study import Study
-from runtime.signals.counts.reading import Reading, read_counts
+from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import SpeedErrors, States
 from runtime.signals.states import encoder_drives, encoder_position, encoder_root, joint_states
 
@@ -95,8 +95,6 @@ class CoarseEncoders:
         study = replace(study, signals=signals, cestac=settings)
         side = encoder_drives(settings.side, drives, "cestac")
         self.reader, self.root, self.parts = reader, encoder_root(side, len(model.JOINTS)), []
-        self.alike: tuple[float, ...] = ()  # step and encoders of what was read last
-        self.near: dict[int, Reading] = {}  # that reading, by record
         into = np.linalg.inv(self.root).T
         for own in records:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
@@ -230,9 +228,7 @@ class CoarseEncoders:
         which are those of the encoder in every record.
         """
         settings, chosen, errors = self.task.settings, list(encoders), []
-        if self.alike != (delta, *chosen):
-            self.alike, self.near = (delta, *chosen), {}
-        for k, part in enumerate(self.parts):
+        for part in self.parts:
             rng = stream(settings.seed, *key)
             columns = [
                 counted(part.x[:, i], delta, phases[i], settings.uneven, rng) for i in chosen
@@ -243,9 +239,8 @@ class CoarseEncoders:
                 error[0][:, chosen] = y - part.x[:, chosen]
                 errors.append(error[0])
                 continue
-            counts = read_counts(y, rate, delta, near=self.near.get(k))
-            self.near[k] = counts
-            read = joint_states(*counts.motion, rate, part.record.selection.signals, None)
+            motion, signals = read_counts(y, rate, delta).motion, part.record.selection.signals
+            read = joint_states(*motion, rate, signals, None)
             assert read.errors is not None
             error[0][:, chosen] = read.q - exact.q[:, chosen]
             error[1][:, chosen] = read.qd - exact.qd[:, chosen]

@@ -178,4 +178,5 @@ def test_least_squares_that_is_feasible_within_its_noise_alone_is_told(tx40_data
     assert result.exit_code == 0
     told = json.loads(result.stdout)["feasibility"]
     assert told["feasible"] and told["margin"] == 0
-    assert told["blocking"][0]["condition"] == "link 3" and told["blocking"][0]["margin"] < 0
+    blocking = {one["condition"]: one["margin"] for one in told["blocking"]}
+    assert "link 3" in blocking and max(blocking.values()) < 0

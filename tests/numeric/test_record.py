@@ -729,3 +729,13 @@ def test_damaged_files(tmp_path, name, data, said):
 def test_settings_have_at_most_two_files():
     with pytest.raises(InputError, match="3 files"):
         RecordSettings(files=("a", "b", "c"))
+
+
+@pytest.mark.parametrize("read", [read_record, open_stream])
+def test_a_quotation_mark_that_stays_open_is_told_with_its_line(tmp_path, read) -> None:
+    """It took the next line into its field: blocks ended in a ValueError of zip()."""
+    rows = ["t,q1,tau1", *(f"{k / 100},{k % 3},1" for k in range(20))]
+    rows[7] = '0.06,2,"'
+    (tmp_path / "run.csv").write_text("\n".join([*rows, ""]))
+    with pytest.raises(InputError, match=r"run\.csv, line 8: a quotation mark"):
+        read(RecordSettings(files=["run.csv"]), folder=tmp_path)

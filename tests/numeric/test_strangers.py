@@ -470,23 +470,6 @@ def test_names_of_joints_stand_in_limits_and_advice() -> None:
         check_limits(far, {"q": [[-3, 3], [-3, 3]]}, joint_labels(model))
 
 
-def test_a_reading_beside_another_one_is_that_of_a_search() -> None:
-    """The advisor reads one motion by counts of many phases: knots and errors of the first reading
-    serve the others, which took half of its time.
-    """
-    from runtime.signals.counts.reading import read_counts
-
-    t = np.arange(3000) / 1000
-    x = np.stack([np.sin(3 * t) + 0.3 * np.cos(7 * t), 0.2 * np.sin(2 * t)], axis=1)
-    step, phase = 2e-3, 0.7e-3
-    first = read_counts(step * np.round(x / step), 1000.0, step)
-    moved = phase + step * np.round((x - phase) / step)
-    alone, beside = (read_counts(moved, 1000.0, step, near=near) for near in (None, first))
-    off = np.abs(beside.q - alone.q) / alone.s_q
-    assert off.max() < 1.0 and np.abs(beside.qd - alone.qd).max() < alone.s_qd.max()
-    assert np.allclose(beside.s_qd, alone.s_qd, rtol=0.2)
-
-
 @pytest.mark.parametrize("kind", ["none", "counterbalance", "spring"])
 def test_a_torque_by_position_that_nobody_told_is_named(kind) -> None:
     """A forgotten counterbalance was told as "d of frame 2 is 0.043 m rather than 0.1 m", or not at

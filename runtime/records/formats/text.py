@@ -84,9 +84,12 @@ class TextTable(Table):
         if self.source.decimal == ".":
             with suppress(ValueError):
                 whole = _numbers(lines, self.delimiter)
-                if whole.shape[1] == len(self.names):
+                if whole.shape == (len(lines), len(self.names)):
                     return whole[:, indices]
         numbered = [*zip(numbers, lines, strict=False)]
+        if open_quote := next((k for k, line in numbered if line.count('"') % 2), None):
+            message = "a quotation mark that its line does not close; expected one sample a line"
+            raise InputError(message, file=self.file, row=f"line {open_quote}")
         self.require_widths(numbered)
         if self.source.decimal != ".":
             self._require_no_points(indices, numbered)

@@ -151,7 +151,6 @@ def read_counts(
     *,
     lines: Lines = "detected",
     name: str = "record",
-    near: Reading | None = None,
 ) -> Reading:
     """Positions, velocities and accelerations from counts, with deviations.
 
@@ -169,9 +168,6 @@ def read_counts(
         deviation is known, steps.
     name : str
         What errors call the record.
-    near : Reading, optional
-        The same motion from counts of another phase: its knots and the errors of its counts are
-        taken where they agree with these, and not searched again.
 
     Returns
     -------
@@ -184,24 +180,18 @@ def read_counts(
         lattice; counts that jump.
     """
     known, counts, unwrapping = unwrapped_counts(position, step, name=name)
-    return _reading(counts, rate, known, lines, unwrapping.findings, near.parts if near else ())
+    return _reading(counts, rate, known, lines, unwrapping.findings)
 
 
 def _reading(
-    counts: Array,
-    rate: float,
-    known: Lattice,
-    lines: Lines,
-    said: Sequence[str],
-    before: Sequence[Part],
+    counts: Array, rate: float, known: Lattice, lines: Lines, said: Sequence[str]
 ) -> Reading:
     N, n = counts.shape
     states, unknown = [np.empty((N, n)) for _ in range(6)], np.empty((N, n), dtype=bool)
     density, parts, found, gaps = np.zeros(n), [], dict.fromkeys((*known.findings, *said)), Gaps(n)
     for begin, first, stop, end in stretches(N):
         kept = slice(first - begin, stop - begin)
-        near = next((part for part in before if part.begin == begin), None)
-        part, read, left = read_stretch(counts[begin:end], rate, lines, gaps.rest(counts), near)
+        part, read, left = read_stretch(counts[begin:end], rate, lines, gaps.rest(counts))
         unknown[first:stop] = left[kept]
         gaps.take(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
@@ -223,7 +213,7 @@ def _reading(
 
 
 def read_stretch(
-    counts: Array, rate: float, lines: Lines, rest: Array, near: Part | None = None
+    counts: Array, rate: float, lines: Lines, rest: Array
 ) -> tuple[Part | None, list[Array], Array]:
     """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
     steps, and where the state is unknown, (N, n) each.
@@ -239,7 +229,7 @@ def read_stretch(
     moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
     states[0][:] = np.where(np.isfinite(least), least, rest)
-    part = _moved(k, moving, states, rate, lines, near) if len(moving) else None
+    part = _moved(k, moving, states, rate, lines) if len(moving) else None
     missing = np.isnan(counts)
     unknown = missing & (states[3] > UNKNOWN)
     for j in np.flatnonzero(missing.any(axis=0)):
@@ -252,14 +242,7 @@ def read_stretch(
     return part, states, unknown
 
 
-def _moved(
-    k: Array,
-    moving: Array,
-    states: Sequence[Array],
-    rate: float,
-    lines: Lines,
-    near: Part | None,
-) -> Part:
+def _moved(k: Array, moving: Array, states: Sequence[Array], rate: float, lines: Lines) -> Part:
     """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the
     states.
     """
@@ -270,10 +253,7 @@ def _moved(
         and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
     )
     lines = ANYWHERE if shaken else lines
-    known_before = {} if near is None else dict(zip(near.moving, near.smoothed, strict=True))
-    channels = tuple(
-        smoothed(k[j], 1 / rate, lines=lines, near=known_before.get(j)) for j in moving
-    )
+    channels = tuple(smoothed(k[j], 1 / rate, lines=lines) for j in moving)
     part = Part(channels, 0, 0, N, moving)
     for order in range(3):
         for j, each in zip(moving, channels, strict=True):

@@ -104,14 +104,11 @@ class Smoothed:
         return np.asarray(drawn[: self.basis.N] + self.origin)
 
 
-def smoothed(
-    counts: Array, Ts: float, *, lines: Lines = "detected", near: Smoothed | None = None
-) -> Smoothed:
+def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed:
     """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
 
     lines : whether errors of the lines are "detected", and bounds widened, or "estimated"; or their
     deviation in steps, less than which is not taken.
-    near : the same motion from counts of another phase.
 
     InputError where no motion goes with the counts.
     """
@@ -128,7 +125,7 @@ def smoothed(
     jumps = given.leaps()
     for leap in jumps:
         given = given.without(*leap)
-    boxes, read = given.read(sizes, near)
+    boxes, read = given.read(sizes)
     while len(jumps) < JUMPS and (jump := given.jump(boxes, read)):
         jumps.append(jump)
         given = given.without(*jump)
@@ -158,15 +155,11 @@ class Counts:
     rest: Array
     Ts: float
 
-    def read(self, sizes: Sequence[float], near: Smoothed | None = None) -> tuple[Boxes, Posterior]:
+    def read(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
         """The motion between the bounds, with the errors of most evidence, or wider ones with which
         it agrees with every count. Errors of a long record are those of its liveliest part, or
-        wider ones that make the whole more likely. Errors of `near` are taken where they agree.
+        wider ones that make the whole more likely.
         """
-        if near is not None:
-            boxes, read = self.first(near.read.errors, near)
-            if boxes.agrees(read):
-                return boxes, read
         if len(self.y) > 4 * LIVELIEST:
             boxes, read = self.first(self.liveliest().searched(sizes)[1].errors)
             if read.settled:
@@ -209,23 +202,19 @@ class Counts:
             boxes, read = max([(boxes, read), *found], key=lambda each: each[1].evidence)
         return boxes, read
 
-    def first(self, errors: Errors, near: Smoothed | None = None) -> tuple[Boxes, Posterior]:
+    def first(self, errors: Errors) -> tuple[Boxes, Posterior]:
         """Bounds of counts with these errors, and the motion between them.
 
-        Knots are as far apart as the motion allows that passes near the changes, or those of
-        `near`.
+        Knots are as far apart as the motion allows that passes near the changes.
         """
         N, least = len(self.y), max(1, round(KNOTS / self.Ts))
+        basis = Basis(N, least, self.Ts)
         tau, nu = self.from_changes(errors)
-        if near is None:
-            basis = Basis(N, least, self.Ts)
-            c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
-            h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
-            if (m := max(1, round(h / self.Ts))) > least:
-                basis = Basis(N, m, self.Ts)
-                c, density = _passed(basis, tau, nu, float(density.max()))
-        else:
-            basis, c, density = near.basis, near.read.c, near.read.density
+        c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
+        h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
+        if (m := max(1, round(h / self.Ts))) > least:
+            basis = Basis(N, m, self.Ts)
+            c, density = _passed(basis, tau, nu, float(density.max()))
         sites = self.sites(density.mean())
         bounds = self.y[sites] - 0.5, self.y[sites] + 0.5
         y, rest = basis.filled(self.y), basis.filled(self.rest)
