@@ -108,19 +108,19 @@ BUDGET = {
         "": 958,
         "settings": 997,
         "model": 961,
-        "records": 2398,
-        "signals": 1636,
+        "records": 2401,
+        "signals": 1628,
         "rows": 1367,
         "estimators": 1579,
         "loop": 1662,
         "excitation": 535,
-        "resolution": 1866,
+        "resolution": 1861,
         "checks": 1966,
         "identification": 2704,
         "reporting": 960,
     },
 }
-TOTAL = {"symgen": 13_743, "runtime": 19_589}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_743, "runtime": 19_579}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is
