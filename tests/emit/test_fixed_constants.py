@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from oracles.loop_robots import BENNETT
 from oracles.test_random_loops import module_of
 from runtime.errors import InputError
 from runtime.model.generated import checked_model, constants_of
@@ -19,23 +20,10 @@ from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files, generate_module
 from symgen.regroup.regrouping import EXACT, NUMERIC, regroup
 
-BENNETT = b"""symgen: 1
-name: bennett
-gravity: [0, -9.81, 0]
-constants: {a: 0.3, AA: 0.6, BB: 1.1}
-frames:   # spatial 4R, a/sin(A) = b/sin(B)
-  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
-  2: {ant: 1, sigma: 0, mu: 0, alpha: AA, d: a, theta: q2, r: 0}
-  3: {ant: 2, sigma: 0, mu: 0, alpha: BB, d: a*sin(BB)/sin(AA), theta: q3, r: 0}
-  4: {ant: 0, sigma: 0, mu: 0, alpha: -BB, d: -a*sin(BB)/sin(AA), theta: q4, r: 0}
-  5: {ant: 4, sigma: 2, alpha: -AA, d: -a, theta: 0, r: 0}
-loops: [{cut: 3, twin: 5, start: {q1: 1.0}}]
-"""
-
 
 def test_spatial_loop(tmp_path: Path) -> None:
     """By keyword, at another angle, it was up to 11 % off and said nothing."""
-    robot = parse_robot(BENNETT, "bennett.yaml")
+    robot = parse_robot(BENNETT.encode(), "bennett.yaml")
     regrouping = regroup(robot)
     assert regrouping.method.startswith(NUMERIC) and regrouping.constants == {}
     text = generate_module(robot)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from oracles.loop_robots import JACKS
 from symgen.certify.modules import certify
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
@@ -32,22 +33,7 @@ frames:
   5: {ant: 1, sigma: 2, alpha: -pi/2, d: 0, theta: 0, r: 0}
 loops: [{cut: 4, twin: 5, start: {%s}}]
 """
-EXCAVATOR = """constants: {a: 0.5, a2: 0.45, d1: 0.35, LB: 1.3, g: 9.81}
-frames:
-  1: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: 0, theta: q1, r: 0}
-  2: {ant: 0, sigma: 0, mu: 0, gamma: -0.5, alpha: 0, d: d1, theta: q2, r: 0}
-  3: {ant: 2, sigma: 1, alpha: pi/2, d: 0, theta: 0, r: q3}
-  4: {ant: 3, sigma: 0, mu: 0, alpha: -pi/2, d: 0, theta: q4, r: 0}
-  5: {ant: 1, sigma: 2, alpha: 0, d: a, theta: 0, r: 0}
-  6: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: LB, theta: q6, r: 0}
-  7: {ant: 1, sigma: 0, mu: 0, gamma: 0.4, alpha: 0, d: a2, theta: q7, r: 0}
-  8: {ant: 7, sigma: 1, alpha: pi/2, d: 0, theta: 0, r: q8}
-  9: {ant: 8, sigma: 0, mu: 0, alpha: -pi/2, d: 0, theta: q9, r: 0}
-  10: {ant: 6, sigma: 2, alpha: 0, d: 0.25, theta: 0, r: 0}
-loops:
-  - {cut: 4, twin: 5, start: {q1: 0.6, q3: 0.5}}
-  - {cut: 9, twin: 10, start: {q6: 1.6, q8: 0.9}}
-"""
+EXCAVATOR = JACKS.partition("gravity: [0, -g, 0]\n")[2]
 BOOM = 1.213225  # of the jack at q3 = 0.5, by the law of cosines
 
 
