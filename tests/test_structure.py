@@ -108,7 +108,7 @@ BUDGET = {
         "": 958,
         "settings": 997,
         "model": 961,
-        "records": 2401,
+        "records": 2408,
         "signals": 1628,
         "rows": 1367,
         "estimators": 1579,
@@ -116,7 +116,7 @@ BUDGET = {
         "excitation": 535,
         "resolution": 1861,
         "checks": 1966,
-        "identification": 2704,
+        "identification": 2697,
         "reporting": 960,
     },
 }

@@ -52,7 +52,7 @@ from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams
 from runtime.records.record import Record
-from runtime.records.stream import Stream
+from runtime.records.stream import Stream, in_memory
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import halves
@@ -64,9 +64,10 @@ if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
     from runtime.loop.simulation import Simulator
 
-__all__ = ["Identification", "assess", "feasibility_of", "identify", "whole_records"]
+__all__ = ["Identification", "assess", "feasibility_of", "identify"]
 
 T = TypeVar("T")
+NEED_WHOLE = "a load, friction curves and scalars of laws need"
 SIMULATING = ("iv", "didim", "cloe")
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
@@ -151,7 +152,7 @@ def identify(
             )
         at("scalars of laws")
         columns = None if study.estimate.columns == "all" else tuple(study.estimate.columns)
-        laws = fit_laws(model, whole_records(own), columns, weights=weighted)
+        laws = fit_laws(model, in_memory(own, NEED_WHOLE), columns, weights=weighted)
         model = cast(GeneratedModel, BoundModel(model, laws.constants))
         own, further, load = transmitted(model, own, further, weighted)
     chosen = {"lowpass": lowpass} if lowpass else {}
@@ -272,7 +273,7 @@ def identify(
             told = (*observation.findings, *gears.sentences)
             fit = replace(fit, provenance={**fit.provenance, "elastic": gears.summary()})
             result = replace(result, observation=replace(observation, findings=told), estimate=fit)
-        whole = whole_records(own) if friction or study.payload is not None else []
+        whole = in_memory(own, NEED_WHOLE) if friction or study.payload is not None else []
         return replace(
             result,
             payload=None
@@ -306,16 +307,6 @@ def feasibility_of(result: Identification) -> Feasibility:
         return judged
     wider = max(1.0, float(np.median(fit.sigma_corrected / fit.sigma)))
     return within_noise(judged, physical, fit.names, fit.X, wider**2 * fit.covariance)
-
-
-def whole_records(records: Sequence[Prepared | Stream]) -> list[Prepared]:
-    """The records, all of them in memory; InputError where one is read by blocks."""
-    whole = [record for record in records if isinstance(record, Prepared)]
-    if len(whole) < len(records):
-        raise InputError(
-            "a load, friction curves and scalars of laws need whole records; set stream: off"
-        )
-    return whole
 
 
 def assess(

@@ -20,7 +20,7 @@ from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, channels_of
 from runtime.records.record import Record
-from runtime.records.stream import Stream
+from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, prepared
 
@@ -49,11 +49,9 @@ def transmitted(
     read = {c: own for c, own in channels_of(model).items() if c.startswith(TRANSMITTED)}
     if not read:
         return tuple(fitted), list(further), ""
-    records = [one for one in fitted if isinstance(one, Prepared)]
-    others = [one for one in further if isinstance(one, Record)]
     names = ", ".join(sorted({name for own in read.values() for name in own}))
-    if len(records) < len(fitted) or len(others) < len(further):
-        raise InputError(f"{names}: the torque of the model needs whole records; set stream: off")
+    who = f"{names}: the torque of the model needs"
+    records, others = in_memory(fitted, who), in_memory(further, who)
     torque = _Torque(model, read)
     X, records = np.zeros(len(model.BASE_PARAMETERS)), [torque.given(r, None) for r in records]
     before = np.zeros(0)

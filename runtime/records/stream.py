@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
+from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.records.record import Origin, Record, known_text
 
 Array = np.ndarray
+T = TypeVar("T")
 Block = tuple[Array, Array, Array, Array]
 Part = tuple[Array, Array, Array, Array, Mapping[str, Array]]  # a block and its channels
 
@@ -196,3 +199,11 @@ def _joined(parts: Sequence[Part], own: slice) -> Part:
     t, q, tau, missing = (np.concatenate(x)[own] for x in columns)
     channels = {key: np.concatenate([x[key] for x in named])[own] for key in named[0]}
     return t, q, tau, missing, channels
+
+
+def in_memory(records: Sequence[T | Stream], who: str) -> list[T]:
+    """The records, none of them read by blocks; InputError "`who` whole records" where one is."""
+    whole = [record for record in records if not isinstance(record, Stream)]
+    if len(whole) < len(records):
+        raise InputError(f"{who} whole records; set stream: off")
+    return whole
