@@ -259,11 +259,7 @@ def held_out_weight(
     Errors of the fifths add up, and none is below that of the least squares of its own rows: a
     weight is left as soon as it cannot be the best.
     """
-    t0, t1 = observation.span
-    number = np.minimum(
-        (LIMIT.HELD_OUT_PARTS * (observation.t - t0) / (t1 - t0)).astype(int),
-        LIMIT.HELD_OUT_PARTS - 1,
-    )
+    number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
     parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
     others = [
         Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())

@@ -28,7 +28,12 @@ from runtime.identification.elastic import elasticity
 from runtime.identification.friction import friction_curves
 from runtime.identification.homogeneity import homogeneity
 from runtime.identification.laws import fit_laws
-from runtime.identification.parameter_sets import SetName, best_set, parameter_sets
+from runtime.identification.parameter_sets import (
+    SetName,
+    best_set,
+    held_out_validation,
+    parameter_sets,
+)
 from runtime.identification.payload_study import payload_study
 from runtime.identification.result import Identification
 from runtime.identification.torque_law import completed, gain_doubt
@@ -229,6 +234,9 @@ def identify(
             validation.append(
                 cross_validation(observation, parts, how, name=fitted, model=model, fitted=known)
             )
+        halved = not parts and not study.validate.split and "feasible" in sets
+        if halved and validation and best_set(validation[0].errors()) == "all":
+            validation = [held_out_validation(observation, how, model=model)]
         missing += [text for part in validation for text in part.missing]
         errors = validation[-1].errors() if validation and sets else {}
         best = best_set(errors, study.essential.first)

@@ -81,8 +81,8 @@ class Identification:
     comparison : tuple of JointComparison
         Torques by joint beside W X of `model_estimate`.
     validation : tuple of CrossValidation
-        One part of the data predicts the others: windows of the records first, then further
-        records.
+        One part of the data predicts the others: windows of the records first, or each fifth by
+        the other four (`parameter_sets`), then further records.
     correlations : WeakDirections
         Parameters that trade against each other.
     coupling : mapping of Coupling to Estimate

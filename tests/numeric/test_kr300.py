@@ -149,6 +149,23 @@ def test_a_mass_that_the_record_does_not_determine_is_told(robot, tmp_path):
     assert bounded.details["masses"]["M2"]["highest"] <= 1600
 
 
+def test_halves_that_leave_friction_open_do_not_choose_the_set(robot):
+    """Axis 3 moves one way in the first half of A but for a few rows: the fit of that half leaves
+    171 % of the second with physical parameters, 136 % with all. Fifths, each predicted by the
+    other four, say 6 and 13 %, and physical parameters predict B with half the error.
+    """
+    model, A, B = robot
+    study = study_from_mapping(
+        kr300.study() | {"signals": {"median": 1, "lowpass": {"cutoff": 40}}}
+    )
+    result = runtime.identify(model, balanced(A), study)
+    assert len(result.validation) == 1 and result.unseen.startswith("a part of the record")
+    assert result.model_columns == "feasible" and result.prediction_error < 10
+    other = runtime.observe(model, balanced(B), study)
+    physical, free = (prediction_errors(other, result.sets[s])[0] for s in ("feasible", "all"))
+    assert physical < 0.6 * free
+
+
 @campaign
 def test_one_call_finds_the_best_treatment(robot):
     """Judged on the same rows: the counterbalance known, then without rest, then all rows; the

@@ -9,9 +9,11 @@ import pytest
 from planar_data import OLS, TRUE, motion, observation
 
 from runtime.errors import InputError
+from runtime.identification.parameter_sets import held_out_validation
 from runtime.identification.validation import (
     cross_validation,
     direct_comparison,
+    prediction_errors,
     split_validation,
     weak_directions,
 )
@@ -125,3 +127,16 @@ def test_correlations_are_those_of_the_covariance():
     for pair in found.pairs:
         i, k = seen.names.index(pair.first), seen.names.index(pair.second)
         assert np.isclose(pair.correlation, C[i, k] / np.sqrt(C[i, i] * C[k, k]))
+
+
+def test_each_fifth_is_predicted_by_the_others():
+    whole = observation(noise=(0.3, 0.05), seed=1)
+    result = held_out_validation(whole, {"all": OLS})
+    number = whole.equal_parts(5)
+    assert [np.ptp(whole.t[number == p]) for p in range(5)] == pytest.approx([2] * 5, abs=0.1)
+    assert not any(p.fitted for p in result.predictions) and not result.missing
+    for p, prediction in enumerate(result.predictions):
+        others = estimate_of(whole.where(number != p), OLS)
+        total, by_joint = prediction_errors(whole.where(number == p), others)
+        assert (prediction.relative_error, prediction.per_joint) == (total, by_joint)
+    assert result.errors() == {"all": max(p.relative_error for p in result.predictions)}
