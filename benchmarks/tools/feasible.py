@@ -22,7 +22,7 @@ def feasible(urdf: str, coupled: tuple[int, ...], states: list[Array], torque: A
     n = model.nv
     W = columns(model, model.createData(), coupled, *states)
     scale = np.linalg.norm(W, axis=0)
-    scale[scale == 0] = 1.0
+    scale[scale < 1e-9 * scale.max()] = 1.0  # columns that are rounding alone
     U, s, Vt = np.linalg.svd(W / scale, full_matrices=True)
     rank = int(np.sum(s > 1e-9 * s[0]))
     X0 = Vt[:rank].T @ (U[:, :rank].T @ torque.ravel() / s[:rank]) / scale
