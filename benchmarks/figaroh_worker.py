@@ -22,9 +22,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas
-from figaroh.identification.base_identification import BaseIdentification
-from figaroh.tools.regressor import build_regressor_basic
 from figaroh.tools.robot import Robot
+
+sys.path.insert(0, str(Path(__file__).resolve().parent / "tools"))
+
+from tool_figaroh import Configured
 
 LINK = """<link name="link{j}"><inertial><origin xyz="0 0 0"/><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -44,30 +46,15 @@ def urdf(frames):
     return text + "</robot>"
 
 
-class Identification(BaseIdentification):
+class Identification(Configured):
     """The job with settings in place of a configuration file."""
 
     def __init__(self, robot, settings):
         self.settings = settings
-        super().__init__(robot)
+        super().__init__(robot, coupled=(4, 5))
         self.filter_config = {
             "differentiation_method": "gradient",
             "filter_params": settings["filter"],
-        }
-
-    def load_param(self, config_file, setting_type="identification"):
-        n = self.model.nv
-        self.identif_config = {
-            "act_idxq": list(range(n)),
-            "act_idxv": list(range(n)),
-            "active_joints": list(self.model.names[1:]),
-            "has_friction": True,
-            "has_actuator_inertia": True,
-            "has_joint_offset": True,
-            "is_joint_torques": True,
-            "is_external_wrench": False,
-            "force_torque": None,
-            **{key: [0.0] * n for key in ("fv", "fs", "Ia", "off")},
         }
 
     def load_trajectory_data(self, data_source=None):
@@ -82,25 +69,6 @@ class Identification(BaseIdentification):
             "accelerations": None,
             "torques": tau @ ratio,
         }
-
-    def calculate_full_regressor(self):
-        v, a = self.processed_data["velocities"], self.processed_data["accelerations"]
-        W = build_regressor_basic(
-            self.robot, self.processed_data["positions"], v, a, self.identif_config
-        )
-        wrist = np.zeros((6, len(v), 3))
-        wrist[4] = np.stack([a[:, 5], v[:, 5], np.sign(v[:, 4] + v[:, 5])], axis=1)
-        wrist[5] = np.stack([a[:, 4], v[:, 4], np.sign(v[:, 4] + v[:, 5])], axis=1)
-        self.dynamic_regressor = np.hstack([W, wrist.reshape(-1, 3)])
-
-    def initialize_standard_parameters(self):
-        super().initialize_standard_parameters()
-        self.standard_parameter.update({"Iam6": 0.0, "fvm6": 0.0, "fsm6": 0.0})
-
-    def _compute_validation_metrics(self):
-        """Left out: without other data figaroh would evaluate the regressor of the same record once
-        more.
-        """
 
 
 def job(robot, settings):

@@ -9,9 +9,9 @@ predicted, whose torques have no noise; pinocchio makes all torques.
 Treatment of the arrays that every tool is given: Butterworth of order 4 without lag on positions
 and torques, central differences twice, 0.1 s of each end left out, samples left out where a joint
 is slower than a hundredth of its largest speed, every k-th sample so that some 1,500 stay. The
-cut-off is each tool's own choice out of CUTOFFS: the one by which a fit of half of the fitted rows
-predicts the other half best, both ways. What is predicted is treated by the cut-off `score` of the
-record, which no tool chooses.
+cut-off is each tool's own choice out of CUTOFFS: the one by which a fit of half of the record
+predicts the other half best, both ways; of Go2, run 0 and run 1. What is predicted is treated by
+the cut-off `score` of the record, which no tool chooses.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,7 +31,7 @@ import symgen
 from runtime.files import read_bytes
 from runtime.model.drives import Drives
 from runtime.records.datasets import fetch
-from symgen.description import load_robot
+from symgen.description import Robot, load_robot
 from symgen.description.files import write_robot
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,10 +53,6 @@ class Piece:
     t: Array
     q: Array
     tau: Array
-
-    def halves(self) -> tuple[Piece, Piece]:
-        k = len(self.t) // 2
-        return self.cut(slice(0, k)), self.cut(slice(k, None))
 
     def cut(self, rows: slice | Array) -> Piece:
         return Piece(self.t[rows], self.q[rows], self.tau[rows])
@@ -91,14 +87,25 @@ class Case:
     exact: tuple[Array, ...] = ()
     repeats: tuple[tuple[Piece, ...], ...] = ()
 
+    def halves(self) -> tuple[Piece, Piece]:
+        """Two parts of what is fitted, by which settings are chosen."""
+        if len(self.train) > 1:
+            return self.train[0], self.train[1]
+        k = len(self.train[0].t) // 2
+        return self.train[0].cut(slice(0, k)), self.train[0].cut(slice(k, None))
+
+    @cached_property
+    def description(self) -> Robot:
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"{self.name}.{self.suffix}"
+            path.write_text(self.robot, encoding="utf-8")
+            return load_robot(str(path))
+
     def urdf(self) -> str:
         """The URDF of the robot; names of joints that sort as their numbers do."""
         if self.suffix == "urdf":
             return self.robot
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / f"{self.name}.{self.suffix}"
-            path.write_text(self.robot, encoding="utf-8")
-            text = write_robot(load_robot(str(path)), "robot.urdf")[0]
+        text = write_robot(self.description, "robot.urdf")[0]
         for j in range(1, 10):
             text = text.replace(f'"joint{j}"', f'"joint0{j}"').replace(f'"link{j}"', f'"link0{j}"')
         return text
@@ -107,16 +114,12 @@ class Case:
         """d, a, alpha and angle of the frames, (n + 1, 4), modified Denavit and Hartenberg, a and
         alpha a line up as Craig counts them; empty for a tree or a sliding joint.
         """
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / f"{self.name}.{self.suffix}"
-            path.write_text(self.robot, encoding="utf-8")
-            robot = load_robot(str(path))
-        frames = [f for f in robot.frames if f.sigma != 2]
+        frames = [f for f in self.description.frames if f.sigma != 2]
         if any(f.sigma != 0 or f.ant != f.j - 1 for f in frames):
             return np.zeros((0, 4))
         rows = np.zeros((len(frames) + 1, 4))
         for k, f in enumerate(frames):
-            value = robot.constants
+            value = self.description.constants
             rows[k, 1:3] = f.d.value(value), f.alpha.value(value)
             rows[k, 3] = f.theta.value({**value, f"q{f.j}": 0.0})
             rows[k + 1, 0] = f.r.value(value)

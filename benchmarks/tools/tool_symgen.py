@@ -8,16 +8,25 @@ import runtime
 import symgen
 
 
-def fit(job, chosen="model_estimate"):
-    model = symgen.model(job.robot)
-    ends = np.cumsum(job.lengths)[:-1]
-    pieces = (np.split(x, ends) for x in (job.t, job.raw_q, job.raw_tau))
-    records = [runtime.Record(*piece) for piece in zip(*pieces, strict=True)]
+def given(job):
+    pieces = (np.split(x, np.cumsum(job.lengths)[:-1]) for x in (job.t, job.raw_q, job.raw_tau))
     study = runtime.Study(
         signals={"median": 1, "lowpass": {"cutoff": job.cutoff}},
         rows={"low_speed": job.slow.tolist()},
         estimate={"method": "wls", "weights": "joint"},
     )
+    return symgen.model(job.robot), [runtime.Record(*p) for p in zip(*pieces, strict=True)], study
+
+
+def answer(model, found):
+    X = np.zeros(len(model.BASE_PARAMETERS))
+    X[[model.BASE_PARAMETERS.index(name) for name in found.names]] = found.X
+    values = zip(found.names, zip(found.X, found.sigma_corrected, strict=True), strict=True)
+    return lambda q, qd, qdd: model.inverse_dynamics(q, qd, qdd, X), dict(values)
+
+
+def fit(job):
+    model, records, study = given(job)
     variants = symgen.variants(job.robot) if job.final else None
     result = runtime.identify(model, records, study, variants=variants)
     if result.plausibility:
@@ -26,18 +35,10 @@ def fit(job, chosen="model_estimate"):
         for check in result.plausibility.checks:
             if check.state in ("no", "doubtful"):
                 print(check.finding)
-    found = getattr(result, chosen)
-    X = np.zeros(len(model.BASE_PARAMETERS))
-    X[[model.BASE_PARAMETERS.index(name) for name in found.names]] = found.X
-
-    def predict(q, qd, qdd):
-        return model.inverse_dynamics(q, qd, qdd, X)
-
-    return predict, {
-        name: (found[name], s) for name, s in zip(found.names, found.sigma_corrected, strict=True)
-    }
+    return answer(model, result.model_estimate)
 
 
 def least_squares(job):
     """All parameters, nothing but the record behind them."""
-    return fit(job, "estimate")
+    model, records, study = given(job)
+    return answer(model, runtime.estimate(model, records, study))

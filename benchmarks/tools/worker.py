@@ -20,7 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-LIMIT = 60  # s of processor, a fit
+LIMIT, WHOLE = 90, 300  # s of processor: of one fit, of all jobs of a folder
 
 
 def late(*_):
@@ -67,7 +67,9 @@ def main(file, function, folder):
         job.robot, job.urdf = str(job.robot), str(job.urdf)
         job.cutoff, job.option = float(job.cutoff), float(job.option)
         job.final, job.folder = bool(job.final), Path(folder)
-        if not answer.get("error", "").startswith("TimeoutError"):  # one such is enough
+        if time.process_time() > WHOLE:
+            answer = {"error": f"TimeoutError: not reached in {WHOLE} s", "said": ""}
+        elif not answer.get("error", "").startswith("TimeoutError"):  # one such is enough
             answer = done(fit, job)
         path.with_suffix(".json").write_text(json.dumps(answer))
 
