@@ -20,7 +20,7 @@ choice of the chapter, it stands for the robot where it predicts as well as the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -115,6 +115,15 @@ def best_set(errors: Mapping[Any, float], essential: bool = False) -> SetName:
         return "essential" if essential else "all"
     limit = LIMIT.PREFERRED_SET * min(known.values())
     return next(name for name, error in known.items() if error <= limit)
+
+
+def whole_set(names: Collection[SetName], model_columns: SetName) -> SetName:
+    """The set with all base parameters that a file or a program is given: `model_columns`, or where
+    that is the essential one, the feasible set if it is among `names`.
+    """
+    if model_columns != "essential":
+        return model_columns
+    return "feasible" if "feasible" in names else "all"
 
 
 def ranking_text(errors: Mapping[SetName, float], counts: Mapping[SetName, int], where: str) -> str:

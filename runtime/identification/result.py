@@ -25,7 +25,13 @@ from runtime.identification.expected_error import expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
 from runtime.identification.laws import FittedLaws
-from runtime.identification.parameter_sets import ORDER, SetName, best_set, ranking_text
+from runtime.identification.parameter_sets import (
+    ORDER,
+    SetName,
+    best_set,
+    ranking_text,
+    whole_set,
+)
 from runtime.identification.payload_study import PayloadStudy
 from runtime.identification.uncertainty import Uncertainty
 from runtime.identification.validation import (
@@ -203,6 +209,13 @@ class Identification:
         method of the study is not linear.
         """
         return self.sets.get(self.model_columns, self.estimate)
+
+    @property
+    def whole_estimate(self) -> Estimate:
+        """All base parameters, for a robot file or a program: `model_estimate`, or the physical
+        ones where the essential ones stand for the robot.
+        """
+        return self.sets.get(whole_set(self.sets, self.model_columns), self.estimate)
 
     @property
     def torque_unit(self) -> str:
@@ -553,6 +566,7 @@ class Identification:
                     "names": fit.names,
                     "X": fit.X,
                     "sigma_corrected": fit.sigma_corrected,
+                    "standard": fit.details.get("standard", {}),
                 }
                 for name, fit in self.sets.items()
             ],

@@ -1,16 +1,20 @@
-"""Layouts of estimate.json and cestac.json as types, and the JSON Schemas made from them and from
-the settings.
+"""Layouts of estimate.json and cestac.json as types, the JSON Schemas made from them and from the
+settings, and the estimate in a file that a robot file or a program is given.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import json
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
+from runtime.errors import InputError
 from runtime.estimators.estimate import SCHEMA as ESTIMATE
-from runtime.estimators.estimate import Estimate, JointFit
+from runtime.estimators.estimate import Estimate, JointFit, load_estimate
+from runtime.identification.parameter_sets import SetName, whole_set
 from runtime.identification.validation import RecordError, WeakDirections
-from runtime.json_documents import Vector, Whole, json_schema
+from runtime.json_documents import NanIfNull, Vector, Whole, from_text, json_schema, read_text
 from runtime.model.drives import Coupling
 from runtime.resolution.result import SCHEMA as CESTAC
 from runtime.resolution.result import LevelResult, Verdict
@@ -78,13 +82,67 @@ class CouplingDocument:
     per_joint: tuple[JointFit, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class SetDocument:
+    """One of the nested sets of parameters (`runtime.identification.parameter_sets`).
+
+    Attributes
+    ----------
+    name : str
+        essential, feasible or all.
+    count : int
+        Number of parameters b.
+    relative_error : float, %
+        100 ||Y - W X|| / ||Y||.
+    unseen : float, %
+        Error on data that the set was not fitted to; null where nothing was predicted.
+    names : tuple of str
+        Names in column order.
+    X : ndarray, shape (b,), SI
+        Values.
+    sigma_corrected : ndarray, shape (b,), SI
+        Standard deviations without the assumption of independent residuals.
+    standard : mapping, SI
+        Standard parameters of the physical robot, by name; empty for the other sets.
+    """
+
+    name: SetName
+    count: Whole
+    relative_error: NanIfNull
+    unseen: NanIfNull
+    names: tuple[str, ...]
+    X: Vector
+    sigma_corrected: Vector
+    standard: dict[str, float]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class IdentificationDocument(Estimate):
-    """Parameters of a robot with their uncertainty; with the keys from `essential` on where a whole
+class SetsDocument(Estimate):
+    """All parameters by the method of the study, and the nested sets beside them.
+
+    Attributes
+    ----------
+    sets : tuple of SetDocument
+        Empty where the method is not linear.
+    model_columns : str
+        Name of the set that stands for the robot.
+    """
+
+    sets: tuple[SetDocument, ...]
+    model_columns: SetName
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentificationDocument(SetsDocument):
+    """Parameters of a robot with their uncertainty; with the keys from `sets` on where a whole
     identification is written.
 
     Attributes
     ----------
+    sets : tuple of SetDocument
+        The essential, the feasible and all parameters; empty where the method is not linear.
+    model_columns : str
+        Name of the set that stands for the robot.
     essential : EssentialDocument
         Essential parameters, fitted alone.
     validation : tuple of mapping
@@ -185,6 +243,37 @@ class CestacDocument:
     settings: dict[str, Any]
     provenance: dict[str, Any]
     notes: tuple[str, ...] = ()
+
+
+def load_whole_estimate(path: Path | str) -> Estimate:
+    """The estimate of all base parameters in estimate.json that a robot file or a program is given:
+    of the set that stands for the robot, or where that is the essential one, of the physical
+    parameters (`whole_set`). Of its fields, names, X, sigma_corrected, relative_error and
+    details.standard are those of that set; the others, the covariance among them, those of
+    least squares. InputError as `load_estimate`.
+    """
+    fit = load_estimate(path)
+    if not json.loads(read_text(path)).get("sets"):
+        return fit
+    document = from_text(SetsDocument, read_text(path), ESTIMATE, str(path))
+    sets = {own.name: own for own in document.sets}
+    own = sets.get(whole_set(sets, document.model_columns))
+    if (
+        own is None
+        or own.names != fit.names
+        or not len(own.X) == len(own.sigma_corrected) == len(fit.X)
+    ):
+        raise InputError(
+            "its sets are not those of its parameters; the file was changed", file=str(path)
+        )
+    return replace(
+        fit,
+        method="feasible" if own.name == "feasible" else fit.method,
+        X=own.X,
+        sigma_corrected=own.sigma_corrected,
+        relative_error=own.relative_error,
+        details={**fit.details, **({"standard": own.standard} if own.standard else {})},
+    )
 
 
 def schemas() -> dict[str, str]:

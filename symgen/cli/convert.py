@@ -58,8 +58,8 @@ def convert(
         Path | None,
         typer.Option(
             help=(
-                "The same from estimate.json of a feasible estimate (study: estimate: {method: "
-                "feasible})."
+                "The same from estimate.json of an identification with physical parameters, as "
+                "`symgen identify -o` writes it."
             )
         ),
     ] = None,
@@ -91,11 +91,10 @@ def convert(
 
             robot = with_values(robot, values_of_csv(read_bytes(values), str(values)))
         if estimate is not None:
-            from runtime.estimators.estimate import load_estimate
+            from runtime.identification.schemas import load_whole_estimate
 
-            robot = with_estimate(
-                robot, load_estimate(estimate).details.get("standard"), str(estimate)
-            )
+            standard = load_whole_estimate(estimate).details.get("standard")
+            robot = with_estimate(robot, standard, str(estimate))
         comments = [f"Converted from {robot.file}.", *([robot.angles] if exact else []), *read]
         text, written = write_robot(robot, output.name, comments=comments)
         write_all(output.parent, {output.name: text})

@@ -165,14 +165,14 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Measured and predicted torques of one `record` of the run in the folder `run`, fitted or to
     validate on, with positions, at instants that its estimate read.
     """
-    from runtime.estimators.estimate import load_estimate
+    from runtime.identification.schemas import load_whole_estimate
     from runtime.identification.validation import direct_comparison
     from runtime.records.record import Record
     from runtime.rows.prepared import prepared
 
     place = Path(request["run"])
     loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
-    fit = load_estimate(place / "estimate.json")
+    fit = load_whole_estimate(place / "estimate.json")
     if not isinstance(record, Record):
         raise InputError("the record is read by blocks; its report shows the torques")
     own = prepared(loaded, record, study)

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.estimators.estimate import Estimate, load_estimate
+from runtime.estimators.estimate import Estimate
+from runtime.identification.schemas import load_whole_estimate
 from runtime.model.generated import load_model
 from runtime.model.inertia import PhysicalModel, physical_model
 from symgen.certify.modules import model as emitted
@@ -55,8 +56,9 @@ def apply(
     Parameters
     ----------
     estimate : Estimate, Identification, str or Path
-        Result, its estimate.json, or the folder that `symgen identify -o` wrote. All base
-        parameters, not the essential ones alone.
+        Result, its estimate.json, or the folder that `symgen identify -o` wrote. Of a whole
+        identification the parameters that stand for the robot are taken, or the physical ones where
+        the essential ones do (`Identification.whole_estimate`).
     model : str or Path
         The file: .urdf, or .xml and .mjcf (MJCF).
     robot : str or Path, optional
@@ -143,8 +145,8 @@ def apply(
 def _estimate(given: Any) -> Estimate:
     if isinstance(given, str | Path):
         path = Path(given)
-        return load_estimate(path / "estimate.json" if path.is_dir() else path)
-    given = getattr(given, "estimate", given)
+        return load_whole_estimate(path / "estimate.json" if path.is_dir() else path)
+    given = getattr(given, "whole_estimate", given)
     if not isinstance(given, Estimate):
         raise DescriptionError(
             f"{type(given).__name__} given as estimate; expected an Estimate, an Identification, "

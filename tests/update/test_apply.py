@@ -4,6 +4,7 @@ what is refused, and that nothing is half-written.
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,13 @@ import pytest
 from campaign import campaign, sampled
 from numpy.testing import assert_allclose
 
+import runtime
 import symgen
 from oracles import mjcf_robots, urdf_robots
 from oracles.applying import exact, motion, other_values, skeleton, torques_of
 from oracles.mjcf_robots import ARM, BRANCHES, GRIPPER
 from runtime.errors import InputError
+from runtime.settings.study import EssentialSettings
 from symgen.description.files import read_robot
 from symgen.description.xml_text import MAX_BYTES
 from symgen.errors import DescriptionError
@@ -225,6 +228,40 @@ def test_what_no_physical_robot_has_is_refused_with_the_reason(tmp_path) -> None
         symgen.apply(exact(model, dict(model.VALUES) | INFEASIBLE), path)
     with pytest.raises(DescriptionError, match=r"no physical robot.*link '(fore|sensor|tool)'"):
         symgen.apply(exact(model, dict(model.VALUES) | {"ZZ2": -0.5, "XX2": -0.5}), path)
+
+
+def test_the_parameters_printed_first_are_written(tmp_path) -> None:
+    """Least squares of a noisy record is no robot (friction below zero); the physical set is."""
+    path = written(tmp_path, "arm.urdf")
+    model = symgen.model(read_robot(path)[0])
+    t, *states = motion(len(model.JOINTS), 5, 8)
+    chi = other_values(model, 4) | {"FV1": 0.0, "FS1": 0.0}
+    torque = model.inverse_dynamics(*states, np.asarray(model.base_parameters(chi)))
+    noise = np.random.default_rng(3).normal(size=torque.shape) * 0.3 * torque.std(0)
+    record = runtime.Record(t, states[0], torque + noise)
+    result = runtime.identify(model, record)
+    with pytest.raises(DescriptionError, match="no physical robot"):
+        symgen.apply(result.estimate, path)
+    assert result.model_columns == "feasible"
+    applied = symgen.apply(result, path)
+    runtime.report(result, tmp_path / "results")
+    assert symgen.apply(tmp_path / "results", path).content == applied.content
+    out = applied.write(tmp_path / "identified.urdf")
+    X = result.sets["feasible"].X
+    assert_allclose(
+        torques_of(out, model, tuple(states), dict(applied.placeless), {}),
+        model.inverse_dynamics(*states, X),
+        atol=1e-6 * np.abs(torque).max(),
+    )
+    study = runtime.Study(essential=EssentialSettings(first=True))
+    chapter = runtime.identify(model, record, study)
+    assert chapter.whole_estimate is chapter.sets["feasible"]
+
+    document = json.loads((tmp_path / "results" / "estimate.json").read_text())
+    next(own for own in document["sets"] if own["name"] == "feasible")["X"].pop()
+    (tmp_path / "results" / "estimate.json").write_text(json.dumps(document))
+    with pytest.raises(InputError, match="sets are not those of its parameters"):
+        symgen.apply(tmp_path / "results", path)
 
 
 def test_estimates_of_other_robots_are_refused(tmp_path) -> None:
