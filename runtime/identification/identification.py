@@ -19,36 +19,21 @@ import numpy as np
 from runtime.blas import single_threaded
 from runtime.checks.plausibility import plausibility
 from runtime.errors import InputError
-from runtime.estimators.essential import essential_of
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.method import LINEAR, linear_companion
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.cutoff_errors import cutoff_errors, cutoff_text
 from runtime.identification.elastic import elasticity
+from runtime.identification.fits import agreement, fitted, validated
 from runtime.identification.friction import friction_curves
-from runtime.identification.homogeneity import homogeneity
-from runtime.identification.laws import fit_laws
-from runtime.identification.parameter_sets import (
-    SetName,
-    best_set,
-    held_out_validation,
-    parameter_sets,
-)
+from runtime.identification.laws import FittedLaws, fit_laws
 from runtime.identification.payload_study import payload_study
 from runtime.identification.result import Identification
 from runtime.identification.torque_law import completed, gain_doubt
 from runtime.identification.transmitted import transmitted
 from runtime.identification.uncertainty import uncertainty
-from runtime.identification.validation import (
-    CrossValidation,
-    cross_validation,
-    direct_comparison,
-    split_validation,
-    weak_directions,
-)
+from runtime.identification.validation import direct_comparison, weak_directions
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of, simulator_of
 from runtime.loop.methods import observed as method_observation
+from runtime.loop.methods import simulator_of
 from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import physical_model
@@ -60,7 +45,7 @@ from runtime.records.record import Record
 from runtime.records.stream import Stream, in_memory
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
-from runtime.rows.observation import halves
+from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, prepared, resolved
 from runtime.settings.record import behind_gears
 from runtime.settings.study import Study
@@ -72,6 +57,8 @@ if TYPE_CHECKING:
 __all__ = ["Identification", "assess", "feasibility_of", "identify"]
 
 T = TypeVar("T")
+Measured = tuple[Prepared | Stream, ...]
+"""Records as the study reads them."""
 NEED_WHOLE = "a load, friction curves and scalars of laws need"
 SIMULATING = ("iv", "didim", "cloe")
 OF_DRIVES = ("inertia", "viscous", "coulomb")
@@ -138,7 +125,7 @@ def identify(
     records = tuple(records) if isinstance(records, Sequence) else (records,)
     asked_study = of_links(model, study or Study())
     study, lowpass = resolved(asked_study, records)
-    own = tuple(
+    measured: Measured = tuple(
         record if isinstance(record, Stream) else prepared(model, record, study)
         for record in records
     )
@@ -146,151 +133,128 @@ def identify(
         further = records_or_streams(
             study.validate.record, model, study.stream, missing=study.signals.admits_missing
         )
-    weighted = study.estimate.weights != "none"
-    own, further, load = transmitted(model, own, further, weighted)
-    laws = None
-    if hasattr(model, "FIT"):
-        if study.estimate.method in SIMULATING:
-            raise InputError(
-                f"scalars of laws are not fitted by {study.estimate.method}, which simulates the "
-                "loop with those of the file; fit them by ols, then fix them: fit: {vs: 0.08}"
-            )
-        at("scalars of laws")
-        columns = None if study.estimate.columns == "all" else tuple(study.estimate.columns)
-        laws = fit_laws(model, in_memory(own, NEED_WHOLE), columns, weights=weighted)
-        model = cast(GeneratedModel, BoundModel(model, laws.constants))
-        own, further, load = transmitted(model, own, further, weighted)
-    chosen = {"lowpass": lowpass} if lowpass else {}
-    provenance = {**origin(records), **chosen, **(provenance or {})}
+    model, laws, measured, further, load = _with_laws(model, study, measured, further)
     simulator = simulator or simulator_of(model, study)
-    asked = variants is not None if plausible is None else plausible
-    own, further, law = completed(model, study, own, further)
-    if law is not None:
-        provenance["law"] = law.summary()
+    plausible = variants is not None if plausible is None else plausible
+    measured, further, law = completed(model, study, measured, further)
+    provenance = {
+        **origin(records),
+        **({"lowpass": lowpass} if lowpass else {}),
+        **(provenance or {}),
+        **({"law": law.summary()} if law else {}),
+    }
+    names = record_names([*records, *further])
+    own_names, further_names = names[: len(records)], names[len(records) :]
     with started(workers) as processes:
-        judged = (
-            processes.meanwhile(partial(plausibility, model, own, asked_study, variants=variants))
-            if asked
-            else None
-        )
-        observed = partial(method_observation, model, study=study, workers=processes)
-        observation = observed(own, simulator=simulator)
-        told = (*observation.findings, *([law.text] if law else []), *([load] if load else []))
-        observation = replace(observation, findings=told)
-        memory = [one for one in own if isinstance(one, Prepared)]
-        short = sum(len(one.record) for one in memory) <= LIMIT.CUTOFF_SAMPLES
-        low = asked_study.signals.lowpass
-        if asked and lowpass and low and low.cutoff == "auto" and len(memory) == len(own) and short:
-            at("other cut-offs")
-            by_cutoff = cutoff_errors(model, memory, study)
-            hertz = study.signals.lowpass.hertz if study.signals.lowpass else 0.0
-            provenance["lowpass"] = lowpass + cutoff_text(by_cutoff, hertz)
-        at("least squares, essential parameters")
-        reduced = essential_of(
-            observation,
-            study.essential,
-            linear_companion(study.estimate),
-            model=model,
-            provenance=provenance,
-        )
-        sets: dict[SetName, Estimate] = {}
-        missing: list[str] = []
-        if study.estimate.method in LINEAR:
-            sets, how, note = parameter_sets(observation, study.estimate, reduced, model=model)
-            fit, missing = reduced.all_parameters, [note] if note else []
-        else:
-            at(study.estimate.method)
-            fit = estimate_of(observation, study.estimate, model=model, provenance=provenance)
-            how = {
-                "all": study.estimate,
-                "essential": replace(study.estimate, columns=reduced.names),
-            }
-        if doubt := gain_doubt(model, study, own, fit.relative_error):
-            observation = replace(observation, findings=(*observation.findings, doubt))
-        windows = study.validate.split or halves(*observation.span)
-        names = record_names([*records, *further])
-        fitted, others = ", ".join(names[: len(records)]), names[len(records) :]
-        validation: list[CrossValidation] = []
-        ended = (
-            fit.status == "ok" or study.estimate.method in LINEAR
-        )  # else each validation would simulate a loop that is wrong once more
-        if ended:
-            at("validation")
-            try:
-                validation = [split_validation(observation, windows, how, model=model)]
-            except InputError as e:
-                missing = [*missing, f"validation between windows of the record: {e}"]
-        else:
-            missing = [
-                *missing,
-                f"validation: {study.estimate.method} ended with status {fit.status}",
-            ]
-        parts = {
-            name: observed([record], windows=())
-            for name, record in zip(others, further, strict=True)
+        checks = partial(plausibility, model, measured, asked_study, variants=variants)
+        judged = processes.meanwhile(checks) if plausible else None
+        observe = partial(method_observation, model, study=study, workers=processes)
+        observation = observe(measured, simulator=simulator)
+        observation = _with_findings(observation, law.text if law else "", load)
+        if plausible and lowpass:
+            provenance["lowpass"] += _other_cutoffs(model, measured, study, asked_study)
+        fits = fitted(observation, study, model, provenance)
+        doubt = gain_doubt(model, study, measured, fits.estimate.relative_error)
+        observation = _with_findings(observation, doubt)
+        unseen = {
+            name: observe([record], windows=())
+            for name, record in zip(further_names, further, strict=True)
         }
-        if parts and ended:
-            known = sets or {"all": fit}
-            validation.append(
-                cross_validation(observation, parts, how, name=fitted, model=model, fitted=known)
-            )
-        halved = not parts and not study.validate.split and "feasible" in sets
-        if halved and validation and best_set(validation[0].errors()) == "all":
-            validation = [held_out_validation(observation, how, model=model)]
-        missing += [text for part in validation for text in part.missing]
-        errors = validation[-1].errors() if validation and sets else {}
-        best = best_set(errors, study.essential.first)
-        comparison = direct_comparison(observation.first_rows, sets.get(best, fit))
-        each = (
-            {name: observation.of_record(k) for k, name in enumerate(names[: len(records)])}
-            if len(names) > 1
-            else {}
+        validation, missing = validated(
+            fits, observation, unseen, study, model, ", ".join(own_names)
         )
-        parts = {**each, **parts} if each else {}
-        agreement = None
-        for columns in (reduced.all_parameters.names, reduced.names) if parts else ():
-            agreement = homogeneity(parts, columns, study.estimate, model=model)
-            if not agreement.untested:  # else fewer columns, that each record determines
-                break
-        held = [one for one in own if isinstance(one, Prepared)]
+        comparison = direct_comparison(observation.first_rows, fits.best(validation, study))
         result = Identification(
             model=model,
             study=study,
-            prepared=own,
+            prepared=measured,
             observation=observation,
-            estimate=fit,
-            essential=reduced,
+            estimate=fits.estimate,
+            essential=fits.reduced,
             comparison=comparison,
-            validation=tuple(validation),
-            sets=sets,
-            homogeneity=agreement,
-            missing=tuple(missing),
+            validation=validation,
+            sets=fits.sets,
+            homogeneity=agreement(fits, observation, own_names, unseen, study, model),
+            missing=missing,
             correlations=weak_directions(observation, study.estimate),
             coupling=coupling_fits(
-                model, own, study, observation, fit, partial(observed, windows=())
+                model, measured, study, observation, fits.estimate, partial(observe, windows=())
             ),
-            uncertainty=uncertainty(observation, study.estimate, reduced, comparison),
+            uncertainty=uncertainty(observation, study.estimate, fits.reduced, comparison),
             laws=laws,
         )
         if physical and not result.determined:
-            groups = "; ".join(", ".join(group) for group in fit.groups)
+            groups = "; ".join(", ".join(group) for group in result.estimate.groups)
             text = f"physical consistency: the record does not tell apart {groups}"
-            result, physical = replace(result, missing=(*result.missing, text)), False
-        gears = elasticity(model, held, fit.names, fit.X) if result.determined else None
-        if gears is not None:
-            told = (*observation.findings, *gears.sentences)
-            fit = replace(fit, provenance={**fit.provenance, "elastic": gears.summary()})
-            result = replace(result, observation=replace(observation, findings=told), estimate=fit)
-        whole = in_memory(own, NEED_WHOLE) if friction or study.payload is not None else []
+            result, physical = replace(result, missing=(*missing, text)), False
+        result = _with_elasticity(result)
+        whole = in_memory(measured, NEED_WHOLE) if friction or study.payload is not None else []
         return replace(
             result,
             payload=None
             if study.payload is None
             else payload_study(model, whole, study, provenance=origin(records)),
             feasibility=feasibility_of(result) if physical else None,
-            friction=friction_curves(model, whole, study, fit) if friction else (),
+            friction=friction_curves(model, whole, study, result.estimate) if friction else (),
             plausibility=judged() if judged else None,
         )
+
+
+def _with_laws(
+    model: GeneratedModel, study: Study, measured: Measured, further: Sequence[Record | Stream]
+) -> tuple[GeneratedModel, FittedLaws | None, Measured, Sequence[Record | Stream], str]:
+    """The model with the scalars of its laws fitted, these, the records with the torque that each
+    joint transmits, and a sentence on that torque ("": no column reads it).
+    """
+    weighted = study.estimate.weights != "none"
+    loaded, others, load = transmitted(model, measured, further, weighted)
+    if not hasattr(model, "FIT"):
+        return model, None, loaded, others, load
+    if study.estimate.method in SIMULATING:
+        raise InputError(
+            f"scalars of laws are not fitted by {study.estimate.method}, which simulates the "
+            "loop with those of the file; fit them by ols, then fix them: fit: {vs: 0.08}"
+        )
+    at("scalars of laws")
+    columns = None if study.estimate.columns == "all" else tuple(study.estimate.columns)
+    laws = fit_laws(model, in_memory(loaded, NEED_WHOLE), columns, weights=weighted)
+    model = cast(GeneratedModel, BoundModel(model, laws.constants))
+    return model, laws, *transmitted(model, loaded, others, weighted)
+
+
+def _with_findings(observation: Observation, *sentences: str) -> Observation:
+    return replace(observation, findings=(*observation.findings, *filter(None, sentences)))
+
+
+def _other_cutoffs(
+    model: GeneratedModel, measured: Measured, study: Study, asked_study: Study
+) -> str:
+    """What other cut-offs than an automatic one would give, a sentence; "" where the cut-off was
+    given or the records are long.
+    """
+    records, asked = [one for one in measured if isinstance(one, Prepared)], asked_study.signals
+    short = sum(len(one.record) for one in records) <= LIMIT.CUTOFF_SAMPLES
+    automatic = asked.lowpass is not None and asked.lowpass.cutoff == "auto"
+    if not automatic or not short or len(records) < len(measured):
+        return ""
+    at("other cut-offs")
+    hertz = study.signals.lowpass.hertz if study.signals.lowpass else 0.0
+    return cutoff_text(cutoff_errors(model, records, study), hertz)
+
+
+def _with_elasticity(result: Identification) -> Identification:
+    """The result with the stiffness of transmissions whose motor and link are both measured."""
+    if not result.determined:
+        return result
+    fit, records = result.estimate, [one for one in result.prepared if isinstance(one, Prepared)]
+    elastic = elasticity(result.model, records, fit.names, fit.X)
+    if elastic is None:
+        return result
+    return replace(
+        result,
+        observation=_with_findings(result.observation, *elastic.sentences),
+        estimate=replace(fit, provenance={**fit.provenance, "elastic": elastic.summary()}),
+    )
 
 
 def of_links(model: GeneratedModel, study: Study) -> Study:

@@ -1,0 +1,143 @@
+"""Fits of all rows: all parameters, the essential ones, the nested sets; and what each predicts of
+rows that did not give it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from runtime.errors import InputError
+from runtime.estimators.essential import Essential, essential_of
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.method import LINEAR, linear_companion
+from runtime.identification.homogeneity import Homogeneity, homogeneity
+from runtime.identification.parameter_sets import (
+    SetName,
+    best_set,
+    held_out_validation,
+    parameter_sets,
+)
+from runtime.identification.validation import (
+    CrossValidation,
+    cross_validation,
+    split_validation,
+)
+from runtime.loop.methods import estimate_of
+from runtime.model.generated import GeneratedModel
+from runtime.progress import at
+from runtime.rows.observation import Observation, halves
+from runtime.settings.study import EstimateSettings, Study
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Fits of all rows.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        All parameters, by the method of the study.
+    reduced : Essential
+        By its linear companion.
+    sets : mapping of str to Estimate
+        The nested sets; empty where the method is not linear.
+    settings : mapping of str to EstimateSettings
+        Settings that give each set from parts of the rows.
+    missing : tuple of str
+        Why a set is not there.
+    """
+
+    estimate: Estimate
+    reduced: Essential
+    sets: Mapping[SetName, Estimate]
+    settings: Mapping[Any, EstimateSettings]
+    missing: tuple[str, ...] = ()
+
+    def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
+        """The estimate that stands for the robot."""
+        errors = validation[-1].errors() if validation and self.sets else {}
+        return self.sets.get(best_set(errors, study.essential.first), self.estimate)
+
+
+def fitted(
+    observation: Observation, study: Study, model: GeneratedModel, provenance: Mapping[str, Any]
+) -> Fits:
+    """All parameters, the essential ones, and the nested sets of a linear method."""
+    at("least squares, essential parameters")
+    reduced = essential_of(
+        observation,
+        study.essential,
+        linear_companion(study.estimate),
+        model=model,
+        provenance=provenance,
+    )
+    if study.estimate.method in LINEAR:
+        sets, settings, note = parameter_sets(observation, study.estimate, reduced, model=model)
+        return Fits(reduced.all_parameters, reduced, sets, settings, (note,) if note else ())
+    at(study.estimate.method)
+    essential = replace(study.estimate, columns=reduced.names)
+    return Fits(
+        estimate_of(observation, study.estimate, model=model, provenance=provenance),
+        reduced,
+        {},
+        {"all": study.estimate, "essential": essential},
+    )
+
+
+def validated(
+    fits: Fits,
+    observation: Observation,
+    unseen: Mapping[str, Observation],
+    study: Study,
+    model: GeneratedModel,
+    name: str,
+) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
+    """Windows of the records of that `name` against each other, or fifths of them where halves
+    prefer all parameters to physical ones, then further records, `unseen`; and what could not be
+    done. None where the method did not end well: each would simulate a loop that
+    is wrong once more.
+    """
+    method, status = study.estimate.method, fits.estimate.status
+    if status != "ok" and method not in LINEAR:
+        return (), (*fits.missing, f"validation: {method} ended with status {status}")
+    at("validation")
+    validation, missing = [], list(fits.missing)
+    try:
+        windows = study.validate.split or halves(*observation.span)
+        validation.append(split_validation(observation, windows, fits.settings, model=model))
+    except InputError as e:
+        missing.append(f"validation between windows of the record: {e}")
+    if unseen:
+        known = fits.sets or {"all": fits.estimate}
+        validation.append(
+            cross_validation(
+                observation, unseen, fits.settings, name=name, model=model, fitted=known
+            )
+        )
+    halved = not unseen and not study.validate.split and "feasible" in fits.sets
+    if halved and validation and best_set(validation[0].errors()) == "all":
+        validation = [held_out_validation(observation, fits.settings, model=model)]
+    missing += [text for part in validation for text in part.missing]
+    return tuple(validation), tuple(missing)
+
+
+def agreement(
+    fits: Fits,
+    observation: Observation,
+    own_names: Sequence[str],
+    unseen: Mapping[str, Observation],
+    study: Study,
+    model: GeneratedModel,
+) -> Homogeneity | None:
+    """Whether several records agree: in all parameters, or in the essential ones where one of the
+    records does not determine all. None for one record.
+    """
+    if len(own_names) + len(unseen) < 2:
+        return None
+    parts = {name: observation.of_record(k) for k, name in enumerate(own_names)} | dict(unseen)
+    in_all = homogeneity(parts, fits.reduced.all_parameters.names, study.estimate, model=model)
+    if not in_all.untested:
+        return in_all
+    return homogeneity(parts, fits.reduced.names, study.estimate, model=model)
