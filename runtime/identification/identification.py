@@ -223,6 +223,9 @@ def _with_laws(
 
 
 def _with_findings(observation: Observation, *sentences: str) -> Observation:
+    """The observation with further findings; itself, with the factor it holds, where all are ""."""
+    if not any(sentences):
+        return observation
     return replace(observation, findings=(*observation.findings, *filter(None, sentences)))
 
 
