@@ -70,7 +70,7 @@ FAULTS = (
     Fault("runtime/signals/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
     Fault("runtime/signals/filters.py", "CUTOFF * rate / (2 * signals.lowpass.hertz)", "CUTOFF * rate / signals.lowpass.hertz", "decimation by twice the factor of eq. (13)", SIGNALS),
     Fault("runtime/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
-    Fault("runtime/rows/selection.py", "            np.abs(qd[instants].T)", "            np.abs(qd[instants]).max(axis=1)", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
+    Fault("runtime/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
     Fault("runtime/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("numeric/test_observation.py",)),
     Fault("runtime/rows/prepared.py", "median_filtered(tau, selection.signals.median), selection", "tau, selection", "torques without their median filter", ("numeric/test_observation.py", "numeric/test_cestac.py")),
     Fault("runtime/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),

@@ -30,7 +30,7 @@ from runtime.checks.trials import Problem
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
-from runtime.model.generated import GeneratedModel, elements_of, joint_labels
+from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.model.inertia import INERTIAL
 from runtime.rows.observation import Observation
 from runtime.table import Table
@@ -168,11 +168,14 @@ def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: b
         )
     )
     slopes: dict[str, float] = {}
-    for label, joint in zip(joint_labels(model), observation.factor.joints, strict=True):
+    for j, label, joint in zip(
+        model.JOINTS, joint_labels(model), observation.factor.joints, strict=True
+    ):
         expected, measured = joint.R[:, :-1] @ X0[joint.columns], joint.R[:, -1]
         size, both = float(expected @ expected), float(expected @ measured)
         if (
             size > 0
+            and not is_axis(j)
             and both > LIMIT.TORQUE_ALIKE * np.sqrt(size) * joint.measured_norm
             and not 1 / LIMIT.TORQUE_FACTOR < both / size < LIMIT.TORQUE_FACTOR
         ):

@@ -84,6 +84,11 @@ class JointFit:
     sigma_rho: NanIfNull
     scale: NanIfNull = 1.0
 
+    @property
+    def is_axis(self) -> bool:
+        """Whether it is an axis of a force sensor (`runtime.rows.wrench`), no joint."""
+        return not self.joint[:1].isdigit()
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
@@ -182,6 +187,15 @@ class Estimate:
     def rows(self) -> Whole:
         """Number of rows r of W."""
         return sum(fit.rows for fit in self.per_joint)
+
+    @property
+    def worst_joint(self) -> JointFit:
+        """The joint with the largest relative error, of those that have rows; an axis of a force
+        sensor, which may measure its noise alone, where there are no joints.
+        """
+        return max(
+            self.per_joint, key=lambda fit: (fit.rows > 0, not fit.is_axis, fit.relative_error)
+        )
 
     def __getitem__(self, name: str) -> float:
         """Value of one parameter."""

@@ -278,9 +278,9 @@ def explained_by_joint(
     """Error of the worst joint, which a total hides; no check of a single joint. Where predictions
     are expected to be good (`expected`, %), a joint is no reason for a "no".
     """
-    if len(fit.per_joint) < 2:
+    worst = fit.worst_joint
+    if len(fit.per_joint) < 2 or worst.is_axis:
         return None
-    worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
     state = _state(worst.relative_error, *LIMIT.JOINT_ERROR)
     return Answer(
         "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR[0] else state,

@@ -395,7 +395,7 @@ def identified(context: None, parcel: Parcel) -> Finished:
 def row_of(job: Job, result: Identification) -> Row:
     """The line of an identification."""
     fit = result.estimate
-    worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+    worst = fit.worst_joint
     return Row(
         name=job.name,
         robot=result.model.NAME,

@@ -50,7 +50,7 @@ from runtime.identification.friction_laws import (
 from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.limits import LIMIT
 from runtime.markup import number
-from runtime.model.generated import GeneratedModel, elements_of, joint_labels, require
+from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels, require
 from runtime.model.inertia import physical_model
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
@@ -221,6 +221,7 @@ def friction_curves(
     return tuple(
         _curve(label, joined([part[j] for part in parts]))
         for j, label in enumerate(joint_labels(model))
+        if fit.per_joint[j].rows and not is_axis(model.JOINTS[j])
     )
 
 

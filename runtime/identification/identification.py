@@ -47,8 +47,9 @@ from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, prepared, resolved
+from runtime.rows.wrench import with_wrench
 from runtime.settings.record import behind_gears
-from runtime.settings.study import Study
+from runtime.settings.study import SIMULATING, Study
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
@@ -60,7 +61,6 @@ T = TypeVar("T")
 Measured = tuple[Prepared | Stream, ...]
 """Records as the study reads them."""
 NEED_WHOLE = "a load, friction curves and scalars of laws need"
-SIMULATING = ("iv", "didim", "cloe")
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
 
@@ -123,19 +123,22 @@ def identify(
         A record, setting or extra that does not suit what is asked for.
     """
     records = tuple(records) if isinstance(records, Sequence) else (records,)
-    asked_study = of_links(model, study or Study())
+    study = study or Study()
+    if further is None:
+        further = records_or_streams(
+            study.validate.record, model, study.stream, missing=study.signals.admits_missing
+        )
+    wide, records, study, further = with_wrench(model, records, study, further)
+    plausible = (variants is not None if plausible is None else plausible) and wide is model
+    model = wide
+    asked_study = of_links(model, study)
     study, lowpass = resolved(asked_study, records)
     measured: Measured = tuple(
         record if isinstance(record, Stream) else prepared(model, record, study)
         for record in records
     )
-    if further is None:
-        further = records_or_streams(
-            study.validate.record, model, study.stream, missing=study.signals.admits_missing
-        )
     model, laws, measured, further, load = _with_laws(model, study, measured, further)
     simulator = simulator or simulator_of(model, study)
-    plausible = variants is not None if plausible is None else plausible
     measured, further, law = completed(model, study, measured, further)
     provenance = {
         **origin(records),
@@ -332,6 +335,8 @@ def assess(
         )
         return replace(result, missing=(*result.missing, reason))
     missing = list(result.missing)
+    if len(result.model.JOINTS) > len(model.JOINTS):  # with force sensors
+        model, runs = result.model, None
 
     def attempt(part: str, compute: Callable[[], T]) -> T | None:
         progress(part)

@@ -335,7 +335,7 @@ class Identification:
                 f"No values of {self.model.NAME}: {self.estimate.method} ended with status "
                 f"{self.estimate.status}. {reason}."
             )
-        worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+        worst = fit.worst_joint
         by_joint = (
             f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)"
             if self.observation.n > 1
@@ -403,7 +403,9 @@ class Identification:
             f"{len(values)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
             f"{fit.method}, SI units, +- 95 %"
         )
-        by_joint = ", ".join(f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint)
+        by_joint = ", ".join(
+            f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint if one.rows
+        )
         cutoff = self.estimate.provenance.get("lowpass", "")
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
         notes += [cutoff] if BETTER in cutoff else []

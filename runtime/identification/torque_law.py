@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
@@ -24,7 +23,7 @@ from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.law import late
 from runtime.records.record import Record
-from runtime.records.stream import Stream
+from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe, with_torques
 from runtime.rows.prepared import Prepared
@@ -74,11 +73,8 @@ def completed(
     asked = [law for law in laws if "fit" in (law.kd, law.delay)]
     if not asked:
         return tuple(fitted), list(further), None
-    own = [one for one in fitted if isinstance(one, Prepared)]
-    others = [one for one in further if isinstance(one, Record)]
-    if len(own) < len(fitted) or len(others) < len(further):
-        path = ("controller", "law")
-        raise SettingsError("fit needs whole records; set stream: off", path=path)
+    who = "controller.law: fit needs"
+    own, others = in_memory(fitted, who), in_memory(further, who)
     found = law_estimate(model, own, study, asked[0])
 
     def whole(record: Record) -> Record:

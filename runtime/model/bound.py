@@ -35,5 +35,6 @@ class BoundModel:
             return self._model.elements(**self._given)  # type: ignore[attr-defined]
         if not callable(value) or isinstance(value, type):
             return value
-        own = signature(value).parameters.keys()
-        return partial(value, **{key: x for key, x in self._given.items() if key in own})
+        own = signature(value).parameters
+        rest = any(p.kind is p.VAR_KEYWORD for p in own.values())
+        return partial(value, **{key: x for key, x in self._given.items() if rest or key in own})

@@ -236,6 +236,11 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
     return tuple(f"{j}{more.get(j, '')}" for j in model.JOINTS)
 
 
+def is_axis(joint: int | str) -> bool:
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.rows.wrench`), no joint."""
+    return isinstance(joint, str)
+
+
 def elements_of(
     model: GeneratedModel, constants: Mapping[str, float] | None = None
 ) -> Mapping[str, Any]:

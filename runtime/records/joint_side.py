@@ -129,7 +129,9 @@ def column_names(
         )
     of_q = _meant(first, "q", "position", given.q, joints)
     of_tau: tuple[str, ...] = ()
-    if not settings.by_law:
+    if given.wrench and not given.tau and "tau1" not in last.names:
+        of_tau = ()
+    elif not settings.by_law:
         named = last.joints is not None or given.q == BY_NAME
         of_tau = _meant(last, "tau", "effort", given.tau or (given.q if named else ()), joints)
     elif settings.controller is None:
@@ -302,7 +304,7 @@ def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
         "tau": names.tau,
         "tau_ff": names.tau_ff,
         "tau_known": tuple(name for name in names.tau_known if name != NONE),
-        **{name: (column,) for name, column in names.channels.items()},
+        **names.further,
     }
 
 
@@ -312,7 +314,7 @@ def groups_of(
     """Each file once, with the columns that it is asked for, by quantity."""
     first, last, other = tables
     place = {**dict.fromkeys(IN_FIRST, first), "tau": last, "tau_ff": last, "tau_known": other}
-    place |= dict.fromkeys(names.channels, first)
+    place |= dict.fromkeys(names.further, first)
     asked = {key: columns for key, columns in asked_columns(names).items() if columns}
     groups = {
         table: {key: columns for key, columns in asked.items() if place[key] is table}

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +51,7 @@ class RecordFiles:
     hashes : mapping of str to str
         SHA-256 by file.
     tables : tuple of 3 Table
-        The files of the positions, of the torques, of the known torques; one file may stand for
-        several.
+        Files of the positions, of the torques, of the known torques; some may be the same.
     columns : Columns
         Names of the columns.
     samples : int
@@ -182,6 +182,8 @@ class RecordFiles:
         sides |= dict.fromkeys(("q", "q_r"), self.side.position)
         sides |= dict.fromkeys(("qd", "qd_ref"), self.side.velocity)
         sides |= {"tau_ff": self.side.torque, "q_link": self._behind_gears}
+        wrench = partial(np.multiply, self.settings.scale.wrench)
+        sides |= dict.fromkeys(self.columns.further, wrench)
         sides |= dict.fromkeys(self.columns.channels, np.asarray)
         x: dict[str, Array] = {}
         for table, groups in groups_of(self.columns, self.tables):
@@ -193,7 +195,7 @@ class RecordFiles:
                     most = LIMIT.LARGEST_NUMBER
                     y = y[:, ~np.isnan(y).all(axis=0)] if key == "q_link" else y
                     require_finite(y, names, table.file, table.row, start, largest=most)
-        channels = {k: x[k] for k in (*JOINT_CHANNELS, *self.columns.channels) if k in x}
+        channels = {k: x[k] for k in (*JOINT_CHANNELS, *self.columns.further) if k in x}
         samples = Samples(x.get("t"), x["q"], x.get("tau"), missing, x.get("tau_known"), channels)
         return samples, parts["q"][-1]
 

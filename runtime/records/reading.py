@@ -118,7 +118,7 @@ def read_pieces(opened: RecordFiles) -> list[Record]:
         Record(
             stretch.t,
             own["q"],
-            own["tau"],
+            own.get("tau", np.zeros_like(own["q"])),
             tau_known=own.get("tau_known"),
             channels={key: own[key] for key in (*samples.channels, "law_v") if key in own},
             rate=rate,

@@ -140,7 +140,7 @@ def checks_section(checklist: Checklist) -> Section:
 def key_numbers(result: Identification) -> list[Number]:
     """What a reader compares first."""
     fit = result.model_estimate
-    worst = max(fit.per_joint, key=lambda joint: joint.relative_error)
+    worst = fit.worst_joint
     numbers = [
         Number("parameters of the model", f"{len(fit.names)} of {len(result.estimate.names)}"),
         Number("error where fitted", f"{fit.relative_error:.1f} %"),

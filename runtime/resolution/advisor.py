@@ -67,6 +67,7 @@ from runtime.resolution.run import forget
 from runtime.rows.observation import stack
 from runtime.rows.position_errors import Perturbation, perturbation, solution
 from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
+from runtime.rows.wrench import with_wrench
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
@@ -165,7 +166,8 @@ def advise(
         through.
     """
     several = records if isinstance(records, Sequence) else (records,)
-    study, model = resolved(study or Study(), several)[0], usable(model)
+    model, several, study, _ = with_wrench(model, several, study or Study())
+    study, model = resolved(study, several)[0], usable(model)
     study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     as_measured = [prepared(model, record, study) for record in several]
     whole = [own.record for own in as_measured]

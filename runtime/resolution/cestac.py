@@ -57,6 +57,7 @@ from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, forget, run_block
 from runtime.resolution.runs import Level, Runs
 from runtime.rows.prepared import Prepared, common_drives, prepared, record_of, resolved
+from runtime.rows.wrench import with_wrench
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
 if TYPE_CHECKING:
@@ -126,7 +127,8 @@ def cestac(
         the steps.
     """
     several = records if isinstance(records, Sequence) else (records,)
-    study = resolved(study or Study(), several)[0]
+    model, several, study, _ = with_wrench(model, several, study or Study())
+    study = resolved(study, several)[0]
     require_found(study.record, (record_of(one).measured for one in several))
     settings, model = study.cestac, usable(model)
     as_measured = [prepared(model, record, study) for record in several]

@@ -30,7 +30,10 @@ LEAVES_OUT = {
     "mask": "the choice of samples",
     "missing": "positions that are missing",
     "direction": "an uncertain direction of dry friction",
+    "torque": "a torque that was not measured",
 }
+UNMEASURED = 1e9
+"""rows.low_speed of a joint whose torque was not measured, beside what else was."""
 
 
 UNCERTAIN = 0.5
@@ -191,13 +194,11 @@ def selected(
     kept, n = np.arange(at.first, at.stop - at.start, at.factor), qd.shape[1]
     instants, number = kept + at.start, at.number + np.arange(at.kept)
     mask = np.ones((n, len(kept)), dtype=bool)
-    dropped = {}
+    dropped, slow = {}, per_joint(rows.low_speed, n, "rows.low_speed")[:, None]
     for reason, usable in (
         ("trim", (number >= at.used[0]) & (number < at.used[1])),
-        (
-            "low_speed",
-            np.abs(qd[instants].T) >= per_joint(rows.low_speed, n, "rows.low_speed")[:, None],
-        ),
+        *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
+        ("low_speed", np.abs(qd[instants].T) >= slow),
         ("mask", True if keep is None else keep[instants].T),
     ):
         before = mask.sum(axis=1)

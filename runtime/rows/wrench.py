@@ -1,160 +1,283 @@
-"""Six rows more: the wrench of a force sensor below the base, beside the joint torques or without
-them.
+"""Force sensors as six rows more each, beside the joint torques or in their place.
+
+A sensor ahead of link j measures the wrench by which it moves link j and those behind it, in the
+axes of frame j about its origin: the torques of six joints between the links that stay at zero, as
+the base wrench is that of a floating base. So the model with a sensor has six joints more, which
+do not move,
 
     [Y ]   [D K]         [0]
-    [  ] = [   ] chi  +  [ ] b ,        w = WB(q, qd, qdd) chi + b
-    [w ]   [WB ]         [1]
+    [  ] = [   ] chi  +  [ ] b ,        w = WS(q, qd, qdd) chi + b
+    [w ]   [WS ]         [1]
 
-chi standard parameters, X = K chi those of the joint torques, WB the columns of
-`base_wrench_regressor` (force, then moment about the origin of frame 0, in frame 0, by which the
-sensor moves the robot), b the offset of the sensor. A wrench knows parameters that no joint torque
-depends on, and none of the drives: the rotor's own moment on the base, its inertia by the gear
-ratio once, is left out. So the base parameters are others than those of the module: columns that
-do not depend on those before them, at random states, and what they take in (Gautier 1991, in
-numbers and for the constants of the robot file).
+chi standard parameters, X = K chi those of the joint torques, b the offset of the sensor, WS the
+columns of `base_wrench_regressor` of these links, moved from the origin of frame 0 to frame j. A
+wrench knows parameters that no joint torque depends on, and none of the drives: the rotor's own
+moment on the base, its inertia by the gear ratio once, is left out. The base parameters are others
+than those of the module: columns that do not depend on those before them, at random states, and
+what they take in (Gautier 1991, in numbers and for the constants of the robot file).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.generated import GeneratedModel
-from runtime.model.inertia import physical_model
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, decimated_rows, decimated_torque, prepared
-from runtime.settings.study import Study
+from runtime.model.bound import BoundModel
+from runtime.model.generated import GeneratedModel, channels_of, elements_of, joint_units
+from runtime.model.inertia import INERTIAL, physical_model
+from runtime.records.record import JOINT_CHANNELS, Record
+from runtime.records.stream import in_memory
+from runtime.rows.prepared import Source, record_of
+from runtime.rows.selection import UNMEASURED, per_joint
+from runtime.settings.record import WRENCH
+from runtime.settings.study import SIMULATING, Study
 
 Array = np.ndarray
 
-SENSOR_OFFSETS = ("BFX", "BFY", "BFZ", "BNX", "BNY", "BNZ")  # offset of the sensor, N and N m
+AXES = ("FX", "FY", "FZ", "NX", "NY", "NZ")
+TEN_UNITS = ("kg*m**2",) * 6 + ("kg*m",) * 3 + ("kg",)  # in the order of INERTIAL
 PROBED_STATES = 64  # random ones that tell columns apart
 LEFT_OF_COLUMN = 1e-8  # of the norm of a column: less is left of it beside those before
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchRows:
-    """Joint torques and wrench as one linear system.
-
-    Attributes
-    ----------
-    observation : Observation
-        Its rows are those of each joint, then those of FX, FY, FZ, NX, NY, NZ: an estimator with
-        weights by joint finds a deviation for each of the six.
-    standard : tuple of str
-        Standard parameters, then the offsets SENSOR_OFFSETS; p + 6 names.
-    K : ndarray, shape (b, p + 6)
-        X = K (chi, b) of the columns of `observation`.
-    """
-
-    observation: Observation
-    standard: tuple[str, ...]
-    K: Array
-
-    @property
-    def formulas(self) -> dict[str, str]:
-        """What every parameter takes in, by name."""
-        return {
-            name: " ".join(
-                f"{x:+.6g}*{own}" for own, x in zip(self.standard, row, strict=True) if x
-            )
-            for name, row in zip(self.observation.names, self.K, strict=True)
-        }
+S = TypeVar("S", bound=Source)
 
 
-def observe_wrench(
+def with_wrench(
     model: GeneratedModel,
-    record: Record | Prepared,
-    study: Study | None = None,
-    *,
-    torques: bool = True,
-) -> WrenchRows:
-    """The rows of a record with a channel `wrench`, shape (N, 6), N and N m in frame 0.
+    records: Sequence[S],
+    study: Study,
+    further: Sequence[S] = (),
+) -> tuple[GeneratedModel, Sequence[S | Record], Study, Sequence[S | Record]]:
+    """Model, records and study with six joints more for each sensor; as they are without sensors.
 
     Parameters
     ----------
     model : GeneratedModel
         Emitted with the function base_wrench_regressor.
-    record : Record or Prepared
-        `Record(t, q, tau, channels={"wrench": ...})`.
-    study : Study, optional
-        Signals and rows; default: Study().
-    torques : bool
-        Whether joint torques are rows too.
+    records, further : sequence of Record
+        With the channels wrench0, wrench7 ..., shape (N, 6), N and N m: of sensors below the robot,
+        ahead of link 7. Joint torques that are zero throughout, in all records, were not measured:
+        they are no rows.
+    study : Study
+        Signals and rows; rows of each joint and axis get a weight of their own where it says ols.
 
     Raises
     ------
     InputError
-        A module without the function, or a record without such a channel.
+        A module without the function or the frame, a robot with loops and a sensor that is not
+        below it, records without or with other sensors, or by blocks, what simulates a loop or a
+        load, and `signals.reader: counts`.
     """
-    own = prepared(model, record, study or Study())
-    wrench = own.record.channels.get("wrench")
-    if not hasattr(model, "base_wrench_regressor"):
-        raise InputError(
-            f"{model.NAME} has no base_wrench_regressor; emit the module by symgen generate ROBOT "
-            "--with base_wrench_regressor"
-        )
-    if wrench is None or wrench.shape[1:] != (6,):
-        raise InputError(
-            "no channel `wrench` with three forces and three moments by sample; give it as "
-            'Record(..., channels={"wrench": ...}), shape (N, 6)',
-            file=own.record.name,
-        )
-    standard, base = physical_model(model).standard, physical_model(model).K
-    random = np.random.default_rng(0).uniform(-np.pi, np.pi, (3, PROBED_STATES, len(model.JOINTS)))
-    rows = [_by_sensor(model, *random)]
-    if torques:
-        D = model.regressor(*random) @ base
-        rows.append(np.pad(D, ((0, 0), (0, 0), (0, 6))))
-    of_joints = {name.removesuffix("R") for name in model.BASE_PARAMETERS}
-    order = sorted(range(len(standard)), key=lambda k: standard[k] not in of_joints)
-    order += range(len(standard), len(standard) + 6)
-    kept, K = _independent(np.concatenate([x.reshape(-1, len(order)) for x in rows]), order)
-    used = own.selection.mask.any(axis=0)
-    states, number = own.states, int(used.sum())
-    signals = _by_sensor(model, states.q, states.qd, states.qdd)[:, :, kept]
-    decimated = decimated_rows(signals.reshape(len(states), -1), own.selection)[:, used]
-    W = decimated.reshape(6, len(kept), number).swapaxes(1, 2).reshape(-1, len(kept))
-    Y = decimated_torque(wrench, own.selection)[:, used]
-    names, t = (*standard, *SENSOR_OFFSETS), np.tile(own.selection.t[used], 6)
-    joints, above = own.observation(model), np.pad(base, ((0, 0), (0, 6)))[:, kept]
-    count = sum(joints.rows) if torques else 0
-    observation = replace(
-        joints,
-        W=np.concatenate([joints.W[:count] @ above, W]),
-        Y=np.concatenate([joints.Y[:count], Y.ravel()]),
-        rows=(*(joints.rows if torques else ()), *[number] * 6),
-        names=tuple(names[k] + "R" * int((x != 0).sum() > 1) for k, x in zip(kept, K, strict=True)),
-        t=np.concatenate([joints.t[:count], t]),
-        record=np.zeros(count + len(t), dtype=int),
-        dropped={},
+    every = [record_of(one) for one in (*records, *further)]
+    channels = sorted({c for r in every for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
+    if not channels:
+        return model, records, study, further
+    own = in_memory(every, "a wrench needs")
+    for record in own:
+        for c in channels:
+            if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:
+                raise InputError(
+                    f"no {c} of three forces and three moments; name its six columns in every "
+                    "record that is fitted or predicted, record.columns: {wrench: "
+                    f"{{{c.removeprefix(WRENCH)}: [...]}}}}",
+                    file=record.file,
+                )
+    for what, asked in (
+        ("signals.reader: counts", study.signals.reader == "counts"),
+        (f"estimate.method: {study.estimate.method}", study.estimate.method in SIMULATING),
+        ("payload", study.payload is not None),
+    ):
+        if asked:
+            raise InputError(f"{what} does not read wrenches; leave it out, or the wrench")
+    n, torques = len(model.JOINTS), any(record.tau.any() for record in own)
+    slow = per_joint(study.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
+    rows = replace(study.rows, low_speed=(*map(float, slow), *[0.0] * 6 * len(channels)))
+    wide = WrenchModel(model, [int(c.removeprefix(WRENCH)) for c in channels], torques)
+    padded, count = [_record(record, channels) for record in own], len(records)
+    if study.estimate.method == "ols":  # N and N m in one sum
+        study = replace(study, estimate=replace(study.estimate, method="wls", weights="joint"))
+    study = replace(study, rows=rows)
+    return cast(GeneratedModel, wide), padded[:count], study, padded[count:]
+
+
+def _record(record: Record, channels: Sequence[str]) -> Record:
+    """The record with six joints at rest for each sensor, whose torques are its wrench."""
+    rest = np.zeros((len(record), 6 * len(channels)))
+    others = {
+        c: np.hstack([x, rest * (np.nan if c == "q_link" else 0)]) if c in JOINT_CHANNELS else x
+        for c, x in record.channels.items()
+        if c not in channels
+    }
+    known = record.tau_known
+    return replace(
+        record,
+        q=np.hstack([record.q, rest]),
+        tau=np.hstack([record.tau, *(record.channels[c] for c in channels)]),
+        tau_known=None if known is None else np.hstack([known, rest]),
+        channels=others,
+        origin=replace(record.origin, drives=None),
     )
-    return WrenchRows(observation, names, K)
 
 
-def _by_sensor(model: Any, *states: Array) -> Array:
-    """Columns of the wrench by standard parameter and by offset, shape (N, 6, p + 6)."""
-    WB = np.asarray(model.base_wrench_regressor(*states))
-    return np.concatenate([WB, np.broadcast_to(np.eye(6), (len(WB), 6, 6))], axis=2)
+class WrenchModel:
+    """A model with six joints more for each sensor: they do not move, their torques are its wrench.
 
-
-def _independent(A: Array, order: Sequence[int]) -> tuple[list[int], Array]:
-    """Columns that do not depend on those before them in `order`, and K, shape (b, p), of A = A_1 K
-    with A_1 these columns.
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted with the function base_wrench_regressor.
+    sensors : sequence of int
+        Frames.
+    torques : bool
+        Whether joint torques are measured too, which tells what the base parameters are.
     """
+
+    DRIVES = None
+
+    def __init__(self, model: GeneratedModel, sensors: Sequence[int], torques: bool) -> None:
+        frames, self._model, self._n = getattr(model, "ANTECEDENTS", None), model, len(model.JOINTS)
+        if frames is None:
+            raise InputError(
+                f"{model.NAME} has no base_wrench_regressor; emit the module by symgen generate "
+                "ROBOT --with base_wrench_regressor"
+            )
+        if wrong := [f for f in sensors if f and (f not in frames or hasattr(model, "PASSIVE"))]:
+            why = "links behind it are in loops" if wrong[0] in frames else "no such frame"
+            raise InputError(f"a wrench in frame {wrong[0]} of {model.NAME}: {why}; 0 is the base")
+        standard = physical_model(model).standard
+        rows = tuple(f"{axis}{f}" for f in sensors for axis in AXES)
+        self.JOINTS = (*model.JOINTS, *rows)
+        self.STANDARD_PARAMETERS = (*standard, *(f"B{row}" for row in rows))
+        path = {0: {0}}
+        for j, i in sorted(frames.items()):
+            path[j] = {j} | path[i]
+        link = {f"{p}{j}": path[j] for j in frames for p in INERTIAL}
+        self._behind = {f: [f in link.get(name, ()) for name in standard] for f in sensors}
+        of_joints = {name.removesuffix("R") for name in model.BASE_PARAMETERS}
+        order = sorted(range(len(standard)), key=lambda k: standard[k] not in of_joints)
+        A, self._used = self._probed({}), slice(0 if torques else self._n, None)
+        order += range(len(standard), A.shape[2])
+        self._columns = _independent(A[:, self._used].reshape(-1, A.shape[2]), order)
+        K = self._regrouped({})
+        own_names = [self.STANDARD_PARAMETERS[k] for k in self._columns]
+        self.BASE_PARAMETERS = tuple(
+            name + "R" * int((x != 0).sum() > 1) for name, x in zip(own_names, K, strict=True)
+        )
+        self.STRUCTURE = np.abs(A[..., self._columns]).max(axis=0).T > 0
+        self.FORMULAS = {
+            name: " ".join(
+                f"{x:+.6g}*{k}" for k, x in zip(self.STANDARD_PARAMETERS, row, strict=True) if x
+            )
+            for name, row in zip(self.BASE_PARAMETERS, K, strict=True)
+            if name.endswith("R")
+        }
+        units = getattr(model, "UNITS", {})
+        units = {name.removesuffix("R"): unit for name, unit in units.items()}
+        units |= {f"{p}{j}": u for p, u in zip(INERTIAL, TEN_UNITS, strict=True) for j in frames}
+        units |= {f"B{row}": "N" if row[0] == "F" else "N*m" for row in rows}
+        slides = dict(zip(model.JOINTS, joint_units(model), strict=True))
+        rotors = {  # which a base parameter of joint torques may hold
+            name: "kg" if all(slides.get(j) == "m" for j in along) else "kg*m**2"
+            for name, (kind, _, along) in elements_of(model).items()
+            if kind == "inertia"
+        }
+        pairs = zip(self.BASE_PARAMETERS, own_names, strict=True)
+        self.UNITS = {name: (rotors | units).get(own, "") for name, own in pairs}
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.isupper() or name.startswith("_"):
+            raise AttributeError(name)
+        return self.elements() if name == "ELEMENTS" else getattr(self._model, name)
+
+    def elements(self, **constants: float) -> dict[str, Any]:
+        """ELEMENTS of the model, and the offsets of the sensors."""
+        offsets = {f"B{row}": ("offset", "both", {row: 1.0}) for row in self.JOINTS[self._n :]}
+        return {**elements_of(self._model, constants), **offsets}
+
+    def store(self, N: int) -> Array:
+        """Workspace of shape (b, n, N)."""
+        return np.zeros((len(self.BASE_PARAMETERS), len(self.JOINTS), N))
+
+    def regressor(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: Any
+    ) -> Array:
+        """D, shape (N, n, b)."""
+        D = self._standard(q, qd, qdd, constants)[..., self._columns]
+        if out is not None:
+            out[...] = D.transpose(2, 1, 0)
+        return D
+
+    def observation_matrix(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: Any
+    ) -> Array:
+        """W, shape (n*N, b)."""
+        D = self.regressor(q, qd, qdd, out=out, **constants)
+        return D.transpose(1, 0, 2).reshape(-1, D.shape[2])
+
+    def inverse_dynamics(
+        self, q: Array, qd: Array, qdd: Array, X: Array, **constants: Any
+    ) -> Array:
+        """Torques and wrenches, shape (N, n)."""
+        return np.asarray(self.regressor(q, qd, qdd, **constants) @ X)
+
+    def base_parameters(self, standard: Any, **constants: Any) -> Array:
+        """X of standard parameters: a vector, a matrix of columns, or by name, where an offset that
+        is not named is zero.
+        """
+        if isinstance(standard, Mapping):
+            standard = np.array([standard.get(name, 0.0) for name in self.STANDARD_PARAMETERS])
+        return np.asarray(self._regrouped(constants) @ standard)
+
+    def _standard(self, q: Array, qd: Array, qdd: Array, constants: Mapping[str, Any]) -> Array:
+        """Columns of the standard parameters and of the offsets, shape (N, n, p)."""
+        model = cast(Any, BoundModel(self._model, constants))
+        q, qd, qdd = (x[:, : self._n] for x in (q, qd, qdd))
+        base = model.base_parameters(np.eye(len(self.STANDARD_PARAMETERS) - 6 * len(self._behind)))
+        parts = [model.regressor(q, qd, qdd) @ base]
+        WB, T = model.base_wrench_regressor(q, qd, qdd), model.frame_poses(q)
+        for f, moved in self._behind.items():
+            F, N = (WB * moved)[:, :3], (WB * moved)[:, 3:]
+            if f:
+                R, P = T[:, f - 1, :3, :3], T[:, f - 1, :3, 3]
+                N = N - np.cross(P[:, :, None], F, axis=1)
+                F, N = R.swapaxes(1, 2) @ F, R.swapaxes(1, 2) @ N
+            parts += [F, N]
+        D = np.concatenate(parts, axis=1)
+        offsets = np.eye(D.shape[1])[:, self._n :]
+        return np.concatenate([D, np.broadcast_to(offsets, (len(D), *offsets.shape))], axis=2)
+
+    def _probed(self, constants: Mapping[str, Any]) -> Array:
+        """The same at random states."""
+        rng = np.random.default_rng(0)
+        q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBED_STATES, self._n))
+        timed = {c: rng.uniform(0.5, 2, PROBED_STATES) for c in channels_of(self._model)}
+        try:
+            return self._standard(q, qd, qdd, {**constants, **timed})
+        except ValueError as e:  # what an emitted module of a general loop raises
+            raise InputError(f"{self._model.NAME} with a wrench: {e} in random states") from None
+
+    def _regrouped(self, constants: Mapping[str, Any]) -> Array:
+        """K, shape (b, p), of X = K (chi, b)."""
+        A = self._probed(constants)[:, self._used]
+        A = A.reshape(-1, A.shape[2])
+        K = np.linalg.lstsq(A[:, self._columns], A, rcond=None)[0]
+        return np.where(np.abs(K) > LEFT_OF_COLUMN, K, 0.0)
+
+
+def _independent(A: Array, order: Sequence[int]) -> list[int]:
+    """Columns of A that do not depend on those before them in `order`."""
     Q: Array = np.zeros((len(A), 0))
-    kept: list[int] = []
+    columns: list[int] = []
     for k in order:
         rest = A[:, k] - Q @ (Q.T @ A[:, k])
         rest -= Q @ (Q.T @ rest)  # twice is enough (Giraud, Langou and Rozloznik 2005)
-        if np.linalg.norm(rest) > LEFT_OF_COLUMN * max(
-            float(np.linalg.norm(A[:, k])), LEFT_OF_COLUMN
-        ):
-            Q, kept = np.column_stack([Q, rest / np.linalg.norm(rest)]), [*kept, k]
-    K = np.linalg.lstsq(A[:, kept], A, rcond=None)[0]
-    return kept, np.where(np.abs(K) > LEFT_OF_COLUMN, K, 0.0)
+        size = float(np.linalg.norm(rest))
+        if size > LEFT_OF_COLUMN * max(float(np.linalg.norm(A[:, k])), LEFT_OF_COLUMN):
+            Q, columns = np.column_stack([Q, rest / size]), [*columns, k]
+    return columns

@@ -54,6 +54,7 @@ Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
 
 
 QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "q_link", "tau_ff", "tau_known", "law_v")
+WRENCH = "wrench"  # beginning of the channels that are wrenches, before the number of the frame
 BY_NAME = ("names",)  # columns found by the names of the joints
 
 
@@ -97,6 +98,10 @@ class Columns(Settings):
     channels : mapping of str to str
         Column of each channel.NAME of the laws of the robot file, in the file of the positions, as
         it is: {temperature: T_motor}.
+    wrench : mapping of int to six str
+        Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
+        number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
+        below the robot, {7: [...]} ahead of link 7. Beside tau, or in its place.
     """
 
     t: Text | None = None
@@ -110,6 +115,13 @@ class Columns(Settings):
     tau_ff: Names = ()
     tau_known: SomeNames = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)
+    wrench: Mapping[Annotated[int, Field(ge=0)], Names] = field(default_factory=dict)
+
+    @property
+    def further(self) -> dict[str, tuple[str, ...]]:
+        """Columns that are no joint's, by channel."""
+        own = {name: (column,) for name, column in self.channels.items()}
+        return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
 
     def __post_init__(self) -> None:
         require(
@@ -153,10 +165,14 @@ class Scale(Settings):
         On the positions.
     tau : float or tuple of float or str
         On the torques; gtau where the file holds force = gtau*vir.
+    wrench : float
+        On wrenches, which are those by which the sensor moves the links ahead of it: -1 where it
+        reports what they do to it.
     """
 
     q: Factor = 1.0
     tau: Factor = 1.0
+    wrench: Real = 1.0
 
 
 class Resample(Settings):

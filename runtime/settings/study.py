@@ -195,6 +195,10 @@ class Rows(Settings):
     low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
 
 
+SIMULATING = ("iv", "didim", "cloe")
+"""Methods that simulate the closed loop."""
+
+
 class EstimateSettings(Settings):
     """The estimator and its columns.
 

@@ -105,7 +105,9 @@ def require_valid(certificate: Certificate) -> None:
         )
 
 
-def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
+def model(
+    robot: str | Path | Robot, *, target: str = "numpy", options: Sequence[str] = ()
+) -> ModuleType:
     """The module of a robot: derived, regrouped, emitted, certified, imported from a cache by
     content.
 
@@ -115,6 +117,8 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
         Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
     target : str
         numpy, casadi or xp (arrays of any package).
+    options : sequence of str
+        Functions on request, as of `symgen generate --with`.
 
     Returns
     -------
@@ -137,7 +141,7 @@ def model(robot: str | Path | Robot, *, target: str = "numpy") -> ModuleType:
             f"target {target!r}; Python imports {', '.join(PYTHON)}; `symgen generate --target c` "
             "writes C"
         )
-    path = _certified_path(robot, target)
+    path = _certified_path(robot, target, options)
     if path is None:
         raise SymgenError(
             f"{robot.name}: no {target} module, since its loops are closed by iteration; the NumPy "
@@ -157,11 +161,11 @@ def c_file(robot: str | Path | Robot) -> Path:
     return _certified_path(robot, "c") or stored_path(f"{robot.name}.c", "")
 
 
-def _certified_path(robot: Robot, target: str) -> Path | None:
+def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
     """Path of a text in the cache: what lies there has been certified. None where the robot has no
     text of the target.
     """
-    for file, text in generate_files(robot, targets=(target,)).items():
+    for file, text in generate_files(robot, targets=(target,), options=options).items():
         cached = cached_path(file, text)
-        return cached or stored_path(file, _certified(regroup(robot), {file: text})[file])
+        return cached or stored_path(file, _certified(regroup(robot), {file: text}, options)[file])
     return None

@@ -111,6 +111,7 @@ def _expected(witness: Witness) -> dict[str, Any]:
         "JOINTS": robot.joints,
         "PASSIVE": robot.passive,
         "LINKS": robot.links,
+        "ANTECEDENTS": {frame.j: frame.ant for frame in robot.frames},
         "LABELS": robot.labels,
         "CONSTANTS": regrouping.constants,
         "BASE_PARAMETERS": regrouping.names,

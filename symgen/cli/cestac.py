@@ -56,7 +56,9 @@ def cestac(
         from runtime.records.reading import read_records
         from runtime.resolution.checkpoint import Checkpoint
 
-        model = session.model_of(robot, "numpy" if advise else target, trust=trust, exact=exact)
+        model = session.model_of(
+            robot, "numpy" if advise else target, trust=trust, exact=exact, records=record
+        )
         study = session.changed(
             session.study_of_arguments(record, recorded=False),
             cestac={

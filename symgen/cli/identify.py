@@ -81,7 +81,7 @@ def identify(
         from runtime.model.compiled import target_of
         from runtime.records.reading_by_blocks import is_stream, records_or_streams
 
-        model = session.model_of(robot, target, trust=trust, exact=exact)
+        model = session.model_of(robot, target, trust=trust, exact=exact, records=record)
         study = session.study_of_arguments(record)
         study = study if block is None else replace(study, stream=block)
         study = study if suggest is None else session.suggested_study(study, model, suggest)

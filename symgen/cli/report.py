@@ -43,7 +43,7 @@ def report(
         from runtime.json_documents import json_text
         from runtime.records.reading_by_blocks import records_or_streams
 
-        model = session.model_of(robot, trust=trust, exact=exact)
+        model = session.model_of(robot, trust=trust, exact=exact, records=record)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
         records = records_or_streams(

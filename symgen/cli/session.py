@@ -125,11 +125,16 @@ def end(*, good: bool) -> None:
 
 
 def model_of(
-    robot: str, target: str = "numpy", *, trust: bool = False, exact: bool = False
+    robot: str,
+    target: str = "numpy",
+    *,
+    trust: bool = False,
+    exact: bool = False,
+    records: Sequence[str] = (),
 ) -> GeneratedModel:
     """The model of a ROBOT argument. target : "numpy", or "c" for the same in C; one line says why
     where NumPy serves instead. trust : run a module that was not emitted here. exact : as of
-    `load_robot`.
+    `load_robot`. records : RECORD arguments; where they name wrenches the model has their columns.
     """
     import symgen
     from runtime.model.generated import load_model
@@ -146,7 +151,9 @@ def model_of(
     if path.suffix == ".py":
         model = load_model(path, trust=trust)
     else:
-        model = load_model(symgen.model(described_robot(robot, exact=exact)))
+        named = study_of_arguments(records, recorded=False).record if records else ()
+        options = ("base_wrench_regressor",) * any(one.columns.wrench for one in named)
+        model = load_model(symgen.model(described_robot(robot, exact=exact), options=options))
     return model if target == "numpy" else _in_c(model, robot, exact)
 
 

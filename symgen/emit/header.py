@@ -255,6 +255,11 @@ def data(spec: ModuleSpec) -> list[str]:
         *literal("VALUES", dict(robot.values)),
         *(literal("FIT", fit) if (fit := scalars(robot)) else ()),
         *(literal("CHANNELS", read) if (read := channels(spec.regrouping)) else ()),
+        *(
+            literal("ANTECEDENTS", {f.j: f.ant for f in robot.frames})
+            if "base_wrench_regressor" in spec.functions
+            else ()
+        ),
     ]
 
 
