@@ -9,6 +9,7 @@ from ruamel.yaml import YAML
 from symgen.version import VERSION
 
 ROOT = Path(__file__).resolve().parents[1]
+RECIPE = YAML(typ="safe").load((ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -16,15 +17,15 @@ def test_version_stands_in_one_place() -> None:
     assert "version" not in PROJECT and PROJECT["dynamic"] == ["version"]
     citation = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == VERSION
-    assert f'set version = "{VERSION}"' in (ROOT / "conda" / "meta.yaml").read_text()
+    assert RECIPE["context"]["version"] == VERSION
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(rf"^## {re.escape(VERSION)}\b", changes, re.MULTILINE)
 
 
 def test_recipe_asks_for_what_the_package_asks_for() -> None:
-    recipe = (ROOT / "conda" / "meta.yaml").read_text(encoding="utf-8")
-    run = recipe.partition("  run:\n")[2].partition("\n\n")[0]
-    asked = {line.strip("- ").replace("-base", "").replace(" ", "") for line in run.splitlines()}
+    asked = {line.replace("-base", "").replace(" ", "") for line in RECIPE["requirements"]["run"]}
+    minimum = RECIPE["context"]["python_min"]
+    asked = {line.replace("${{python_min}}", minimum) for line in asked}
     assert asked == {*PROJECT["dependencies"], f"python{PROJECT['requires-python']}"}
 
 

@@ -47,6 +47,8 @@ class Tool:
     options: tuple[float, ...] = (0.0,)
     """Values of the one setting that its users turn, chosen with the cut-off."""
     cutoffs: tuple[float, ...] = CUTOFFS
+    slipped: bool = True
+    """Whether it is given the records with slips."""
 
     @property
     def lines(self) -> int:
@@ -88,7 +90,8 @@ TOOLS = {
         "tool_mujoco",
         "mujoco",
         ("mujoco[sysid]==4.0.0",),
-        cutoffs=(20.0,),  # ten fits more would take minutes
+        cutoffs=(20.0,),  # each fit more takes minutes
+        slipped=False,
     ),
 }
 
@@ -211,23 +214,23 @@ class Runs:
         random = [s * rng.uniform(-1, 1, (400, len(s))) for s in size]
         both = [np.concatenate(pair) for pair in zip(self.states, random, strict=True)]
         self.job("final", case.train, knobs, both, final=True)
-        for k, train in enumerate(case.repeats):
-            self.job(f"repeat{k}", train, knobs, self.states)
-        if case.name in SLIPPED:
-            for k, piece in enumerate(slips(case.train[0]).values()):
-                self.job(f"slip{k}", (piece,), knobs, self.states, final=True)
-        answers = self.run()
-        final = answers["final"]
+        final = self.run()["final"]
         row: Answer = {"knobs": knobs, **{k: final.get(k) for k in ("error", "seconds", "memory")}}
         if "predicted" not in final:
             return row
+        slipped = case.name in SLIPPED and self.tool.slipped
+        for k, train in enumerate(case.repeats if final["values"] else ()):
+            self.job(f"repeat{k}", train, knobs, self.states)
+        for k, piece in enumerate(slips(case.train[0]).values() if slipped else ()):
+            self.job(f"slip{k}", (piece,), knobs, self.states, final=True)
+        answers = self.run()
         K, torque = len(self.truth), np.array(final["predicted"])
         row["joints"] = relative(self.truth, torque[:K]).tolist()
         row["whole"] = norm(self.truth - torque[:K]) / norm(self.truth)
         row["feasible"] = feasible(str(self.urdf), case.coupled, random, torque[K:])
-        repeats = [answers[f"repeat{k}"] for k in range(len(case.repeats))]
-        row["spread"] = spread([a["values"] for a in repeats if a.get("values")])
-        if case.name in SLIPPED:
+        repeats = [a["values"] for name, a in answers.items() if name[0] == "r" and a.get("values")]
+        row["spread"] = spread(repeats)
+        if slipped:
             row["slips"] = [
                 said(final, answers[f"slip{k}"]) for k in range(len(slips(case.train[0])))
             ]

@@ -20,7 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-LIMIT, WHOLE = 90, 300  # s of processor: of one fit, of all jobs of a folder
+LIMIT, WHOLE = 90, 200  # s of processor: of one fit, of all jobs of a folder
 
 
 def late(*_):
