@@ -117,7 +117,7 @@ def known_values(problem: Problem) -> KnownValues | None:
     chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
     for k, name in enumerate(physical.standard):
         if name.startswith("Ia"):
-            chi[k] = physical.values.get(name, problem.given.X[k])
+            chi[k] = physical.values.get(name) or problem.given.X[k]  # a URDF has no place for it
     X = physical.K @ chi
     at_rest = np.zeros_like(s.q)
     gravity = problem.model.regressor(s.q, at_rest, at_rest) @ X

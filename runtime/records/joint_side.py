@@ -286,7 +286,8 @@ def _torque_constant(
             f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for "
             "currents of the motors set record.torque_side: motor, "
             "then gears and torque constants are those of the robot's drives; else set "
-            "record.torque_constant (N*m/A) with the gears in it",
+            "record.torque_constant (N*m/A) of every joint with the gears in it; 1 is no constant "
+            "of a motor",
             remedy={"torque_constant": 1.0} if drives is None else {"torque_side": "motor"},
         )
     return factors, np.where([kind in COMMANDS for kind, _ in units], constant, 1.0)

@@ -370,6 +370,20 @@ def test_currents_read_as_torques_are_no_wrong_rate() -> None:
     assert found.robot_values.heavy and "gravity torque of joint 1 0.0" in found.to_text()
 
 
+def test_motor_inertias_of_zero_do_not_contradict_the_record(tmp_path) -> None:
+    """All that a URDF can say: its values left 23 to 42 % of the torques of an arm with rotors."""
+    text = (files("symgen") / "description/robots/planar_2r.yaml").read_text(encoding="utf-8")
+    for stated in ("Ia1: 0.05", "Ia2: 0.02"):
+        assert stated in text
+        text = text.replace(stated, f"{stated[:3]}: 0")
+    (tmp_path / "bare.yaml").write_text(text, encoding="utf-8")
+    model = symgen.model(tmp_path / "bare.yaml")
+    t, q, tau = motion(model)
+    tau += [1.0, 0.6] * np.gradient(np.gradient(q, t[1], axis=0), t[1], axis=0)
+    found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"))
+    assert found.robot_values.error.max() < 10
+
+
 @pytest.mark.parametrize(
     ("given", "link"),
     [
