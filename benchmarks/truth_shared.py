@@ -32,8 +32,8 @@ RESIDUAL = 1e-9
 
 
 def robots_of(seeds: str) -> tuple[Robot, ...]:
-    """Five robots to tune on; four others for the end."""
-    return world.FIRST if seeds == "first" else world.SECOND
+    """Five robots to tune on; four others that were judged once; four more for the end."""
+    return {"first": world.FIRST, "second": world.SECOND, "third": world.THIRD}[seeds]
 
 
 @cache

@@ -127,8 +127,30 @@ class Robot:
             own.dry * rng.uniform(0.6, 1.6, self.n),
         )
 
+    @cached_property
+    def effort(self) -> Array:
+        """Limits of the torque in the file, (n,): 1000 N m or N for the robots of FIRST and SPECIAL,
+        as when their tables were made; else three times the largest torque of the nominal bodies.
+        """
+        if self not in (*SECOND, *THIRD):
+            return np.full(self.n, 1000.0)
+        still = replace(self.nominal, viscous=np.zeros(self.n), dry=np.zeros(self.n))
+        motion = fourier(self, 0)
+        free = pin.buildModelFromXML(self._urdf(still, np.full(self.n, 1000.0)))
+        data = free.createData()
+        tau = [
+            pin.rnea(free, data, *(x[i] for x in (motion.q, motion.qd, motion.qdd)))
+            for i in range(0, len(motion.t), 10)
+        ]
+        own = self.nominal
+        rest = own.viscous * np.abs(motion.qd).max(axis=0) + own.dry
+        return np.asarray(3 * (np.abs(tau).max(axis=0) + rest))
+
     def urdf(self, bodies: Bodies) -> str:
         """URDF of the chain with those bodies."""
+        return self._urdf(bodies, self.effort)
+
+    def _urdf(self, bodies: Bodies, effort: Array) -> str:
         lines = [f'<robot name="{self.name}">', '<link name="base"/>']
         for k, joint in enumerate(self.joints):
             J, c = bodies.inertia[k], bodies.centre[k]
@@ -139,7 +161,7 @@ class Robot:
                 f'<joint name="joint{k + 1}" type="{"prismatic" if joint.slides else "revolute"}">',
                 f'<parent link="{f"link{k}" if k else "base"}"/><child link="link{k + 1}"/>',
                 f'<origin xyz="{_text(joint.xyz)}" rpy="{_text(joint.rpy)}"/><axis xyz="{_text(joint.axis)}"/>',
-                f'<limit lower="{-1.2 * joint.reach}" upper="{1.2 * joint.reach}" effort="1000" velocity="{2 * joint.speed}"/>',
+                f'<limit lower="{-1.2 * joint.reach}" upper="{1.2 * joint.reach}" effort="{float(effort[k])!r}" velocity="{2 * joint.speed}"/>',
                 f'<dynamics damping="{float(bodies.viscous[k])!r}" friction="{float(bodies.dry[k])!r}"/>',
                 "</joint>",
                 f'<link name="link{k + 1}"><inertial><origin xyz="{_text(c)}" rpy="0 0 0"/>',
@@ -255,6 +277,71 @@ SECOND = (
         Joint((0.0, 0.0, 0.095), LEFT, Z, 0.8, (0.12, 0.08, 0.08), (0.02, 0.01, 0.05), 2.6, 4.5),
     ),
 )
+THIRD = (
+    _robot(
+        "cylindrical",
+        Joint((0.0, 0.0, 0.3), O, Z, 30.0, (0.3, 0.3, 0.6), (0.04, 0.0, 0.1), 2.3, 1.8),
+        Joint((0.12, 0.0, 0.4), O, Z, 15.0, (0.35, 0.2, 0.2), (0.08, 0.02, 0.0), 0.3, 0.7, True),
+        Joint(
+            (0.1, 0.0, 0.0),
+            (0.0, pi / 2, 0.0),
+            Z,
+            6.0,
+            (0.1, 0.1, 0.7),
+            (0.0, 0.0, 0.1),
+            0.3,
+            0.9,
+            True,
+        ),
+        Joint((0.0, 0.0, 0.45), O, Z, 1.6, (0.14, 0.08, 0.1), (0.03, 0.01, 0.06), 2.7, 6.0),
+    ),
+    _robot(
+        "skewed",
+        Joint(
+            (0.0, 0.0, 0.25), (0.5, 0.0, 0.0), Z, 7.0, (0.2, 0.15, 0.2), (0.03, 0.0, 0.05), 2.0, 3.0
+        ),
+        Joint(
+            (0.1, 0.0, 0.15),
+            (-1.0, 0.4, 0.0),
+            Z,
+            5.0,
+            (0.35, 0.1, 0.12),
+            (0.15, 0.0, 0.02),
+            1.3,
+            3.0,
+        ),
+        Joint(
+            (0.3, 0.05, 0.0),
+            (0.7, -0.3, 0.2),
+            Z,
+            2.5,
+            (0.3, 0.08, 0.08),
+            (0.12, 0.02, 0.0),
+            1.6,
+            4.0,
+        ),
+    ),
+    _robot(
+        "hanging",
+        Joint((0.0, 0.0, 1.5), OVER, Z, 18.0, (0.25, 0.25, 0.25), (0.03, 0.0, 0.1), 2.3, 2.0),
+        Joint((0.12, 0.0, 0.25), LEFT, Z, 12.0, (0.4, 0.14, 0.14), (0.17, 0.0, 0.03), 1.1, 2.2),
+        Joint((0.35, 0.0, 0.0), O, Z, 7.0, (0.18, 0.2, 0.16), (0.05, 0.04, 0.0), 1.3, 2.8),
+        Joint((0.1, 0.3, 0.0), LEFT, Z, 3.0, (0.1, 0.1, 0.3), (0.01, 0.0, -0.1), 2.4, 4.0),
+        Joint(O, RIGHT, Z, 1.8, (0.12, 0.2, 0.1), (0.02, 0.06, 0.01), 1.8, 4.5),
+    ),
+    _robot(
+        "seven_offset",
+        Joint((0.0, 0.0, 0.3), O, Z, 5.5, (0.15, 0.15, 0.25), (0.02, 0.01, -0.05), 2.2, 1.8),
+        Joint((0.08, 0.05, 0.0), LEFT, Z, 4.5, (0.2, 0.14, 0.16), (0.03, -0.05, 0.03), 1.3, 1.8),
+        Joint(
+            (0.02, -0.28, 0.12), RIGHT, Z, 3.5, (0.14, 0.14, 0.22), (0.02, 0.02, -0.05), 2.2, 2.0
+        ),
+        Joint((0.06, 0.0, 0.0), RIGHT, Z, 3.0, (0.16, 0.18, 0.14), (-0.03, 0.06, 0.02), 1.4, 2.0),
+        Joint((-0.05, 0.3, 0.09), LEFT, Z, 2.0, (0.12, 0.13, 0.2), (0.01, 0.03, -0.06), 2.3, 2.5),
+        Joint((0.0, 0.05, 0.0), RIGHT, Z, 1.5, (0.12, 0.12, 0.12), (0.03, 0.01, 0.02), 1.7, 2.6),
+        Joint((0.07, 0.0, 0.08), RIGHT, Z, 0.9, (0.1, 0.09, 0.1), (0.015, 0.01, 0.05), 2.5, 3.0),
+    ),
+)
 SPECIAL = (
     _robot(
         "pan_tilt",
@@ -268,7 +355,7 @@ SPECIAL = (
         Joint(O, (0.0, pi / 2, 0.0), Z, 8.0, (0.5, 0.1, 0.1), O, 0.25, 0.6, True),
     ),
 )
-ROBOTS: Mapping[str, Robot] = {robot.name: robot for robot in (*FIRST, *SECOND, *SPECIAL)}
+ROBOTS: Mapping[str, Robot] = {robot.name: robot for robot in (*FIRST, *SECOND, *THIRD, *SPECIAL)}
 
 
 class Truth:
@@ -612,6 +699,6 @@ def in_loop(
 
 
 __all__ = [
-    "FIRST", "MOTIONS", "NOISES", "RATE", "ROBOTS", "SECOND", "SPECIAL", "Bodies", "Encoder", "Lines", "Motion",
+    "FIRST", "MOTIONS", "NOISES", "RATE", "ROBOTS", "SECOND", "SPECIAL", "THIRD", "Bodies", "Encoder", "Lines", "Motion",
     "Robot", "Truth", "encoded", "in_loop", "lines_of", "noise", "replace",
 ]  # fmt: skip
