@@ -151,7 +151,9 @@ def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Arr
     states = own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
 
     def torque(tau: Array) -> Array:
-        return lowpass_filtered(median_filtered(tau, study.signals.median), own.record.rate, low)
+        return lowpass_filtered(
+            median_filtered(tau, study.signals.window_of_torques), own.record.rate, low
+        )
 
     return low.hertz, states, torque
 

@@ -114,7 +114,7 @@ def _gear(own: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...
         record, signals, low = one.record, one.study.signals, one.study.signals.lowpass
         link = filtered_states(record.channels["q_link"][:, [j]], record.rate, signals)
         motor = filtered_states(record.q[:, [j]], record.rate, signals)
-        tau = median_filtered(record.torque[:, [j]], signals.median)
+        tau = median_filtered(record.torque[:, [j]], signals.window_of_torques)
         for _ in () if low is None else {*low.on}:
             tau = lowpass_filtered(tau, record.rate, low)  # type: ignore[arg-type]
         gap, sign = motor.q - link.q, np.sign(motor.qd)

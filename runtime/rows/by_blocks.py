@@ -161,7 +161,7 @@ def piece_rows(
     """
     number, study = piece.record, task.study
     t, states, tau, counts = task.states(piece)
-    tau = median_filtered(tau, study.signals.median)
+    tau = median_filtered(tau, study.signals.window_of_torques)
     rate = task.streams[number].rate
     rows, segments = [], []
     for samples, at in chunks(piece.instants):

@@ -98,7 +98,12 @@ def reach(rate: float, signals: Signals, factor: int) -> int:
         slowest = min(np.ravel(signals.velocity).tolist())
         if slowest < rate / 2:
             lowpass += memory(butterworth(rate, Lowpass(cutoff=slowest, order=1))[0])
-    return signals.median + lowpass + 2 * DIFFERENCE + decimation_reach(factor)
+    return (
+        max(signals.median, signals.window_of_torques)
+        + lowpass
+        + 2 * DIFFERENCE
+        + decimation_reach(factor)
+    )
 
 
 def decimation_reach(factor: int) -> int:

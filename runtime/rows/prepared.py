@@ -21,6 +21,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from runtime.errors import InputError
+from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, check_states, drives_of
 from runtime.records.missing import COUNTS, require_positions
@@ -41,6 +42,7 @@ from runtime.signals.decimation import decimate
 from runtime.signals.filters import States, filtered_states, median_filtered
 from runtime.signals.recorded_speed import crossings
 from runtime.signals.states import observed_states
+from runtime.signals.torque_median import taken
 
 Array = np.ndarray
 
@@ -158,9 +160,9 @@ def prepared(model: GeneratedModel, record: Record | Prepared, study: Study) -> 
 
 
 def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
-    """The study with numbers for signals.lowpass.cutoff: auto and, where velocities were recorded,
-    signals.velocity: auto, one for all records, and what they became and why, in words; empty where
-    the study gives them.
+    """The study with numbers for signals.lowpass.cutoff: auto, for signals.torque_median: auto
+    where it is none and, where velocities were recorded, for signals.velocity: auto, one for all
+    records, and what they became and why, in words; empty where nothing changes.
 
     The first EXCERPT samples in the window of the study are looked at, of every record.
     """
@@ -168,9 +170,10 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
     automatic = low is not None and low.cutoff == "auto"
     recorded = signals.velocity == "auto" and signals.reader == "lowpass"
     recorded = recorded and all("qd" in record_of(record).measured for record in records)
-    if not automatic and not (recorded and records):
+    torques = signals.torque_median == "auto" and signals.median > 1
+    if not automatic and not torques and not (recorded and records):
         return study, ""
-    parts = []
+    parts, shares = [], []
     for record in map(record_of, records):
         times = record.times() if isinstance(record, Stream) else [record.t]
         start, stop = 0, len(record)
@@ -178,12 +181,20 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
             start, stop = window_of(times, study.rows.window, record.name)
         part = start, min(stop, start + EXCERPT)
         if isinstance(record, Stream):
-            _, q, _, _, channels = PieceReader(record).read(*part)
+            _, q, tau, _, channels = PieceReader(record).read(*part)
         else:
-            q = record.q[slice(*part)]
+            q, tau = record.q[slice(*part)], record.tau[slice(*part)]
             channels = {key: x[slice(*part)] for key, x in record.channels.items()}
         parts.append((q, channels, record.rate))
+        shares += [taken(tau, q, record.rate, signals.median)] if torques else []
     positions, texts = [(q, rate) for q, _, rate in parts], []
+    if np.max(shares, initial=0.0) > LIMIT.MEDIAN_TAKES:
+        signals, worst = replace(signals, torque_median=1), np.max(shares, axis=0)
+        texts.append(
+            "Torques without a median (torque_median: auto): it would take "
+            f"{100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} in time with "
+            "the motion, as from a controller that answers every count of its encoder."
+        )
     if recorded and records:
         first = cutoff(positions, signals)[0] if automatic else 0.0
         known = replace(signals, lowpass=replace(low, cutoff=first)) if low and first else signals
@@ -217,7 +228,7 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
     """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
     filter, window, decimation.
     """
-    return decimated_rows(median_filtered(tau, selection.signals.median), selection)
+    return decimated_rows(median_filtered(tau, selection.signals.window_of_torques), selection)
 
 
 def decimated_rows(tau: Array, selection: Selection) -> Array:

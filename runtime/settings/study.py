@@ -144,6 +144,10 @@ class Signals(Settings):
     lines : str
         Lines of the encoders at unequal distances, for counts: detected widens the bounds by their
         deviation; estimated finds them with the motion.
+    torque_median : int or str
+        Window of the median filter on torques; auto: as on positions, but none where it would take
+        torque that goes with the motion, as from a controller that answers every count
+        (`runtime.signals.torque_median`).
     """
 
     median: OddWindow = 5
@@ -155,6 +159,7 @@ class Signals(Settings):
     side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
     lines: Literal["detected", "estimated"] = "detected"
+    torque_median: OddWindow | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
         for key, given in (
@@ -167,6 +172,11 @@ class Signals(Settings):
                 "given, but reader is lowpass; it is a setting of reader: counts",
                 key,
             )
+
+    @property
+    def window_of_torques(self) -> int:
+        """Window of the median on torques; that on positions where auto has no record to follow."""
+        return self.median if isinstance(self.torque_median, str) else self.torque_median
 
     @property
     def admits_missing(self) -> bool:

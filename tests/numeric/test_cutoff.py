@@ -9,6 +9,8 @@ from runtime.records.stream import RecordStream
 from runtime.rows.prepared import resolved
 from runtime.settings.study import Signals, Study
 from runtime.signals.cutoff import cutoff
+from runtime.signals.filters import median_filtered
+from runtime.signals.torque_median import taken
 
 RATE = 1000.0
 T = np.arange(10_000) / RATE
@@ -77,3 +79,35 @@ def test_results_say_what_auto_became(records):
     study = runtime.Study(cestac={"delta": [1e-4], "runs": 2})
     perturbed = runtime.cestac(model, records, study)
     assert perturbed.reference.settings["signals"]["lowpass"]["cutoff"] == hertz
+
+
+def pulses(q: np.ndarray, step: float, size: float) -> np.ndarray:
+    """What a controller adds that answers every count by a pulse of 6 ms against it."""
+    steps = np.diff(np.round(q / step), axis=0, prepend=np.round(q[:1] / step))
+    shape = np.exp(-np.arange(40) / 6)
+    return -size * np.apply_along_axis(lambda x: np.convolve(x, shape)[: len(x)], 0, steps)
+
+
+def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
+    q = motion()
+    rng, smooth = np.random.default_rng(3), 10 * q + np.sign(np.gradient(q, axis=0))
+    torque = smooth + 0.1 * rng.standard_normal(q.shape)
+    spoilt = torque.copy()
+    spoilt[::301] += 40 * rng.standard_normal(spoilt[::301].shape)
+    for usual in (torque, spoilt, np.zeros_like(q), torque[:500]):
+        assert not taken(usual, q[: len(usual)], RATE, 5).any()
+    driven = torque + pulses(q, 0.1, 6.0)
+    d = median_filtered(driven, 5) - driven
+    share = taken(driven, q, RATE, 5)
+    assert share[1] > 0.02 and not taken(driven, q, RATE, 1).any()
+    blocks = d.reshape(100, 100, 2).mean(axis=1), driven.reshape(100, 100, 2).mean(axis=1)
+    whole = [np.linalg.norm(x, axis=0) for x in blocks]
+    assert share[1] == pytest.approx((whole[0] / whole[1])[1], rel=0.1)
+    record = runtime.Record(T, np.round(q / 0.1) * 0.1, driven)
+    for one in (record, RecordStream(record, 3000)):
+        study, why = resolved(Study(), [one])
+        assert study.signals.window_of_torques == 1 and study.signals.median == 5
+        assert "Torques without a median" in why
+    assert resolved(Study(), [runtime.Record(T, q, torque)])[0].signals.window_of_torques == 5
+    asked = Study(signals=Signals(torque_median=3))
+    assert resolved(asked, [record])[0].signals.window_of_torques == 3

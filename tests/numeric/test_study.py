@@ -98,6 +98,7 @@ def test_written_settings_read_back(study):
         "step",
         "side",
         "lines",
+        "torque_median",
     }  # complete, defaults filled
 
 

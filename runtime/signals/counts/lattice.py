@@ -132,7 +132,7 @@ def lattice(
             "line to and fro; the motion shakes, as under a controller "
             "that answers single counts. Counts do not show that: what is read, and its stated "
             "deviations, are those of the smooth motion alone. Compare with signals: "
-            "{reader: lowpass}, whose cutoff: auto was several times nearer to the truth there"
+            "{reader: lowpass}: neither is always nearer to the truth there"
         )
     if step is None:
         unequal = (

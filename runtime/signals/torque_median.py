@@ -1,0 +1,42 @@
+"""Whether a running median suits the torques of a record: `signals.torque_median: auto`.
+
+A controller that answers every count of an encoder drives in pulses. Their mean moves the robot,
+and a median cuts them off. With d what the median takes from the torque tau of a joint, and
+means over blocks of LIMIT.TORQUE_BLOCK,
+
+    d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
+
+Spikes, for which a median is there, and noise go with no motion. Measured: docs/truth.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.signals.filters import median_filtered
+
+Array = np.ndarray
+
+
+def taken(tau: Array, q: Array, rate: float, window: int) -> Array:
+    """Share of the torques tau, shape (N, n), that a median over `window` samples takes with the
+    motion q, shape (N, n), shape (n,); 0 where most of what it takes goes with no motion.
+    """
+    block = max(1, round(LIMIT.TORQUE_BLOCK * rate))
+    count, n = len(tau) // block, tau.shape[1]
+    share = np.zeros(n)
+    if window == 1 or count < LIMIT.FEWEST_BLOCKS:
+        return share
+    off = median_filtered(tau, window) - tau
+    off = np.where(np.abs(off) > LIMIT.SPIKE * np.sqrt(np.mean(off**2, axis=0)), 0.0, off)
+    d, torque, place = (
+        x[: count * block].reshape(-1, block, n).mean(axis=1) for x in (off, tau, q)
+    )
+    qd = np.gradient(place, axis=0)
+    columns = np.stack([torque, qd, np.sign(qd)], axis=2)  # (blocks, n, 3)
+    for j in np.flatnonzero(np.isfinite(columns).all(axis=(0, 2)) & torque.any(axis=0)):
+        with_motion = columns[:, j] @ np.linalg.lstsq(columns[:, j], d[:, j], rcond=None)[0]
+        part, whole, size = (np.linalg.norm(x) for x in (with_motion, d[:, j], torque[:, j]))
+        share[j] = part / size if 2 * part**2 > whole**2 else 0.0
+    return share
