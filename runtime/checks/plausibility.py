@@ -263,11 +263,11 @@ def _case(
 
 def _ranked(trials: Sequence[Trial]) -> list[Trial]:
     """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
-    gives the parameters more room, and so has a coupling.
+    gives the parameters more room, and so have a coupling and a spring.
     """
+    roomy = ("rate", "coupling", "spring")
     priced = [
-        replace(t, gain=t.gain - LIMIT.RATE_GAIN * (t.alternative.kind in ("rate", "coupling")))
-        for t in trials
+        replace(t, gain=t.gain - LIMIT.RATE_GAIN * (t.alternative.kind in roomy)) for t in trials
     ]
     return sorted(priced, key=lambda trial: -trial.gain)
 

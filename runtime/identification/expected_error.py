@@ -3,7 +3,8 @@ encoders do to them, carried over to motions of the robot's own range.
 
     D       regressor in states of a reference motion: sines of every joint over a part of the range
             and at a part of the speed of the robot file, or of the record where it has none
-    C       covariance of least squares, wider by the median of corrected over stated deviations
+    C       covariance of least squares with joints weighted by their residuals, wider by the median
+            of corrected over stated deviations
     V       the same, knowing the values of the robot file to LIMIT.VALUES_KNOWN where the fit
             does: (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; their
             estimate is chi_V
@@ -54,7 +55,8 @@ def expected_error(
     observation : Observation
         Rows of the records.
     settings : EstimateSettings
-        Method of the study; deviations are those of its linear companion.
+        Method of the study; deviations are those of its linear companion, weighted by joint where
+        that has no weights: a slide of large forces says nothing of the noise of a wrist.
     fit : Estimate
         The parameters that stand for the robot.
     records : sequence of Prepared or Stream
@@ -66,7 +68,10 @@ def expected_error(
         D = np.asarray(model.regressor(*states))
     except ValueError:  # a loop that does not close
         return float("nan")
-    system = linear_system(observation, linear_companion(settings))
+    linear = linear_companion(settings)
+    if linear.weights == "none":
+        linear = EstimateSettings("wls", "joint", linear.columns)
+    system = linear_system(observation, linear)
     every = assemble(system, system.solve())
     D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in every.names]]
     X = np.array([dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in every.names])
