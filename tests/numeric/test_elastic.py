@@ -4,6 +4,8 @@ springs, integrated by scipy, within the stated deviations.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import planar_2r_model as planar
 import pytest
@@ -30,6 +32,7 @@ def torque(t):
     return (a * np.sin(w * t + np.array([[0.1], [1.0]]))).sum(1)
 
 
+@cache
 def simulated():
     def rate(t, x):
         m, l, md, ld = x.reshape(4, 2)
@@ -42,16 +45,16 @@ def simulated():
     return t, x[:, :2], x[:, 2:4], np.array([torque(time) for time in t])
 
 
-T, MOTOR, LINK, TAU = simulated()
-
-
-def record(seed=0, link=LINK):
+def record(seed=0, link=None):
+    """A noisy record; link : positions of the links, default those of the simulation."""
+    t, motor, q_link, tau = simulated()
     rng = np.random.default_rng(seed)
-    noise = [s * rng.standard_normal(MOTOR.shape) for s in (1e-5, 1e-5, 0.02)]
-    return Record(T, MOTOR + noise[0], TAU + noise[2], q_link=link + noise[1])
+    noise = [s * rng.standard_normal(motor.shape) for s in (1e-5, 1e-5, 0.02)]
+    q_link = q_link if link is None else link
+    return Record(t, motor + noise[0], tau + noise[2], q_link=q_link + noise[1])
 
 
-def found(seed=0, link=LINK):
+def found(seed=0, link=None):
     own = [Prepared(record(seed, link), STUDY)]
     return elasticity(planar, own, planar.BASE_PARAMETERS, TRUE)
 
@@ -73,26 +76,28 @@ def test_scatter_over_noise_is_that_of_the_deviations():
 
 def test_a_late_encoder_is_told_and_costs_no_stiffness():
     """3 ms between the encoders."""
-    late = np.column_stack([np.interp(T - 3e-3, T, x) for x in LINK.T])
+    t, _, link, _ = simulated()
+    late = np.column_stack([np.interp(t - 3e-3, t, x) for x in link.T])
     one, plain = found(link=late), found()
     np.testing.assert_allclose(one.lag - plain.lag, 3e-3, rtol=0.1)
     np.testing.assert_allclose(one.K, K, rtol=0.05)
 
 
 def test_a_joint_without_second_encoder_and_one_that_tells_nothing():
-    one = LINK.copy()
+    t, motor, link, tau = simulated()
+    one = link.copy()
     one[:, 0] = np.nan
     assert found(link=one).joints == ("2",)
-    noise = 1e-2 * np.random.default_rng(5).standard_normal(MOTOR.shape)
-    told = found(link=MOTOR + noise)
+    noise = 1e-2 * np.random.default_rng(5).standard_normal(motor.shape)
+    told = found(link=motor + noise)
     assert np.isnan(told.K).all() and "no stiffness can be told" in told.sentences[0]
-    assert elasticity(planar, [Prepared(Record(T, MOTOR, TAU), STUDY)], (), np.zeros(0)) is None
+    assert elasticity(planar, [Prepared(Record(t, motor, tau), STUDY)], (), np.zeros(0)) is None
 
 
 def test_identify_tells_it_from_a_file(tmp_path):
     one = record()
     l = one.channels["q_link"][:, 1]
-    table = np.column_stack([T, one.q, one.tau, l])
+    table = np.column_stack([simulated()[0], one.q, one.tau, l])
     head = "t,q1,q2,tau1,tau2,l2"
     np.savetxt(tmp_path / "a.csv", table, "%.12g", ",", header=head, comments="")
     study = study_from_mapping(

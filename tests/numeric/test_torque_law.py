@@ -5,6 +5,7 @@ back, from files whole and by blocks, and so do its parameters.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import planar_2r_model as planar
@@ -32,6 +33,7 @@ def reference(t):
     return (a * np.sin(w * t + phase)).sum(1), (a * w * np.cos(w * t + phase)).sum(1)
 
 
+@cache
 def simulated(feed=0.0, moving=True):
     """t, q, qd, q_ref, qd_ref, tau_ff of the arm under its law, integrated by scipy; the inertia
     matrix from the rows of unit accelerations. moving : whether the law follows qd_ref.
@@ -57,12 +59,14 @@ def simulated(feed=0.0, moving=True):
     return t, x[:, :2], x[:, 2:], followed[:, :2], followed[:, 2:] * moving, tau_ff
 
 
-LOGGED = simulated(feed=5.0)
+def logged():
+    """What was logged in the loop with a feed-forward of 5 N m."""
+    return simulated(feed=5.0)
 
 
-def written(folder, logged=LOGGED, **study):
-    """The study of a file run.npz that holds what was logged."""
-    t, q, qd, r, rd, ff = logged
+def written(folder, log=None, **study):
+    """The study of a file run.npz that holds a log; default: what was `logged`."""
+    t, q, qd, r, rd, ff = log or logged()
     named = {"t": t, "q": q, "v": qd, "r": r, "rd": rd, "ff": ff}
     np.savez(folder / "run.npz", **named)
     columns = {"t": "t", "q": "q", "qd": "v", "q_ref": "r", "qd_ref": "rd", "tau_ff": "ff"}
@@ -71,8 +75,8 @@ def written(folder, logged=LOGGED, **study):
     return study_from_mapping({"record": record, **law, **study})
 
 
-def law_torque(logged=LOGGED):
-    _, q, qd, r, rd, ff = logged
+def law_torque(log=None):
+    _, q, qd, r, rd, ff = log or logged()
     return KP * (r - q) + KD * (rd - qd) + ff
 
 
@@ -87,7 +91,7 @@ def test_the_law_is_the_torque_whole_and_by_blocks(tmp_path):
 
 
 def test_without_recorded_velocities_differences_stand_for_them(tmp_path):
-    t, q, _, r, *_ = LOGGED
+    t, q, _, r, *_ = logged()
     table = np.column_stack([t, q, r])
     np.savetxt(tmp_path / "a.csv", table, "%.17g", ",", header="t,q1,q2,r1,r2", comments="")
     study = study_from_mapping(

@@ -9,6 +9,7 @@ coupled elements, massless links.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ class _Constants:
         return Expression.symbol(name)
 
 
+@cache
 def random_robot(seed: int) -> Robot:
     rng = np.random.default_rng([20, seed])
     n = int(rng.choice([2, 3, 4, 5, 6, 7], p=[0.12, 0.22, 0.22, 0.18, 0.14, 0.12]))

@@ -12,12 +12,11 @@ import pytest
 from oracles.named_robots import four_bar, planar_2r, six_r
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import describe_mix, random_parameters, random_robot, random_state
+from oracles.test_emitted_agree import PACKAGED
 from symgen.derive.lagrange import Lagrange, sampled
-from symgen.description import load_robot, packaged_robots
 from symgen.description.robot import Robot
 from symgen.errors import DescriptionError
 
-PACKAGED = [robot for robot in map(load_robot, packaged_robots()) if not robot.passive]
 ROBOTS = [planar_2r(), six_r(), *PACKAGED, *(random_robot(seed) for seed in range(30))]
 TOLERANCE = 1e-10
 
