@@ -7,7 +7,7 @@
 
 `truth`: rigid-body torques by pinocchio, friction and cogging written here in NumPy, white noise of
 2 % of the torques' deviation; the same motion, other noise in every record. Coverage is that of
-1.96 deviations, of scalars that of `FittedScalar.interval`; its standard error sqrt(0.95 0.05/N).
+1.96 deviations, its standard error sqrt(0.95 0.05/N).
 """
 
 from __future__ import annotations
@@ -121,15 +121,15 @@ def truth(records, kinds, robots):
                 fit = fitted_laws(problem, weights=True)
                 s = next(x for x in fit.scalars if x.name == scalar)
                 test = next(x for x in fit.tests if x.parameter == f"LAW{j}")
-                found[scalar].append((s.value, s.sigma, s.interval))
-                found[f"LAW{j}"].append((test.value, test.sigma, 1.96 * test.sigma))
+                found[scalar].append((s.value, s.sigma))
+                found[f"LAW{j}"].append((test.value, test.sigma))
                 X = pseudo @ (problem.Y / sigma)
                 for key, values in usual.items():
                     values.append(X[bare.names.index(key)])
             for key, true in told.items():
-                x, deviation, interval = np.array(found[key]).T
+                x, deviation = np.array(found[key]).T
                 scatter = x.std(ddof=1)
-                covered = 100 * np.mean(np.abs(x - true) < interval)
+                covered = 100 * np.mean(np.abs(x - true) < 1.96 * deviation)
                 print(
                     f"| {name} | {kind} | {key} | {true:g} | {x.mean():.4f} | "
                     f"{(x.mean() - true) / scatter:+.2f} | {scatter:.4f} | "

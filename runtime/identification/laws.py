@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.linear import percent
@@ -43,9 +42,6 @@ class FittedScalar:
         The parameter whose law it is in.
     value, sigma : float
         Estimate and its deviation, jointly with X.
-    blocks : float
-        Effective number of blocks of time that sigma is from, (sum w)**2 / sum w**2 of their
-        shares w in the variance.
     minima : tuple of float
         Other local minima, the best first.
     doubt : str
@@ -56,14 +52,8 @@ class FittedScalar:
     parameter: str
     value: float
     sigma: float
-    blocks: float
     minima: tuple[float, ...]
     doubt: str
-
-    @property
-    def interval(self) -> float:
-        """Half the interval of 95 %, by Student's t of the effective number of blocks."""
-        return self.sigma * float(stdtrit(max(self.blocks - 1, 1), 0.975))
 
 
 @dataclass(frozen=True)
@@ -114,7 +104,7 @@ class FittedLaws:
             else (
                 s.name,
                 s.parameter,
-                f"{s.value:.4g} ± {s.interval:.2g}",
+                f"{s.value:.4g} ± {1.96 * s.sigma:.2g}",
                 ", ".join(f"{x:.4g}" for x in s.minima),
             )
             for s in self.scalars
@@ -145,7 +135,9 @@ class FittedLaws:
     @property
     def line(self) -> str:
         """The scalars in a line."""
-        said = [f"{s.name} {s.doubt or f'{s.value:.4g} ± {s.interval:.2g}'}" for s in self.scalars]
+        said = [
+            f"{s.name} {s.doubt or f'{s.value:.4g} ± {1.96 * s.sigma:.2g}'}" for s in self.scalars
+        ]
         idle = [t.parameter for t in self.tests if not t.earned]
         worth = f"; not worth their scalars on unseen data: {', '.join(idle)}" if idle else ""
         return f"Scalars of laws (± 95 %): {', '.join(said)}{worth}"
@@ -192,7 +184,7 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
         scale = np.array(by_joint)[problem.joint]
         projection = Projection(problem, every, scale)
     u, cost, others = projection.fitted(members)
-    A, X, sigma, number = _joint_deviations(problem, u, scale)
+    A, X, sigma = _joint_deviations(problem, u, scale)
     r = problem.Y - A @ X
     count = len(r) / correlation_time(residual_correlation(r))
     b = len(problem.names)
@@ -209,16 +201,12 @@ def fitted_laws(problem: LawProblem, weights: bool = False) -> FittedLaws:
         test = LawTest(parameter, float(X[c]), float(sigma[c]), p, *errors)
         tests.append(test)
         for k in group:
-            scalars.append(
-                _scalar(problem, k, u, (sigma[b + k], number[b + k]), others.get(g, []), test)
-            )
+            scalars.append(_scalar(problem, k, u, float(sigma[b + k]), others.get(g, []), test))
     return FittedLaws(tuple(scalars), tuple(tests))
 
 
-def _joint_deviations(
-    problem: LawProblem, u: Array, scale: Array
-) -> tuple[Array, Array, Array, Array]:
-    """W, X, and deviations of X and u by blocks of time, with the effective numbers of blocks."""
+def _joint_deviations(problem: LawProblem, u: Array, scale: Array) -> tuple[Array, Array, Array]:
+    """W, X, and deviations of X and u by blocks of time."""
     A = problem.W.copy()
     for c in problem.moving:
         A[:, c] = problem.column(c, u)
@@ -227,10 +215,9 @@ def _joint_deviations(
     whole = np.column_stack([A, S]) / scale[:, None]
     residual = (problem.Y - A @ X) / scale
     T = np.linalg.pinv(np.linalg.qr(whole, mode="r"), rcond=1e-10)
-    blocks = list(split_rows(np.column_stack([whole, residual]), problem.block))
+    blocks = split_rows(np.column_stack([whole, residual]), problem.block)
     C = block_covariance(blocks, np.zeros(whole.shape[1]), T)
-    share = np.array([np.sum((rows[:, :-1] @ T @ T.T) ** 2, axis=0) for rows in blocks])
-    return A, X, np.sqrt(np.diag(C)), share.sum(axis=0) ** 2 / np.sum(share**2, axis=0)
+    return A, X, np.sqrt(np.diag(C))
 
 
 def _half(
@@ -263,14 +250,9 @@ def _unseen(
 
 
 def _scalar(
-    problem: LawProblem,
-    k: int,
-    u: Array,
-    deviation: tuple[float, float],
-    others: Sequence[Array],
-    test: LawTest,
+    problem: LawProblem, k: int, u: Array, sigma: float, others: Sequence[Array], test: LawTest
 ) -> FittedScalar:
-    (sigma, number), name, a = deviation, problem.scalars[k], float(problem.values(u)[k])
+    name, a = problem.scalars[k], float(problem.values(u)[k])
     width = problem.upper[k] - problem.lower[k]
     end = min(u[k] - problem.lower[k], problem.upper[k] - u[k]) < 1e-3 * width
     loose = sigma if problem.log[k] else sigma / width
@@ -283,4 +265,4 @@ def _scalar(
         doubt = f"not determined: it ends at its bound, {a:.3g}"
     minima = tuple(float(problem.values(o)[k]) for o in others)
     sigma *= a if problem.log[k] else 1.0
-    return FittedScalar(name, test.parameter, a, float(sigma), float(number), minima, doubt)
+    return FittedScalar(name, test.parameter, a, sigma, minima, doubt)

@@ -18,7 +18,7 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, channels_of
+from runtime.model.generated import TRANSMITTED, GeneratedModel, channels_of
 from runtime.records.record import Record
 from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
@@ -26,8 +26,6 @@ from runtime.rows.prepared import Prepared, prepared
 
 Array = np.ndarray
 
-TRANSMITTED = "tau_model"
-"""Beginning of the channels that are torques of the model, before the number of the joint."""
 PASSES = 50
 SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 

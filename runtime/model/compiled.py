@@ -33,7 +33,13 @@ from runtime.model.compile_cache import (
     NotCompiledError,
     shared_object,
 )
-from runtime.model.generated import GeneratedModel, channels_of, check_states, constants_of
+from runtime.model.generated import (
+    GeneratedModel,
+    channels_of,
+    check_states,
+    constants_of,
+    require,
+)
 from runtime.model.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
 from runtime.model.narrowing import narrowed_source
 
@@ -266,7 +272,8 @@ class CompiledModel(CompiledSignals):
     def forward_dynamics(
         self, q: Array, qd: Array, tau: Array, X: Array, **constants: float
     ) -> Array:
-        """qdd = A(q)**-1 (tau - bias), shape (N, n)."""
+        """qdd = A(q)**-1 (tau - bias), shape (N, n); ModelError where the module has none."""
+        require(self.module, "forward_dynamics")
         A, H = self.inertia_matrix(q, X, **constants), self.bias(q, qd, X, **constants)
         return np.linalg.solve(A, (np.asarray(tau, dtype=float) - H)[..., None])[..., 0]
 

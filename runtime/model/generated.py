@@ -36,6 +36,8 @@ CONSTANTS = (
     "CONSTANTS",
     "SOURCE_SHA256",
 )
+TRANSMITTED = "tau_model"
+"""Beginning of the channels that are torques of the model, before the number of the joint."""
 OWN_KINDS = ("column", "dissipative")  # of the user's own columns
 SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
 FUNCTIONS = (
@@ -182,6 +184,11 @@ def checked_model(module: ModuleType) -> GeneratedModel:
 def require(model: GeneratedModel, *functions: str) -> None:
     """Raise ModelError unless the model offers all the named functions."""
     missing = [name for name in functions if not callable(getattr(model, name, None))]
+    if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
+        raise ModelError(
+            "no forward_dynamics: laws read tau_model, the torque that it would change",
+            file=model.NAME,
+        )
     if missing:
         raise ModelError(
             f"no function {', '.join(missing)}; emit the model again with the target that has them",

@@ -110,10 +110,10 @@ class Witness:
         self.D = self.model.actuated_regressor(self.q, self.qd, self.qdd)
         self.x, self.xd, self.xdd, self.G = self.model.motion(self.q, self.qd, self.qdd)
         self.A = inertia_of(lambda qdd: self.torque(self.q, 0 * self.q, qdd), self.q)
-        massless = np.linalg.matrix_rank(self.A).min() < self.q.shape[1]
+        no_direct = np.linalg.matrix_rank(self.A).min() < self.q.shape[1] or self.robot.loaded
         self.left_out = {
             *["gravity"] * absorbing,
-            *["forward_dynamics", "forward_dynamics_derivatives"] * bool(massless),
+            *["forward_dynamics", "forward_dynamics_derivatives"] * bool(no_direct),
         }
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:

@@ -106,6 +106,12 @@ def emitted(
                 "module serves",
                 err=True,
             )
+        if robot.loaded:
+            typer.echo(
+                f"{robot.name}: no forward_dynamics: laws of {', '.join(robot.loaded)} read "
+                "tau_model, which depends on the acceleration that it would give",
+                err=True,
+            )
         modules |= files
     return modules
 

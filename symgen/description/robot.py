@@ -46,7 +46,7 @@ from symgen.description.fields import (
     Whole,
     Written,
 )
-from symgen.description.kinds import JOINT_FAMILIES, KINDS, USUAL_KINDS
+from symgen.description.kinds import JOINT_FAMILIES, KINDS, TRANSMITTED, USUAL_KINDS
 from symgen.description.parts import (
     DIRECTIONS,
     FIXED,
@@ -314,6 +314,14 @@ class Robot:
         read = [(c, parameter(e.family, j)) for e in self.elements for j in e.keys
                 for c in e.channels(j)]  # fmt: skip
         return {c: tuple(name for own, name in read if own == c) for c, _ in read}
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Parameters whose laws read the torque that the others transmit: their direct model is
+        implicit, and not given.
+        """
+        read = (own for c, own in self.channels.items() if c.startswith(TRANSMITTED))
+        return tuple(name for own in read for name in own)
 
     def root(self, loop: Loop) -> int:
         """The last frame that carries both ends of a loop: what is before it turns the whole."""

@@ -193,7 +193,12 @@ def context(
         ],
         "tied": spec.tied,
         "passive": robot.passive,
-        "models": EMITTED | {n: m for n, m in ON_REQUEST.items() if n in spec.functions},
+        "models": {
+            n: m
+            for n, m in (EMITTED | ON_REQUEST).items()
+            if (n in spec.functions or not m.option)
+            and not (n == "forward_dynamics" and robot.loaded)
+        },
         "references": any(f.reads("qdr") or f.reads("qddr") for f in spec.functions.values()),
         "functions": spec.functions,
         "takes": {name: list(b.arguments) for name, b in blocks.items()},

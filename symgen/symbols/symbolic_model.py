@@ -236,6 +236,11 @@ class SymbolicModel:
         """qdd = adj(A) (Gamma - H) / det A, by Cramer's rule."""
         robot = self.source.robot
         n = range(len(robot.joints))
+        if robot.loaded:
+            raise SymgenError(
+                f"the direct model of {robot.name}: laws of {', '.join(robot.loaded)} read "
+                "tau_model, which depends on qdd; A qdd = Gamma - H is implicit in it"
+            )
         if len(n) > LARGEST_DIRECT:
             raise SymgenError(
                 f"the direct model of {robot.name} has {len(n)} joints; its closed form is given "

@@ -14,14 +14,15 @@ from scipy.optimize import least_squares
 
 import runtime
 import symgen
-from runtime.errors import InputError
+from runtime.errors import InputError, ModelError
 from runtime.identification.transmitted import transmitted
+from runtime.model.generated import require
 from runtime.records.reading import read_records
 from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from symgen.certify.modules import certified_files
 from symgen.description.yaml import parse_robot
-from symgen.errors import DescriptionError
+from symgen.errors import DescriptionError, SymgenError
 
 ARM = """
 symgen: 1
@@ -117,7 +118,15 @@ def test_columns_of_channels_are_those_of_casadi() -> None:
     np.testing.assert_allclose(tau, D @ X, atol=1e-10)
     with pytest.raises(ValueError, match="9001"):
         module.regressor(q, qd, qdd, temperature=T[:-1])
-    assert len(certified_files(arm, targets=["numpy", "xp", "casadi", "c"])) == 4
+    files = certified_files(arm, targets=["numpy", "xp", "casadi", "c"])
+    assert len(files) == 4
+    # implicit in the torque, so that no target has it
+    assert not any(" forward_dynamics(" in text for text in files.values())
+    assert not hasattr(module, "forward_dynamics")
+    with pytest.raises(ModelError, match="laws read tau_model, the torque that it would change"):
+        require(module, "forward_dynamics")
+    with pytest.raises(SymgenError, match="LD2 read tau_model, which depends on qdd"):
+        str(symgen.symbolic(arm).formulas("forward_dynamics"))
     printed = str(symgen.symbolic(arm).formulas("friction"))
     assert "tau_model2*sign(QP2)*sign(tau_model2)*LD2" in printed and "temperature" in printed
 
