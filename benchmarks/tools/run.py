@@ -15,6 +15,7 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -160,6 +161,9 @@ class Runs:
             robot=str(self.robot),
             urdf=str(self.urdf),
             mdh=self.table,
+            gravity=[
+                g.value(self.case.description.constants) for g in self.case.description.gravity
+            ],
             states=np.stack(states),
         )
 
@@ -311,98 +315,80 @@ def percent(x: float) -> str:
 def tables(rows: dict[str, dict[str, Answer]], missing: dict[str, str]) -> str:
     """The tables of the page; what depends on the machine comes last."""
     names = [name for name in TOOLS if any(name in row for row in rows.values())]
-    title = {name: TOOLS[name].title for name in TOOLS}
+    title = {name: tool.title for name, tool in TOOLS.items()}
 
-    def cells(show: Any) -> list[list[str]]:
-        return [
-            [title[name], *(show(row[name]) if name in row else "" for row in rows.values())]
-            for name in names
-        ]
+    def by_tool(heading: str, show: Callable[[Answer], str], cases: Iterable[str] = rows) -> None:
+        lines = [[title[k], *(show(rows[c].get(k, {})) for c in cases)] for k in names]
+        out.extend([f"### {heading}", "", *table(["tool", *cases], lines)])
 
-    def show_error(row: Answer) -> str:
-        return percent(row["whole"]) if "whole" in row else "-"
-
-    out = ["### Where symgen is not the best", ""]
-    for case, row in rows.items():
-        whole = {k: row[k]["whole"] for k in names if "whole" in row.get(k, {})}
-        best = min(whole, key=whole.__getitem__, default="symgen")
-        if "symgen" in whole and best != "symgen":
-            joints = np.array(row["symgen"]["joints"]), np.array(row[best]["joints"])
-            worse = [str(j + 1) for j in np.flatnonzero(joints[0] > 1.05 * joints[1])]
-            out.append(
-                f"- {case}: {title[best]} {percent(whole[best])} %, symgen "
-                f"{percent(whole['symgen'])} %; joints where symgen is worse by more than a "
-                f"twentieth: {', '.join(worse) or 'none'}"
-            )
-    out += ["", "### Error on unseen data, % of the rms torque", ""]
-    out += table(["tool", *rows], cells(show_error))
-    failed = [
-        f"- {title[name]}, {case}: {row[name]['error']}"
-        for case, row in rows.items()
-        for name in names
-        if row.get(name, {}).get("error")
-    ]
-    out += [*(f"- {title[k]} was not installed: {v}" for k, v in missing.items()), *failed, ""]
-    out += ["### By joint, %", ""]
-    for case, row in rows.items():
-        some = [name for name in names if "joints" in row.get(name, {})]
-        if some:
-            head = [case, *(str(j + 1) for j in range(len(row[some[0]]["joints"])))]
-            out += table(head, [[title[k], *map(percent, row[k]["joints"])] for k in some])
-    out += ["### A physical robot can have the parameters", ""]
-    out += table(["tool", *rows], cells(lambda row: row.get("feasible", "-")))
-    out += ["### Scatter between records beside the deviation that is stated", ""]
-    repeated = [case for case in rows if case == "go2" or case in ROBOTS]
-    out += table(
-        ["tool", *repeated],
-        [
-            [
-                title[k],
-                *(f"{x:.2f}" if (x := rows[c].get(k, {}).get("spread")) else "-" for c in repeated),
-            ]
-            for k in names
-        ],
+    out = ["### Where symgen is not the best", "", *worse(rows, title), ""]
+    by_tool(
+        "Error on unseen data, % of the rms torque",
+        lambda row: percent(row["whole"]) if "whole" in row else "-",
     )
-    out += ["### The cut-off that each chose, Hz (and its setting)", ""]
-    out += table(
-        ["tool", *rows],
-        cells(
-            lambda row: (
-                f"{row['knobs'][0]:g}" + (f" ({row['knobs'][1]:g})" if row["knobs"][1] else "")
-            )
+    out += [f"- {title[k]} was not installed: {text}" for k, text in missing.items()]
+    for name in names:
+        cases: dict[str, list[str]] = {}
+        for case, row in rows.items():
+            if error := row.get(name, {}).get("error"):
+                cases.setdefault(" ".join(error.split()), []).append(case)
+        out += [f"- {title[name]}, {', '.join(own)}: {error}" for error, own in cases.items()]
+    out += ["", "### By joint, %", ""]
+    for case, row in rows.items():
+        own = [name for name in names if "joints" in row.get(name, {})]
+        count = len(row[own[0]]["joints"]) if own else 0
+        lines = [[title[k], *map(percent, row[k]["joints"])] for k in own]
+        out += table([case, *(str(j + 1) for j in range(count))], lines)
+    by_tool("A physical robot can have the parameters", lambda row: row.get("feasible", "-"))
+    by_tool(
+        "Scatter between records beside the deviation that is stated",
+        lambda row: f"{row['spread']:.2f}" if row.get("spread") else "-",
+        [case for case in rows if case == "go2" or case in ROBOTS],
+    )
+    by_tool(
+        "The cut-off that each chose, Hz (and its setting)",
+        lambda row: (
+            f"{row['knobs'][0]:g}" + (f" ({row['knobs'][1]:g})" if row["knobs"][1] else "")
+            if "knobs" in row
+            else "-"
         ),
     )
     out += ["### Five slips in the record", ""]
     for case in (case for case in SLIPPED if case in rows):
-        listed = list(slips(CASES[case]().train[0]))
-        own = [name for name in names if "slips" in rows[case].get(name, {})]
-        out += table(
-            [case, *(title[k] for k in own)],
-            [
-                [slip, *(verdict(rows[case][k]["slips"][i], CAUSES[i]) for k in own)]
-                for i, slip in enumerate(listed)
-            ],
-        )
+        slipped = {k: row["slips"] for k in names if "slips" in (row := rows[case].get(k, {}))}
+        listed = list(enumerate(slips(CASES[case]().train[0])))
+        lines = [
+            [slip, *(verdict(told[i], CAUSES[i]) for told in slipped.values())]
+            for i, slip in listed
+        ]
+        out += table([case, *(title[k] for k in slipped)], lines)
         out += ["What they said, at most three lines each:", ""]
-        for i, slip in enumerate(listed):
-            for k in own:
-                lines = [line for line in rows[case][k]["slips"][i] if not number(line)][:3]
-                out += (
-                    [f"- {slip}, {title[k]}: {' / '.join(line[:160] for line in lines)}"]
-                    if lines
-                    else []
-                )
+        for i, slip in listed:
+            for k, told in slipped.items():
+                words = [line[:160] for line in told[i] if not number(line)][:3]
+                out += [f"- {slip}, {title[k]}: {' / '.join(words)}"] if words else []
         out += [""]
-    out += ["### Lines, seconds of processor and peak memory (MB) of one fit", ""]
-    lines = [
-        [row[0], str(TOOLS[k].lines), *row[1:]] for k, row in zip(names, cells(cost), strict=True)
-    ]
-    out += table(["tool", "lines", *rows], lines)
-    return "\n".join(out)
+    by_tool(
+        "Seconds of processor and peak memory (MB) of one fit",
+        lambda row: f"{row['seconds']:.2g}, {row['memory']:.0f}" if row.get("seconds") else "-",
+    )
+    out += ["Lines that a user writes: " + ", ".join(f"{title[k]} {TOOLS[k].lines}" for k in names)]
+    return "\n".join(out) + ".\n"
 
 
-def cost(row: Answer) -> str:
-    return f"{row['seconds']:.2g}, {row['memory']:.0f}" if row.get("seconds") else "-"
+def worse(rows: dict[str, dict[str, Answer]], title: dict[str, str]) -> list[str]:
+    """Cases that others predict better, and the joints where symgen is worse than the best."""
+    lines = []
+    for case, row in rows.items():
+        whole = {k: answer["whole"] for k, answer in row.items() if "whole" in answer}
+        ranked = sorted(whole, key=whole.__getitem__)
+        better = ranked[: ranked.index("symgen")] if "symgen" in whole else []
+        if better:
+            own, other = (np.array(row[k]["joints"]) for k in ("symgen", better[0]))
+            joints = ", ".join(str(j + 1) for j in np.flatnonzero(own > 1.05 * other)) or "none"
+            errors = ", ".join(f"{title[k]} {percent(whole[k])} %" for k in [*better, "symgen"])
+            lines.append(f"- {case}: {errors}; joints worse by more than a twentieth: {joints}")
+    return lines
 
 
 def main() -> None:

@@ -16,9 +16,11 @@ from scipy.signal import butter, sosfiltfilt
 STEP, LENGTH, WINDOWS = 0.004, 40, 15
 
 
-def model_of(urdf):
-    spec = mujoco.MjSpec.from_file(urdf)
+def model_of(job):
+    spec = mujoco.MjSpec.from_file(job.urdf)
+    spec.option.gravity = job.gravity
     spec.option.timestep = STEP
+    spec.compiler.boundmass = spec.compiler.boundinertia = 1e-3  # a body that is a mass alone
     spec.option.disableflags |= (
         mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
     )
@@ -87,7 +89,7 @@ def windows(job, spec):
 
 
 def fit(job):
-    spec = model_of(job.urdf)
+    spec = model_of(job)
     params = parameters(spec, np.abs(job.tau).max(axis=0))
     residual = sysid.build_residual_fn(models_sequences=windows(job, spec), n_threads=1)
     params, _ = sysid.optimize(params, residual, verbose=False, max_iters=10)

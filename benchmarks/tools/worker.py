@@ -13,7 +13,6 @@ import logging
 import signal
 import sys
 import time
-import traceback
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,7 +45,6 @@ def done(fit, job):
         if isinstance(e, KeyboardInterrupt):
             raise
         answer["error"] = f"{type(e).__name__}: {e}"[:600]
-        print(traceback.format_exc()[-1500:], file=sys.__stderr__)
     signal.setitimer(signal.ITIMER_PROF, 0)
     answer["said"] = said.getvalue()
     status = Path("/proc/self/status").read_text()
