@@ -61,6 +61,7 @@ T = TypeVar("T")
 Measured = tuple[Prepared | Stream, ...]
 """Records as the study reads them."""
 NEED_WHOLE = "a load, friction curves and scalars of laws need"
+NO_CHECKS = "plausibility of the record: not judged beside force sensors; identify without them too"
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
 
@@ -129,7 +130,8 @@ def identify(
             study.validate.record, model, study.stream, missing=study.signals.admits_missing
         )
     wide, records, study, further = with_wrench(model, records, study, further)
-    plausible = (variants is not None if plausible is None else plausible) and wide is model
+    asked = variants is not None if plausible is None else plausible
+    plausible = asked and wide is model
     model = wide
     asked_study = of_links(model, study)
     study, lowpass = resolved(asked_study, records)
@@ -166,6 +168,8 @@ def identify(
         validation, missing = validated(
             fits, observation, unseen, study, model, ", ".join(own_names)
         )
+        if asked and not plausible:
+            missing = (*missing, NO_CHECKS)
         comparison = direct_comparison(observation.first_rows, fits.best(validation, study))
         result = Identification(
             model=model,
