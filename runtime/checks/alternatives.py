@@ -22,12 +22,14 @@ from runtime.checks.samples import Samples
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of, joint_labels, joint_units
+from runtime.settings.units import torque_unit
 
 Array = np.ndarray
 
 TURNS = {"90 degrees": np.pi / 2, "-90 degrees": -np.pi / 2, "180 degrees": np.pi}
 FACTORS = {"1000": 1e3, "1/1000": 1e-3}
 DEGREE = np.pi / 180
+TORQUE_UNITS = ("N*mm", "N*cm", "kgf*cm", "lbf*inch", "ozf*inch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,8 +247,16 @@ def exchanges(make: _Maker) -> Iterator[Alternative]:
 
 
 def units(make: _Maker) -> Iterator[Alternative]:
-    """Degrees for rad and rad for degrees, mm for m; turns for rad."""
+    """Degrees for rad and rad for degrees, mm for m; turns for rad; other torques for N m."""
     turning = np.array([unit == "rad" for unit in make.units])
+    for unit in TORQUE_UNITS if turning.all() else ():
+        yield make(
+            "unit",
+            f"torques: {unit} are read as N*m",
+            f"set record.units.tau: {unit}",
+            T=torque_unit(unit)[1] * make.one,
+            of="a common factor of all torques",
+        )
     for unit, factor, which, of in (
         ("deg", DEGREE, turning, "degrees are read as rad"),
         ("rad", 1 / DEGREE, turning, "rad are read as degrees"),

@@ -3,9 +3,9 @@
 jumps      a step of q between two samples that is LIMIT.JUMP times the usual one and faster than
            any robot: an encoder that dropped out, samples that are
            missing, angles that wrap, two records joined into one
-cut        the largest or the smallest torque holds for many samples, and the fit is better without
-           them: a clipped signal. A torque that saturates
-           the drive and is recorded as it acted leaves the fit as it is
+cut        the largest or the smallest torque holds for many samples, and the model that is fitted
+           to the others goes beyond it: a clipped signal. It meets a torque that saturates the
+           drive and is recorded as it acted
 change     Y = W X + [t > t0] W K x, K all parameters or those of one link and its joint, leaves
            less than 1/LIMIT.CHANGE of what Y = W X leaves, of unseen rows too
 """
@@ -95,19 +95,19 @@ def _wrap(q: Array, high: Array, usual: Array, median: int) -> bool:
 
 @Question(
     "Are the torques recorded in full?",
-    f"less than {100 * LIMIT.CUT:g} % of the samples at the largest torque, or no better fit "
-    "without them",
+    f"less than {100 * LIMIT.CUT:g} % of the samples at the largest torque, or a model of the "
+    f"others that goes beyond it by less than {LIMIT.BEYOND_BOUND:g} times their residual",
     "the signal is clipped: raise the range of the logger, or record a motion that asks "
     "for less torque",
 )
 def cut_torques(case: Case) -> Answer | None:
-    """Torques that stay at their largest or smallest value, and what leaving these samples out
-    changes; None where there are none.
+    """Torques that stay at their largest or smallest value, and what the model fitted to the other
+    samples gives there; None where there are none.
     """
     if case.silent:
         return None
     samples, moving = case.samples, case.samples.moving()
-    at_bounds, shares = np.zeros_like(moving), np.zeros(samples.n)
+    at_bounds, beside, shares = np.zeros_like(moving), np.zeros_like(moving), np.zeros(samples.n)
     for number, one in enumerate(case.straight):
         record, drives, own = one.record, one.drives, samples.record == number
         held = np.stack([_held(tau) for tau in record.tau.T], axis=1)
@@ -115,20 +115,29 @@ def cut_torques(case: Case) -> Answer | None:
             motors = np.stack([_held(u) for u in drives.motor_command(record.tau).T], axis=1)
             held |= motors @ (drives.ratio != 0)
         reach = max(1, round(0.5 * record.rate / samples.cutoff))
-        near = np.searchsorted(record.t, samples.t[own])[:, None] + np.arange(-reach, reach + 1)
-        at_bounds[own] = held[near.clip(0, len(record) - 1)].any(axis=1)
+        k = np.searchsorted(record.t, samples.t[own])
+        near = (k[:, None] + np.arange(-reach, reach + 1)).clip(0, len(record) - 1)
+        at_bounds[own], beside[own] = held[k.clip(0, len(record) - 1)], held[near].any(axis=1)
         shares = np.maximum(shares, held.mean(axis=0))
-    if not at_bounds.any():
+    if not beside.any():
         return None
-    asked = at_bounds.any(axis=0) & (shares < LIMIT.TWO_BOUNDS)
-    apart = moving & ~at_bounds
-    with_them, without = (least_squares(case.grams(mask), 1.0).errors for mask in (moving, apart))
+    asked = beside.any(axis=0) & (shares < LIMIT.TWO_BOUNDS)
+    apart = moving & ~beside
     columns = (case.D != 0).any(axis=0).sum(axis=1)
     few = asked & (apart.sum(axis=0) < 2 * np.maximum(LIMIT.PART_ROWS, columns))
-    clear = with_them - without > LIMIT.LEAST_CHANGE
-    better = np.where(asked & ~few, with_them / np.maximum(without, 0.3), 0.0)
-    clipped = clear & (better > LIMIT.CHANGE)
-    j = int(np.argmax(better if clipped.any() else shares * (few if few.any() else 1)))
+    fit = least_squares(case.grams(apart), 1.0)
+    outward = np.sign(samples.tau - (samples.tau.max(axis=0) + samples.tau.min(axis=0)) / 2)
+    missing = outward * (case.D @ fit.X - samples.tau + samples.tau_known) * at_bounds
+    missing = missing.sum(axis=0) / np.maximum(at_bounds.sum(axis=0), 1)
+    beyond = np.where(asked & ~few, missing / fit.sigma, 0.0)
+    clipped = beyond > LIMIT.BEYOND_BOUND
+    j = int(
+        np.argmax(
+            beyond
+            if clipped.any()
+            else shares * (few if few.any() else asked if asked.any() else 1)
+        )
+    )
     motor = " or of a motor that moves it" if case.straight[0].drives is not None else ""
     text = (
         f"The torque of joint {case.labels[j]}{motor} is at its largest or "
@@ -139,11 +148,12 @@ def cut_torques(case: Case) -> Answer | None:
             "good", f"{text}: the drive knows these two alone, which is no clipped signal"
         )
     if few[j]:
-        return Answer("doubtful", f"{text}: too few others are left to tell what that changes")
+        return Answer("doubtful", f"{text}: too few others are left to tell what it was")
     return Answer(
         "no" if clipped[j] else "good",
-        f"{text}; without them the fit leaves {without[j]:.1f} % of it in place of "
-        f"{with_them[j]:.1f} %",
+        f"{text}; fitted to the others, the model goes beyond it by {missing[j]:.2g} "
+        f"{'N m' if case.turning[j] else 'N'} on average, {beyond[j]:.1f} times the residual "
+        "elsewhere",
     )
 
 

@@ -10,6 +10,7 @@ where there are any.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -319,8 +320,30 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
         return []
     alike = [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain]
     before = problem.unseen(unchanged(problem.samples.n))
-    return [
+    named = [
         trial
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
         if before - problem.unseen(trial.alternative) > np.log(len(trials))
     ]
+    if not named or (given.errors - named[0].fit.errors > 0.2).any():
+        return named
+    least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
+    named += [load for load in loads(problem) if load.gain > least]
+    return sorted(named, key=lambda trial: -trial.gain)
+
+
+def loads(problem: Problem) -> list[Trial]:
+    """The study with other values of the last link than those of the robot file, as a load has
+    them; its ten parameters cost half of log N each. None where the file does not give them.
+    """
+    plain, barrier = unchanged(problem.samples.n), problem.barrier
+    grams = problem.grams(plain)
+    if grams is None or not barrier.known_links[-1:].any():
+        return []
+    link, freed = problem.physical.links[-1], copy(barrier)
+    freed.known_links = np.append(barrier.known_links[:-1], False)
+    cause = f"link {link} has other values than those of the robot file: a load?"
+    remedy = f"say what link {link} carries: payload, or values of the file that hold it"
+    load = replace(plain, kind="load", cause=cause, remedy=remedy)
+    trial = replace(problem, barrier=freed).fitted(load, grams)
+    return [replace(trial, gain=trial.gain - 5 * float(np.log(problem.N)))]

@@ -105,7 +105,8 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         """One sentence."""
         if not self.refused:
             return (
-                "every gain is determined by the load, whose parameters are those with these gains"
+                "every gain is determined by the load, whose parameters are those with them; "
+                "those of the robot are not: set record.torque_constant to the last column"
             )
         return (
             "REFUSED, the load does not change their torque enough (%sigma from "

@@ -48,9 +48,11 @@ KINDS = (
 TURRET = "  1: {ant: 0, sigma: 0, mu: 1, alpha: 0, d: 0, theta: q1, r: 0}"
 
 
-def random_loop(kind: str, seed: int, *, numbers: bool | None = None, behind: int = 0) -> Robot:
+def random_loop(
+    kind: str, seed: int, *, numbers: bool | None = None, behind: int = 0, named: bool = False
+) -> Robot:
     """The robot of a kind and a seed, `behind` that many motors which turn it as a whole; lengths
-    are numbers for odd seeds unless said.
+    are numbers for odd seeds unless said. `named` gives the frames of these motors constants, too.
     """
     rng = np.random.default_rng([57, KINDS.index(kind), seed])
     for _ in range(300):
@@ -71,7 +73,13 @@ def random_loop(kind: str, seed: int, *, numbers: bool | None = None, behind: in
         gravity = "[0, -g, 0]"
         text, loops = (_shifted(part, behind) for part in (text, loops))
         massless = [j + behind for j in massless]
-        text = "\n".join([*(_turning(j, rng) for j in range(1, behind + 1)), text])
+        motors = "\n".join(_turning(j, rng) for j in range(1, behind + 1))
+        if named:
+            decimal = r"-?\d+\.\d+"
+            names = {f"H{k}": float(x) for k, x in enumerate(re.findall(decimal, motors))}
+            unused, constants = iter(names), constants | names
+            motors = re.sub(decimal, lambda _: next(unused), motors)
+        text = f"{motors}\n{text}"
     listed = ", ".join(f"{name}: {x}" for name, x in constants.items())
     bare = f"massless: {sorted(massless)}\n" if massless else ""
     head = f"symgen: 1\nname: loop\ngravity: {gravity}\nconstants: {{{listed}}}\nframes:\n"

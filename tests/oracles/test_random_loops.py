@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import importlib.util
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 
 import numpy as np
 import pytest
@@ -62,10 +63,12 @@ def torques_agree(robot: Robot, module: ModuleType, behind: int = 0) -> None:
         assert np.abs(found - tau).max() < 1e-10 * np.abs(tau).max()
 
 
-def closes(module: ModuleType, q: np.ndarray) -> bool:
-    """Whether the mechanism reaches q, shape (n,)."""
+def closes(
+    module: ModuleType, q: np.ndarray, constants: Mapping[str, float] = MappingProxyType({})
+) -> bool:
+    """Whether the mechanism reaches q, shape (n,), with these constants in place of the file's."""
     try:
-        module.passive_joints(q)
+        module.passive_joints(q, **constants)
     except ValueError:
         return False
     return True
