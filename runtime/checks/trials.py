@@ -325,7 +325,7 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
         if before - problem.unseen(trial.alternative) > np.log(len(trials))
     ]
-    if not named or (given.errors - named[0].fit.errors > 0.2).any():
+    if not named or named[0].fit is None or (given.errors - named[0].fit.errors > 0.2).any():
         return named
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
     named += [load for load in loads(problem) if load.gain > least]
