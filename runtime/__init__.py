@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from runtime.checks.plausibility import plausibility
     from runtime.errors import InputError
     from runtime.estimators.estimate import Estimate
+    from runtime.excitation.poses import static_poses
     from runtime.excitation.search import excite
     from runtime.identification.compare import compare
     from runtime.identification.identification import Identification, identify
@@ -66,12 +67,14 @@ __all__ = [
     "report",
     "resample",
     "simulate",
+    "static_poses",
 ]
 
 _MODULES = {
     "runtime.errors": ("InputError",),
     "runtime.estimators.estimate": ("Estimate",),
     "runtime.loop.methods": ("essential", "estimate"),
+    "runtime.excitation.poses": ("static_poses",),
     "runtime.excitation.search": ("excite",),
     "runtime.identification.compare": ("compare",),
     "runtime.identification.identification": ("Identification", "identify"),

@@ -31,6 +31,7 @@ from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
+from runtime.signals.states import require_motion
 from runtime.table import Table
 
 Array = np.ndarray
@@ -109,6 +110,7 @@ def delay(
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
     """
     study = study or Study()
+    require_motion(study.signals, "a delay")
     own = prepared(model, record, study)
     record = own.record
     duration = float(record.t[-1] - record.t[0])

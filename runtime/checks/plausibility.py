@@ -54,7 +54,7 @@ from runtime.progress import at
 from runtime.records.stream import Stream
 from runtime.rows.prepared import Source, prepared, record_of
 from runtime.settings.study import Study
-from runtime.signals.states import unwrapped
+from runtime.signals.states import require_motion, unwrapped
 from runtime.table import Table
 
 CHECKS: tuple[Callable[[Case], Check | None], ...] = (
@@ -181,6 +181,7 @@ def plausibility(
         of frames too.
     """
     study = study or Study()
+    require_motion(study.signals, "a check of slips")
     several = list(records) if isinstance(records, Sequence) else [records]
     at("plausibility of the record")
     first = times([record_of(record) for record in several])

@@ -46,6 +46,7 @@ from runtime.rows.prepared import resolved
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Study
 from runtime.settings.trajectories import Motion, motion_from_mapping
+from runtime.signals.states import require_motion
 
 Array = np.ndarray
 
@@ -86,6 +87,7 @@ def excite(
     records = (records,) if isinstance(records, Record) else tuple(records)
     require_no_channels(model, "a motion that is sought")
     study, _ = resolved(study or Study(), records)
+    require_motion(study.signals, "a motion that is sought (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
     known = _known(model, records, study, settings)
     limits, weights = limits_of(model, settings.limits), known.weights

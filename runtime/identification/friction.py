@@ -57,6 +57,7 @@ from runtime.rows.prepared import Prepared, prepared
 from runtime.rows.regressor import in_time
 from runtime.settings.study import Study
 from runtime.signals.filters import decimated
+from runtime.signals.states import require_motion
 from runtime.table import Table
 
 Array = np.ndarray
@@ -214,6 +215,7 @@ def friction_curves(
     """Friction against velocity, one curve per joint, from records of the joint side and an
     estimate of all parameters.
     """
+    require_motion(study.signals, "a friction curve")
     require(model, "inverse_dynamics")
     parts = [
         _terms(model, prepared(model, record, study), fit, k) for k, record in enumerate(records)

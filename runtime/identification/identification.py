@@ -46,6 +46,7 @@ from runtime.records.stream import Stream, in_memory
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import Observation
+from runtime.rows.observe import at_rest
 from runtime.rows.prepared import Prepared, prepared, resolved
 from runtime.rows.wrench import with_wrench
 from runtime.settings.record import behind_gears
@@ -131,9 +132,9 @@ def identify(
         )
     wide, records, study, further = with_wrench(model, records, study, further)
     asked = variants is not None if plausible is None else plausible
-    plausible = asked and wide is model
+    plausible = asked and wide is model and study.signals.reader != "static"
     model = wide
-    asked_study = of_links(model, study)
+    asked_study, statement = at_rest(model, records, of_links(model, study))
     study, lowpass = resolved(asked_study, records)
     measured: Measured = tuple(
         record if isinstance(record, Stream) else prepared(model, record, study)
@@ -155,7 +156,7 @@ def identify(
         judged = processes.meanwhile(checks) if plausible else None
         observe = partial(method_observation, model, study=study, workers=processes)
         observation = observe(measured, simulator=simulator)
-        observation = _with_findings(observation, law.text if law else "", load)
+        observation = _with_findings(observation, law.text if law else "", load, statement)
         if plausible and lowpass:
             provenance["lowpass"] += _other_cutoffs(model, measured, study, asked_study)
         fits = fitted(observation, study, model, provenance)
@@ -169,7 +170,8 @@ def identify(
             fits, observation, unseen, study, model, ", ".join(own_names)
         )
         if asked and not plausible:
-            missing = (*missing, NO_CHECKS)
+            rest = "plausibility of the record: not judged for poses at rest"
+            missing = (*missing, rest if statement else NO_CHECKS)
         comparison = direct_comparison(observation.first_rows, fits.best(validation, study))
         result = Identification(
             model=model,
@@ -194,7 +196,7 @@ def identify(
             groups = "; ".join(", ".join(group) for group in result.estimate.groups)
             text = f"physical consistency: the record does not tell apart {groups}"
             result, physical = replace(result, missing=(*missing, text)), False
-        result = _with_elasticity(result)
+        result = result if statement else _with_elasticity(result)
         whole = in_memory(measured, NEED_WHOLE) if friction or study.payload is not None else []
         return replace(
             result,

@@ -10,13 +10,16 @@ from functools import singledispatch
 from pathlib import Path
 from typing import TypeAlias
 
+import numpy as np
+
+from runtime.excitation.poses import StaticPoses
 from runtime.excitation.result import Excitation
 from runtime.identification.compare import Ranking
 from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
 from runtime.limits import LIMIT
-from runtime.loop.result import Simulation
+from runtime.loop.result import Simulation, csv_text
 from runtime.model.generated import joint_labels
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
@@ -37,7 +40,14 @@ RECORD = "simulated.csv"
 
 
 def report(
-    result: Identification | Ranking | Cestac | Advice | Simulation | Excitation | Fleet,
+    result: Identification
+    | Ranking
+    | Cestac
+    | Advice
+    | Simulation
+    | Excitation
+    | StaticPoses
+    | Fleet,
     folder: str | Path | Results,
     *,
     study: Study | None = None,
@@ -46,7 +56,7 @@ def report(
 
     Parameters
     ----------
-    result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or Fleet
+    result : Identification, Ranking, Cestac, Advice, Simulation, Excitation, StaticPoses or Fleet
     folder : str, Path or Results
         Made where it is missing; or one that this process keeps for itself
         (`runtime.result_files.reserved`).
@@ -74,7 +84,7 @@ def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
     raise TypeError(
         f"{type(result).__name__} is no result that is written; expected an Identification, "
-        "Ranking, Cestac, Advice, Simulation, Excitation or Fleet"
+        "Ranking, Cestac, Advice, Simulation, Excitation, StaticPoses or Fleet"
     )
 
 
@@ -169,6 +179,15 @@ def _(result: Excitation, folder: Path, study: Study) -> Files:
         "trajectory.csv": result.to_csv(),
         "motion.yaml": yaml_text({"motion": result.motion.to_mapping()}),
     }
+
+
+@files_of.register
+def _(result: StaticPoses, folder: Path, study: Study) -> Files:
+    """The poses, with their numbers as t: torques beside them make a record of them."""
+    page = Page("Poses at rest", "", [Section(result.model.NAME, listing=result.to_table())])
+    t = np.arange(1.0, len(result.poses) + 1)
+    texts = {"excitation.json": result.to_json(), "poses.csv": csv_text(t, q=result.poses)}
+    return page_files(page) | texts
 
 
 @files_of.register

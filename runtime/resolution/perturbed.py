@@ -34,7 +34,7 @@ from runtime.rows.prepared import Prepared, decimated_torque, observation_from_s
 from runtime.rows.selection import Selection, select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
 from runtime.signals.filters import States, filtered_states
-from runtime.signals.states import observed_states
+from runtime.signals.states import observed_states, require_motion
 
 Array = np.ndarray
 
@@ -206,8 +206,9 @@ def study_columns(
     that `study` describes.
 
     columns : essential names where they are known.
-            Raises SettingsError for a name that is no base parameter.
+            Raises SettingsError for a name that is no base parameter, and for poses at rest.
     """
+    require_motion(study.signals, "the study of encoders")
     if study.cestac.columns == "essential" and columns is None:
         seen = (
             stack([own.by(study).observation(model, None, constants) for own in records])

@@ -40,8 +40,8 @@ from runtime.rows.prepared import (
 )
 from runtime.rows.segments import Cuts, Segment, Window, joined
 from runtime.rows.selection import instants_of, nothing_left
-from runtime.settings.study import Study
-from runtime.signals.states import sentences
+from runtime.settings.study import SIMULATING, Study
+from runtime.signals.states import require_motion, sentences
 
 Array = np.ndarray
 
@@ -104,6 +104,7 @@ def observe(
         )
     blocks = [record.block for record in several if isinstance(record, Stream)]
     if blocks:
+        require_motion(study.signals, "reading by blocks (stream)")
         streams = [
             record
             if isinstance(record, Stream)
@@ -120,6 +121,40 @@ def observe(
         own = [replace(own[0], keep=keep)]
     parts = [one.observation(model, columns, constants) for one in own]
     return parts[0] if len(parts) == 1 else stack(parts)
+
+
+def at_rest(model: GeneratedModel, records: Sequence[Source], study: Study) -> tuple[Study, str]:
+    """The study without the columns that vanish in poses at rest, qd = qdd = 0: those of inertias
+    and of friction; and a sentence on it. As it is, and "", where the records are of a motion.
+
+    Raises
+    ------
+    InputError
+        Every column vanishes.
+    SettingsError
+        Records by blocks, a method that simulates the loop, a load.
+    """
+    if study.signals.reader != "static":
+        return study, ""
+    if study.estimate.method in SIMULATING or study.payload is not None:
+        require_motion(study.signals, "a load, or a method that simulates the loop,")
+    W, asked = observe(model, records, study).W, study.estimate.columns
+    moving = np.abs(W).max(axis=0) > 1e-9 * np.abs(W).max()  # not zero but for rounding
+    acting = set(np.array(model.BASE_PARAMETERS)[moving])
+    names = model.BASE_PARAMETERS if asked == "all" else asked
+    shown = tuple(name for name in names if name in acting)
+    if not shown:
+        raise InputError(
+            f"poses at rest show no parameter of {model.NAME}: gravity acts along none of its "
+            "joints, and there is no offset or spring; record a motion, or correct gravity in the "
+            "robot file"
+        )
+    text = (
+        f"Poses at rest: {len(shown)} of {len(names)} base parameters have a torque in them, the "
+        "others (inertias, friction) are left out. Dry friction holds a joint with a torque of "
+        "unknown sign: approach every pose from both sides and record the mean, or both as poses."
+    )
+    return replace(study, estimate=replace(study.estimate, columns=shown)), text
 
 
 def with_torques(

@@ -148,6 +148,7 @@ def instants_of(
     """
     auto, low = rows.trim == "auto", signals.lowpass
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
+    trim = 0 if signals.reader == "static" else trim
     margin = ceil(LIMIT.END_PERIODS * rate / low.hertz) if auto and low is not None else 0
     start, stop = window_of(times, rows.window, file, margin)
     factor = decimation_factor(signals, rate)

@@ -37,6 +37,9 @@ class ExcitationSettings(Settings):
     ----------
     parts : tuple of Family
         Families in the order of the motion (`runtime.settings.trajectories`).
+    poses : int or None
+        So many poses at rest are sought in place of a motion, for `signals.reader: static`
+        (`runtime.excitation.poses`); null: a motion.
     criterion : str
         record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
         largest predicted %sigma over that of the motion of
@@ -81,6 +84,7 @@ class ExcitationSettings(Settings):
         Fourier(),
         PointToPoint(points=7, travel=1.0, blend=0.25),
     )
+    poses: Count | None = None
     criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"
     columns: Literal["essential", "all"] | Many[Text] = "essential"
     limits: Mapping[str, Any] = field(default_factory=dict)

@@ -132,7 +132,8 @@ class Signals(Settings):
     reader : str
         Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of
         an encoder, which bound the motion, and
-        needs no median.
+        needs no median; static takes each row as a pose at rest, with the mean of its torques: no
+        filter, no decimation, no trim, whatever their settings say.
     step : float or tuple of float or None, rad or m
         Step of the encoders, for counts; null: from the record.
     side : str
@@ -154,7 +155,7 @@ class Signals(Settings):
     lowpass: Lowpass | None = field(default_factory=Lowpass)
     ends: Literal["one-sided", "second-order"] = "one-sided"
     decimate: Decimate | None = field(default_factory=Decimate)
-    reader: Literal["lowpass", "counts"] = "lowpass"
+    reader: Literal["lowpass", "counts", "static"] = "lowpass"
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
@@ -169,9 +170,13 @@ class Signals(Settings):
         ):
             require(
                 self.reader == "counts" or not given,
-                "given, but reader is lowpass; it is a setting of reader: counts",
+                f"given, but reader is {self.reader}; it is a setting of reader: counts",
                 key,
             )
+        if self.reader == "static":
+            single = {"median": 1, "torque_median": 1, "lowpass": None, "decimate": None}
+            for key, value in single.items():
+                object.__setattr__(self, key, value)
 
     @property
     def window_of_torques(self) -> int:

@@ -5,6 +5,7 @@ counts
     positions as counts of encoders (`runtime.signals.counts.reading`), whose posterior mean is then
     filtered alike; errors of the
            velocities are known
+static     poses at rest: q as it is, qd = qdd = 0
 """
 
 from __future__ import annotations
@@ -65,9 +66,11 @@ def observed_states(
         Positions are missing that the reader needs, or are no counts
         (`runtime.signals.counts.reading.read_counts`).
     """
-    if signals.reader == "lowpass":
-        require_positions(missing, "reader: lowpass", name, COUNTS)
-        return filtered_states(q, rate, signals, v)
+    if signals.reader != "counts":
+        require_positions(missing, f"reader: {signals.reader}", name, COUNTS)
+        rest = np.zeros_like(q)
+        static = signals.reader == "static"
+        return States(q, rest, rest) if static else filtered_states(q, rate, signals, v)
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(q, drives, missing)
     if counts is not None:
@@ -75,6 +78,14 @@ def observed_states(
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
     states = joint_states(*reading.motion, rate, signals, drives)
     return replace(states, findings=sentences(reading.findings, name))
+
+
+def require_motion(signals: Signals, who: str) -> None:
+    """SettingsError where the records are poses at rest; who : what needs a motion."""
+    if signals.reader == "static":
+        raise SettingsError(
+            f"static, poses at rest; {who} needs records of a motion", path=("signals", "reader")
+        )
 
 
 def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:

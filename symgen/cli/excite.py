@@ -4,8 +4,9 @@ limits of the robot allow.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -23,7 +24,13 @@ def excite(
     ] = None,
     output: Annotated[
         Path | None,
-        options.folder("trajectory.csv, motion.yaml, excitation.json, report.html, the figure"),
+        options.folder(
+            "trajectory.csv, motion.yaml (or poses.csv), excitation.json, report.html, the figure"
+        ),
+    ] = None,
+    poses: Annotated[
+        int | None,
+        typer.Option(min=1, help="So many poses at rest, which tell gravity, not a motion."),
     ] = None,
     criterion: Annotated[
         str | None,
@@ -41,6 +48,8 @@ def excite(
     """Search an exciting motion. Families, limits and distances: section `excitation` of a study
     file.
 
+    With --poses: poses at rest, which tell the parameters of gravity.
+
     Without RECORD, or with a study file that names none, parameters are the values of the robot
     file.
     """
@@ -53,6 +62,7 @@ def excite(
         study = session.changed(
             session.study_of_arguments([record], recorded=False) if record else runtime.Study(),
             excitation={
+                "poses": poses,
                 "criterion": criterion,
                 "columns": session.names_of(columns),
                 "starts": starts,
@@ -62,7 +72,9 @@ def excite(
         )
         records = read_records(study.record, model, missing=study.signals.admits_missing)
         with session.progress_bar("starts") as progress:
-            result = runtime.excite(model, records, study, workers=workers, progress=progress)
+            seek: Any = partial(runtime.excite, workers=workers, progress=progress)
+            still = study.excitation is not None and study.excitation.poses is not None
+            result = (runtime.static_poses if still else seek)(model, records, study)
         if results is not None:
             runtime.report(result, results)
         text = json_text(result.summary()) if json else result.to_table()
