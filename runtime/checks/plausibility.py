@@ -201,7 +201,8 @@ def plausibility(
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
-        trials = _ranked([*tried(case.problem, case.sides), *searched(case.problem)])
+        every = [*tried(case.problem, case.sides), *searched(case.problem)]
+        trials = _ranked(every, case.problem.given.penalty)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.alternative.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
@@ -262,15 +263,23 @@ def _case(
     return Case(model, own, straight, study, samples, D, variants)
 
 
-def _ranked(trials: Sequence[Trial]) -> list[Trial]:
+def _ranked(trials: Sequence[Trial], penalty: float) -> list[Trial]:
     """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
-    gives the parameters more room, and so have a coupling and a spring.
+    gives the parameters more room, and so has a coupling, and a spring unless it brings them nearer
+    to the values of the robot file. penalty : distance of the study from those, nats.
     """
-    roomy = ("rate", "coupling", "spring")
-    priced = [
-        replace(t, gain=t.gain - LIMIT.RATE_GAIN * (t.alternative.kind in roomy)) for t in trials
-    ]
-    return sorted(priced, key=lambda trial: -trial.gain)
+
+    def price(trial: Trial) -> float:
+        nearer = trial.fit is not None and penalty - trial.fit.penalty > LIMIT.DECISIVE
+        kind = trial.alternative.kind
+        return float(LIMIT.RATE_GAIN) * (
+            kind in ("rate", "coupling") or (kind == "spring" and not nearer)
+        )
+
+    return sorted(
+        (replace(trial, gain=trial.gain - price(trial)) for trial in trials),
+        key=lambda trial: -trial.gain,
+    )
 
 
 __all__ = ["Plausibility", "plausibility"]

@@ -25,7 +25,7 @@ from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_fi
 
 Array = np.ndarray
 
-SIGNALS = ("t", "q", "qd", "qdd", "tau", "tau_known", "record")
+SIGNALS = ("t", "q", "qd", "qdd", "tau", "tau_known", "steady", "record")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +40,9 @@ class Samples:
         Measured at the joints, before known torques are subtracted.
     tau_known : ndarray, shape (K, n), N m or N
         Known torques.
+    steady : ndarray of bool, shape (K, n)
+        Whether the joint keeps its direction as far as the low-pass reaches: at a reversal filtered
+        torques hold a part of the dry friction, its regressor sign(qd) all of it.
     record : ndarray of int, shape (K,)
         Number of the record of each instant.
     cutoff : float, Hz
@@ -52,6 +55,7 @@ class Samples:
     qdd: Array
     tau: Array
     tau_known: Array
+    steady: Array
     record: Array
     cutoff: float
 
@@ -68,8 +72,8 @@ class Samples:
         return np.asarray(LIMIT.STANDING * np.abs(self.qd).max(axis=0))
 
     def moving(self) -> Array:
-        """Whether each joint moves at each instant, bool (K, n)."""
-        return moving(self.qd)
+        """Whether each joint moves at each instant, and keeps its direction, bool (K, n)."""
+        return np.asarray(moving(self.qd) & self.steady)
 
     def still(self) -> Array:
         """Whether each joint stands still in the whole record, (n,)."""
@@ -170,14 +174,29 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _filtered(own: Prepared, study: Study, number: int) -> Samples:
-    """One record, one sample in about 0.8 rate/(2 cutoff)."""
+    """One record, one sample in about 0.8 rate/(2 cutoff), without 2/cutoff at each end."""
     record = own.record
     cutoff, states, torque = lowpassed(own, study)
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
     step = max(1, int(0.8 * record.rate / (2 * cutoff)))
-    kept = np.flatnonzero(usable(record, study, step, 3 * step))[3 * step : -3 * step : step]
+    kept = np.flatnonzero(usable(record, study, step, 3 * step))[5 * step : -5 * step : step]
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)
-    signals = (record.t, states.q, states.qd, states.qdd, torque(record.tau), torque(known))
+    steady = np.stack([_steady(qd, record.rate / cutoff) for qd in states.qd.T], axis=1)
+    motion = (record.t, states.q, states.qd, states.qdd)
+    signals = (*motion, torque(record.tau), torque(known), steady)
     used = {name: x[kept] for name, x in zip(SIGNALS, signals, strict=False)}
     return Samples(**used, record=np.full(len(kept), number), cutoff=cutoff)
+
+
+def _steady(qd: Array, reach: float) -> Array:
+    """Whether the sign of a velocity is one from `reach` samples before to as many after, bool
+    (N,); half of that, or none of it, where less than half of the samples would be left.
+    """
+    turned = np.cumsum(np.diff(np.sign(qd), prepend=np.sign(qd[:1])) != 0)
+    k = np.arange(len(qd))
+    for far in (round(reach), round(reach / 2)):
+        steady = turned[(k + far).clip(max=len(qd) - 1)] == turned[(k - far).clip(min=0)]
+        if 2 * steady.sum() >= len(qd):
+            return np.asarray(steady)
+    return np.ones(len(qd), dtype=bool)

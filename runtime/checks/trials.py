@@ -122,6 +122,7 @@ class Problem:
             return None
         back = self.F @ np.linalg.inv(alternative.T)
         still = ~moving(alternative.states(self.samples)[1])
+        still |= ~self.samples.steady @ (np.abs(alternative.P.T) > 1e-12)
         mask = still @ (np.abs(back) > 1e-12).T == 0
         return back @ D, self.tau - alternative.subtracted(self.samples) @ back.T, mask
 

@@ -336,7 +336,9 @@ def test_the_speed_of_the_remedy_leaves_out_what_stands() -> None:
     t = np.arange(5000) / 500
     qd = np.where(t < 3, 0.013, 0.72 * np.sin(t)) + 1e-6 * np.sin(40 * t)
     zero = np.zeros((len(t), 1))
-    samples = Samples(t, zero + t[:, None], qd[:, None], zero, zero, zero, zero[:, 0], 10.0)
+    samples = Samples(
+        t, zero + t[:, None], qd[:, None], zero, zero, zero, qd[:, None] != 0, zero[:, 0], 10.0
+    )
     low = low_speed_of_rest(samples, Study())
     assert low == 0.015
     assert standing_share(samples, Study(rows=Rows(low_speed=low))).max() == 0
