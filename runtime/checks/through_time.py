@@ -21,6 +21,7 @@ import numpy as np
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question
 from runtime.checks.fits import Grams, least_squares
+from runtime.checks.samples import moving as in_motion
 from runtime.errors import instant
 from runtime.limits import LIMIT
 from runtime.signals.filters import median_filtered
@@ -106,7 +107,7 @@ def cut_torques(case: Case) -> Answer | None:
     """
     if case.silent:
         return None
-    samples, moving = case.samples, case.samples.moving()
+    samples, moving = case.samples, in_motion(case.samples.qd)
     at_bounds, beside, shares = np.zeros_like(moving), np.zeros_like(moving), np.zeros(samples.n)
     for number, one in enumerate(case.straight):
         record, drives, own = one.record, one.drives, samples.record == number
@@ -197,8 +198,8 @@ def change(case: Case) -> Answer | None:
     best, text = 0.0, "One fit serves all of it"
     for number in np.unique(samples.record):
         own = samples.record == number
-        t = samples.t[own]
-        for split in t[np.linspace(0, len(t) - 1, LIMIT.SPLITS + 2).astype(int)[1:-1]]:
+        t = case.straight[number].record.t
+        for split in np.linspace(t[0], t[-1], LIMIT.SPLITS + 2)[1:-1]:
             masks = [moving & (own & (turns == k))[:, None] for k in (0, 1)]
             since = (samples.t >= split)[:, None]
             parts = [(case.grams(mask), case.grams(mask & since)) for mask in masks]
