@@ -205,6 +205,22 @@ def test_friction_that_the_model_lacks_is_no_spring(k: int) -> None:
     assert row["other causes"] == []
 
 
+@pytest.mark.parametrize("k", sampled([1, 3, 4, 6, 9], 0, always=(4,)))
+def test_a_slow_right_study_is_told_no_cause(k: int) -> None:
+    """Nearly all torque is friction: filtered at reversals and at the ends, it was told as gravity
+    along x, degrees read as rad, alpha of frame 1.
+    """
+    robot = world.ROBOTS["scara"]
+    simulated, move = world.Truth(robot, 7_000_000 + k), world.slow(robot, 7_000_000 + k)
+    tau = simulated.torque(move)
+    tau = tau + world.noise(tau, 0.9, 0.02, 7_000_000 + k)
+    model, variants = emitted(robot.name)
+    judged = runtime.plausibility(
+        model, record_of(move, tau), study(robot, "slow"), variants=variants
+    )
+    assert not judged.named_causes and all(check.state != "no" for check in judged.checks)
+
+
 def test_time_stamps_off_by_a_twentieth_of_a_period_are_told() -> None:
     move = world.chirp(truth_counts.FREE, 3, seconds=2.0)
     for jitter in (0.0, 0.055):
