@@ -27,7 +27,7 @@ def survivors(found: list[Fault]) -> list[Fault]:
 
 
 def test_a_few_faults_are_refused() -> None:
-    assert survivors(faults(13, 5)) == []
+    assert survivors(faults(7, 5)) == []
 
 
 @campaign

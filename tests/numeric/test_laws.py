@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 import pytest
+from campaign import campaign
 from scipy.optimize import least_squares
 
 import runtime
@@ -73,6 +74,7 @@ def record_of(model, noise: float, seed: int = 1, **changes: float):
     return runtime.Record(t, q, tau, rate=200.0, name="arm")
 
 
+@campaign
 def test_variable_projection_is_least_squares_on_everything(model) -> None:
     """The same minimum of X and scalars together, found by scipy from 20 other starts."""
     own = [prepared(model, record_of(model, 0.2), STUDY)]
