@@ -96,8 +96,8 @@ def validated(
 ) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
     """Windows of the records of that `name` against each other, or fifths of them where halves
     prefer all parameters to physical ones, then further records, `unseen`; and what could not be
-    done. None where the method did not end well: each would simulate a loop that
-    is wrong once more.
+    done. Nothing is validated where the method did not end well, since each validation would
+    simulate a wrong loop once more.
     """
     method, status = study.estimate.method, fits.estimate.status
     if status != "ok" and method not in LINEAR:
@@ -126,7 +126,7 @@ def validated(
 def agreement(
     fits: Fits,
     observation: Observation,
-    own_names: Sequence[str],
+    fitted_names: Sequence[str],
     unseen: Mapping[str, Observation],
     study: Study,
     model: GeneratedModel,
@@ -134,9 +134,9 @@ def agreement(
     """Whether several records agree: in all parameters, or in the essential ones where one of the
     records does not determine all. None for one record.
     """
-    if len(own_names) + len(unseen) < 2:
+    if len(fitted_names) + len(unseen) < 2:
         return None
-    parts = {name: observation.of_record(k) for k, name in enumerate(own_names)} | dict(unseen)
+    parts = {name: observation.of_record(k) for k, name in enumerate(fitted_names)} | dict(unseen)
     in_all = homogeneity(parts, fits.reduced.all_parameters.names, study.estimate, model=model)
     if not in_all.untested:
         return in_all

@@ -150,7 +150,7 @@ def identify(
         **({"law": law.summary()} if law else {}),
     }
     names = record_names([*records, *further])
-    own_names, further_names = names[: len(records)], names[len(records) :]
+    fitted_names, further_names = names[: len(records)], names[len(records) :]
     with started(workers) as processes:
         checks = partial(plausibility, model, measured, asked_study, variants=variants)
         judged = processes.meanwhile(checks) if plausible else None
@@ -167,7 +167,7 @@ def identify(
             for name, record in zip(further_names, further, strict=True)
         }
         validation, missing = validated(
-            fits, observation, unseen, study, model, ", ".join(own_names)
+            fits, observation, unseen, study, model, ", ".join(fitted_names)
         )
         if asked and not plausible:
             rest = "plausibility of the record: not judged for poses at rest"
@@ -183,7 +183,7 @@ def identify(
             comparison=comparison,
             validation=validation,
             sets=fits.sets,
-            homogeneity=agreement(fits, observation, own_names, unseen, study, model),
+            homogeneity=agreement(fits, observation, fitted_names, unseen, study, model),
             missing=missing,
             correlations=weak_directions(observation, study.estimate),
             coupling=coupling_fits(

@@ -5,7 +5,7 @@ settings, and the estimate in a file that a robot file or a program is given.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,7 @@ class SetDocument:
     names: tuple[str, ...]
     X: Vector
     sigma_corrected: Vector
-    standard: dict[str, float]
+    standard: dict[str, float] = field(default_factory=dict)  # files of before have none
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -252,27 +252,27 @@ def load_whole_estimate(path: Path | str) -> Estimate:
     details.standard are those of that set; the others, the covariance among them, those of
     least squares. InputError as `load_estimate`.
     """
-    fit = load_estimate(path)
-    if not json.loads(read_text(path)).get("sets"):
+    fit, text = load_estimate(path), read_text(path)
+    if not json.loads(text).get("sets"):
         return fit
-    document = from_text(SetsDocument, read_text(path), ESTIMATE, str(path))
-    sets = {own.name: own for own in document.sets}
-    own = sets.get(whole_set(sets, document.model_columns))
+    document = from_text(SetsDocument, text, ESTIMATE, str(path))
+    sets = {one.name: one for one in document.sets}
+    whole = sets.get(whole_set(sets, document.model_columns))
     if (
-        own is None
-        or own.names != fit.names
-        or not len(own.X) == len(own.sigma_corrected) == len(fit.X)
+        whole is None
+        or whole.names != fit.names
+        or not len(whole.X) == len(whole.sigma_corrected) == len(fit.X)
     ):
         raise InputError(
             "its sets are not those of its parameters; the file was changed", file=str(path)
         )
     return replace(
         fit,
-        method="feasible" if own.name == "feasible" else fit.method,
-        X=own.X,
-        sigma_corrected=own.sigma_corrected,
-        relative_error=own.relative_error,
-        details={**fit.details, **({"standard": own.standard} if own.standard else {})},
+        method="feasible" if whole.name == "feasible" else fit.method,
+        X=whole.X,
+        sigma_corrected=whole.sigma_corrected,
+        relative_error=whole.relative_error,
+        details={**fit.details, **({"standard": whole.standard} if whole.standard else {})},
     )
 
 
