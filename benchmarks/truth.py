@@ -4,8 +4,8 @@ known bodies by simulators of another make (`benchmarks/truth_simulator.py`).
     python benchmarks/truth.py --question coverage --records 60 --seeds first --workers 1
 
 prints one table as Markdown and writes truth_NAME_SEEDS.json. Record k of a question always has the
-seed BASE[seeds] + k, whatever the number of records: `first` is for tuning, `second` and `third` have
-other robots each and are run once, at the end of the work of their time. The code that is judged is called by its public interface alone.
+seed BASE[seeds] + k, whatever the number of records: `first` is for tuning; `second`,
+`third` and `fourth` have other robots each and are run once, at the end of the work of their time. The code that is judged is called by its public interface alone.
 
     coverage       intervals of the sets of parameters against the truth; their errors on unseen motion
     ends           records without noise: what the ends of the filters leave
@@ -59,7 +59,7 @@ from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
 
 import runtime
 
-BASE = {"first": 1_000_000, "second": 2_000_000, "third": 3_000_000}
+BASE = {"first": 1_000_000, "second": 2_000_000, "third": 3_000_000, "fourth": 4_000_000}
 """Seeds: record k has BASE + k."""
 SAVED = 30.0
 """Time between two writings of the rows, s."""

@@ -200,7 +200,7 @@ FREE = world.Robot(
 
 def counts_random(k: int, seed: int, seeds: str) -> list[Row]:
     """One reading of two encoders, 2 s of any motion, half of them healthy."""
-    rng = np.random.default_rng([seed, 67, ("first", "second", "third").index(seeds)])
+    rng = np.random.default_rng([seed, 67, ("first", "second", "third", "fourth").index(seeds)])
     condition = "healthy" if k % 2 == 0 else CONDITIONS[1 + (k // 2) % (len(CONDITIONS) - 1)]
     step, motion = 2 * pi / 10 ** rng.uniform(2.0, 5.0), list(world.MOTIONS)[int(rng.integers(4))]
     size = 10 ** rng.uniform(-2, 0)

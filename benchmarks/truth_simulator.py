@@ -132,7 +132,7 @@ class Robot:
         """Limits of the torque in the file, (n,): 1000 N m or N for the robots of FIRST and SPECIAL,
         as when their tables were made; else three times the largest torque of the nominal bodies.
         """
-        if self not in (*SECOND, *THIRD):
+        if self not in (*SECOND, *THIRD, *FOURTH):
             return np.full(self.n, 1000.0)
         still = replace(self.nominal, viscous=np.zeros(self.n), dry=np.zeros(self.n))
         motion = fourier(self, 0)
@@ -342,6 +342,68 @@ THIRD = (
         Joint((0.07, 0.0, 0.08), RIGHT, Z, 0.9, (0.1, 0.09, 0.1), (0.015, 0.01, 0.05), 2.5, 3.0),
     ),
 )
+FOURTH = (
+    _robot(
+        "polar",
+        Joint((0.0, 0.0, 0.5), O, Z, 22.0, (0.3, 0.3, 0.5), (0.03, 0.01, -0.1), 2.2, 2.0),
+        Joint((0.0, 0.1, 0.0), LEFT, Z, 14.0, (0.25, 0.25, 0.3), (0.02, -0.04, 0.05), 1.0, 2.2),
+        Joint(O, RIGHT, Z, 7.0, (0.1, 0.1, 0.8), (0.0, 0.01, -0.15), 0.25, 0.8, True),
+        Joint((0.0, 0.0, 0.3), O, Z, 1.4, (0.1, 0.14, 0.1), (0.03, 0.0, 0.04), 2.6, 6.0),
+    ),
+    _robot(
+        "snake",
+        Joint((0.0, 0.0, 0.2), (0.0, 0.3, 0.0), Z, 6.0, (0.16, 0.16, 0.2), O, 2.0, 2.5),
+        Joint((0.03, 0.0, 0.15), LEFT, Z, 4.0, (0.3, 0.1, 0.1), (0.13, 0.0, 0.02), 1.2, 2.8),
+        Joint((0.28, 0.0, 0.02), RIGHT, Z, 2.8, (0.26, 0.1, 0.1), (0.11, 0.01, 0.0), 1.3, 3.2),
+        Joint((0.25, 0.0, 0.02), LEFT, Z, 1.8, (0.22, 0.08, 0.08), (0.09, 0.0, 0.01), 1.5, 4.0),
+    ),
+    _robot(
+        "wall",
+        Joint(
+            (0.0, 0.0, 1.0), (0.0, 1.1, 0.0), Z, 26.0, (0.3, 0.25, 0.3), (0.04, 0.0, -0.1), 2.1, 1.9
+        ),
+        Joint((0.15, 0.0, 0.1), LEFT, Z, 17.0, (0.6, 0.14, 0.15), (0.26, 0.01, 0.07), 1.0, 2.0),
+        Joint((0.55, 0.0, 0.0), O, Z, 9.0, (0.25, 0.2, 0.2), (0.06, 0.05, 0.0), 1.2, 2.4),
+        Joint((0.1, 0.4, 0.0), LEFT, Z, 4.0, (0.12, 0.12, 0.3), (0.0, 0.01, -0.15), 2.3, 3.5),
+        Joint(
+            (0.0, 0.0, 0.1),
+            (0.0, pi / 3, 0.0),
+            Z,
+            2.2,
+            (0.12, 0.14, 0.12),
+            (0.02, 0.01, 0.03),
+            2.0,
+            4.0,
+        ),
+        Joint(
+            (0.0, 0.0, 0.12),
+            (0.0, -pi / 3, 0.0),
+            Z,
+            1.2,
+            (0.14, 0.1, 0.1),
+            (0.03, 0.0, 0.06),
+            2.7,
+            5.5,
+        ),
+    ),
+    _robot(
+        "bridge",
+        Joint(O, (0.0, pi / 2, 0.0), Z, 35.0, (0.3, 0.9, 0.2), (0.0, 0.05, 0.0), 0.5, 0.9, True),
+        Joint(O, (pi / 2, 0.0, 0.0), Z, 16.0, (0.3, 0.25, 0.3), (0.02, 0.0, 0.0), 0.4, 0.9, True),
+        Joint(
+            (0.1, 0.0, 0.0),
+            (0.0, -0.8, 0.4),
+            Z,
+            5.0,
+            (0.14, 0.14, 0.3),
+            (0.02, 0.01, 0.1),
+            2.2,
+            3.0,
+        ),
+        Joint((0.0, 0.05, 0.25), LEFT, Z, 3.2, (0.3, 0.1, 0.1), (0.12, 0.0, 0.03), 1.3, 3.4),
+        Joint((0.3, 0.0, 0.0), RIGHT, Z, 1.3, (0.1, 0.12, 0.12), (0.02, 0.02, 0.05), 2.4, 5.0),
+    ),
+)
 SPECIAL = (
     _robot(
         "pan_tilt",
@@ -355,7 +417,9 @@ SPECIAL = (
         Joint(O, (0.0, pi / 2, 0.0), Z, 8.0, (0.5, 0.1, 0.1), O, 0.25, 0.6, True),
     ),
 )
-ROBOTS: Mapping[str, Robot] = {robot.name: robot for robot in (*FIRST, *SECOND, *THIRD, *SPECIAL)}
+ROBOTS: Mapping[str, Robot] = {
+    robot.name: robot for robot in (*FIRST, *SECOND, *THIRD, *FOURTH, *SPECIAL)
+}
 
 
 class Truth:
@@ -699,6 +763,6 @@ def in_loop(
 
 
 __all__ = [
-    "FIRST", "MOTIONS", "NOISES", "RATE", "ROBOTS", "SECOND", "SPECIAL", "THIRD", "Bodies", "Encoder", "Lines", "Motion",
+    "FIRST", "FOURTH", "MOTIONS", "NOISES", "RATE", "ROBOTS", "SECOND", "SPECIAL", "THIRD", "Bodies", "Encoder", "Lines", "Motion",
     "Robot", "Truth", "encoded", "in_loop", "lines_of", "noise", "replace",
 ]  # fmt: skip
