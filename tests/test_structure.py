@@ -91,17 +91,17 @@ LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be m
 # Code that moves from one room to another takes its share of the budget with it.
 BUDGET = {
     "symgen": {
-        "": 69,
+        "": 65,
         "description": 3206,
-        "derive": 3015,
+        "derive": 3011,
         "regroup": 991,
-        "emit": 1066,
-        "symbols": 1307,
-        "certify": 1096,
-        "report": 299,
-        "update": 760,
-        "demo": 230,
-        "studio": 904,
+        "emit": 1065,
+        "symbols": 1305,
+        "certify": 1099,
+        "report": 295,
+        "update": 757,
+        "demo": 226,
+        "studio": 900,
         "cli": 801,
     },
     "runtime": {
@@ -120,7 +120,7 @@ BUDGET = {
         "reporting": 964,
     },
 }
-TOTAL = {"symgen": 13_744, "runtime": 19_965}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_721, "runtime": 19_965}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is

@@ -171,11 +171,7 @@ class Certificate:
                 f"{self.torque_error:.1e} of the largest",
             ),
         ]
-        checks += [(True, f"{file} {t.sentence}") for file, t in self.texts.items() if t.not_run]
-        return checks + [
-            (error < TOLERANCE, f"{what} against CasADi: {error:.1e} of the largest")
-            for what, error in self.errors.items()
-        ]
+        return checks + [check for file, text in self.texts.items() for check in text.checks(file)]
 
     def mapping(self) -> dict[str, Any]:
         """The certificate as plain values for JSON; null stands for a number that is not finite."""

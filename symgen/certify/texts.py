@@ -79,6 +79,19 @@ class TextCheck:
     def valid(self) -> bool:
         return not self.wrong and bool(self.errors or self.not_run)
 
+    def checks(self, file: str) -> list[tuple[bool, str]]:
+        """Whether each function agrees with the witness, and whether the tables are right."""
+        if self.not_run:
+            return [(True, f"{file} {self.sentence}")]
+        tables = [name for name in self.errors if name.isupper()]
+        wrong = [name for name in tables if name in self.wrong]
+        told = f"tables of {file} against the robot file: {', '.join(wrong or tables)}"
+        return [
+            (error < TOLERANCE, f"{name} of {file} against CasADi: {error:.1e} of the largest")
+            for name, error in self.errors.items()
+            if name not in tables
+        ] + [(not wrong, told)] * bool(tables)
+
     @property
     def sentence(self) -> str:
         """What ran."""
