@@ -41,8 +41,8 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
                 meant = PI * Fraction(k, 12)
                 notes.append(
                     f"frame {f.j}: {name} has {angle}, not {meant}: "
-                    f"another robot, with other formulas; write {meant} (a URDF is read so "
-                    "without --exact)"
+                    f"another robot, with other formulas; if {meant} is meant, write it (in a URDF "
+                    "the angles or offsets that give it; or leave out --exact)"
                 )
     return notes
 
