@@ -245,7 +245,8 @@ def _root(links: dict[str, Inertial | None], joints: list[Joint], line: int) -> 
         parent[joint.child] = joint.parent
     roots = [link for link in links if link not in parent]
     if len(roots) != 1:
-        roots_text = ", ".join(map(repr, roots[:5])) or "none: the joints form a cycle"
+        none = "none: the joints form a cycle" if links else "none: there is no <link>"
+        roots_text = ", ".join(map(repr, roots[:5])) or none
         raise DescriptionError(
             f"links without parent: {roots_text}; expected one, the base", line=line
         )

@@ -83,6 +83,11 @@ def test_faults_are_errors_with_their_line(old, new, line, words):
     assert words in error.message and error.line == line
 
 
+def test_a_file_without_links_is_told():
+    """What a failed xacro leaves; it was said to have joints in a circle."""
+    assert "there is no <link>" in error_of('<robot name="empty"></robot>').message
+
+
 def test_what_makers_leave_out():
     """Limits that mean none, an inertia not given, the axis of a fixed joint: as files of makers
     have them.
