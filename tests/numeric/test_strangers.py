@@ -7,6 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from campaign import sampled
 from scipy.signal import butter, sosfiltfilt
 from typer.testing import CliRunner
 
@@ -326,7 +327,7 @@ NAMES = {  # of three loggers: columns of q, of tau, of time, and what is beside
 }
 
 
-@pytest.mark.parametrize("logger", NAMES)
+@pytest.mark.parametrize("logger", sampled(NAMES, 0, always=("camel",)))
 def test_a_study_is_suggested_where_a_record_is_refused(tmp_path, logger) -> None:
     """First number fast: columns of another logger, stamps that jitter, samples that are missing.
     One command writes the study and gives the number; that study alone gives it again.

@@ -105,6 +105,7 @@ elements:
 """
 
 
+@pytest.mark.campaign
 def test_what_closes_does_not_hang_on_the_states_beside_it() -> None:
     """States out of reach, in which Newton stalls, end no other one; before, states that closed
     when drawn did not when looked at again, and a traceback ended the certificate.
