@@ -12,18 +12,25 @@ compared with the others, X_-k fitted to all their blocks,
 
     d = X_k - X_-k,     S = C_k + C_-k by the jackknife over blocks, B blocks in all
 
-    per parameter    z = d_i/sqrt(S_ii), Student's t with B - 2 degrees of freedom; probabilities
+    per parameter    z = d_i/sqrt(S_ii), Student's t with nu_i degrees of freedom; probabilities
                      by Holm
-    in all           (B - 1 - b)/((B - 2) b) d' S^-1 d: F(b, B - 1 - b), its probability times the
+    in all           (nu + 1 - b)/(nu b) d' S^-1 d: F(b, nu + 1 - b), its probability times the
                      number of comparisons
 
-Each test has half of the level. The second is left out where there are fewer than 2 b blocks: S is
-then known too badly to be inverted.
+A scatter of blocks of which some tell more than others is known as badly as that of fewer equal
+ones. With w_k the share of block k in what is known of a parameter or, by its trace, of all, of
+independent residuals,
+
+    nu = (B - 2)/B/(sum_k w_k^2)    after Satterthwaite,    B - 2 of equal blocks
+
+Each test has half of the level. The second is left out where nu < FREEDOM b: S is then known too
+badly to be inverted.
 Records that differ say that the robot changed (load, temperature, wear), that something in one
 record is wrong, or that the model leaves out what their motions do
 not share: the stated deviations know nothing of model error.
 
-References: Hotelling (1931) for the test in all; Cochrane and Orcutt (1949) for whitened rows; Holm
+References: Hotelling (1931) for the test in all; Satterthwaite (1946), Bell and McCaffrey (2002)
+for degrees of freedom, by blocks; Cochrane and Orcutt (1949) for whitened rows; Holm
 (1979).
 """
 
@@ -49,6 +56,7 @@ from runtime.settings.study import EstimateSettings
 from runtime.table import Table
 
 Array = np.ndarray
+FREEDOM = 1.2  # least degrees of freedom over parameters
 
 
 @dataclass(frozen=True)
@@ -207,19 +215,21 @@ def homogeneity(
         return Homogeneity(tuple(fits), tuple(names), float("nan"), (), tuple(untested))
     records, b = tuple(fits), len(names)
     compared = records[1:] if len(fits) == 2 else records
-    rows, z, overall = [], [], []
+    rows, z, degrees, overall = [], [], [], []
     for record in compared:
-        X, C = _fit(fits[record])
-        others, rest = _fit([rows for name in fits if name != record for rows in fits[name]])
-        S, B = C + rest, sum(map(len, fits.values()))
+        one = _fit(fits[record])
+        rest = _fit([rows for name in fits if name != record for rows in fits[name]])
+        S = one.C + rest.C
         deviation = np.sqrt(np.diag(S))
-        z.append((X - others) / deviation)
-        rows.append((X, np.sqrt(np.diag(C)), others))
-        if 2 * b <= B:
+        z.append((one.X - rest.X) / deviation)
+        rows.append((one.X, np.sqrt(np.diag(one.C)), rest.X))
+        single, nu = _degrees(one, rest)
+        degrees.append(single)
+        if FREEDOM * b <= nu:
             square = z[-1] @ np.linalg.solve(S / np.outer(deviation, deviation), z[-1])
-            F = (B - 1 - b) / ((B - 2) * b) * square
-            overall.append(len(compared) * float(fisher.sf(F, b, B - 1 - b)))
-    p = 2 * student.sf(np.abs(z), B - 2)
+            F = (nu + 1 - b) / (nu * b) * square
+            overall.append(len(compared) * float(fisher.sf(F, b, nu + 1 - b)))
+    p = 2 * student.sf(np.abs(z), degrees)
     corrected = _holm(p.ravel()).reshape(p.shape)
     named = [
         Disagreement(
@@ -262,14 +272,41 @@ def _blocks(part: Observation, fit: Estimate) -> list[Array]:
     return list(split_rows(np.vstack(whitened), np.concatenate(of_block)))
 
 
-def _fit(blocks: Sequence[Array]) -> tuple[Array, Array]:
-    """X, and its covariance by the jackknife, of the rows [W Y] of some blocks."""
+@dataclass(frozen=True)
+class _Fit:
+    """X and its covariance by the jackknife; what independent residuals would give: `V`, and the
+    shares of each block in the variance of a parameter, (K, b), and in what is known of all, (K,).
+    """
+
+    X: Array
+    C: Array
+    V: Array
+    of_variance: Array
+    of_all: Array
+
+
+def _fit(blocks: Sequence[Array]) -> _Fit:
+    """The fit of the rows [W Y] of some blocks."""
     A = np.vstack(blocks)
     size = np.linalg.norm(A[:, :-1], axis=0)
     R = np.asarray(np.linalg.qr(np.column_stack([A[:, :-1] / size, A[:, -1]]), mode="r"))
     T = np.linalg.inv(R[:-1, :-1]) / size[:, None]
-    X = T @ R[:-1, -1]
-    return X, block_covariance(blocks, X, T)
+    X, V = T @ R[:-1, -1], T @ T.T
+    P = [rows[:, :-1] @ T for rows in blocks]
+    of_variance = np.array([((p @ T.T) ** 2).sum(axis=0) for p in P]) / np.diag(V)
+    of_all = np.array([(p**2).sum() for p in P]) / len(X)
+    return _Fit(X, block_covariance(blocks, X, T), V, of_variance, of_all)
+
+
+def _degrees(one: _Fit, rest: _Fit) -> tuple[Array, float]:
+    """Degrees of freedom of the scatter of X_k - X_-k: of each parameter, (b,), and of all."""
+    size = np.sqrt(np.diag(one.V + rest.V))
+    A, B = (fit.V / np.outer(size, size) for fit in (one, rest))
+    part = np.trace(np.linalg.solve(A + B, A)) / len(A)  # of the record in what is unknown
+    single = np.vstack([one.of_variance * np.diag(A), rest.of_variance * np.diag(B)])
+    of_all = np.concatenate([part * one.of_all, (1 - part) * rest.of_all])
+    scale = 1 - 2 / len(of_all)
+    return scale / (single**2).sum(axis=0), float(scale / (of_all @ of_all))
 
 
 def _holm(p: Array) -> Array:

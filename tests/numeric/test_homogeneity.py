@@ -9,7 +9,7 @@ from scipy.signal import butter, lfilter
 
 import runtime
 import symgen
-from runtime.identification.homogeneity import _holm, homogeneity
+from runtime.identification.homogeneity import _degrees, _fit, _holm, homogeneity
 from runtime.settings.study import study_from_mapping
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 20}}})
@@ -111,6 +111,19 @@ def test_a_record_at_rest_is_left_out_and_told(arm):
     )
     alone = homogeneity({"a": parts["a"], "still": parts["still"]}, arm.BASE_PARAMETERS, model=arm)
     assert "cannot be told" in alone.text and np.isnan(alone.p)
+
+
+def test_blocks_that_tell_more_than_others_count_as_fewer():
+    """Equal blocks have B - 2 degrees of freedom; two of 24 that tell nearly all have two."""
+    rng = np.random.default_rng(5)
+    W = np.linalg.qr(rng.standard_normal((8, 3)))[0]  # W'W = 1
+    rows = [np.column_stack([W, rng.standard_normal(8)]) for _ in range(24)]
+    equal = _degrees(_fit(rows[:12]), _fit(rows[12:]))
+    np.testing.assert_allclose(equal[0], 22, rtol=1e-9)
+    assert equal[1] == pytest.approx(22)
+    heavy = [block * (100 if k in (3, 15) else 1) for k, block in enumerate(rows)]
+    few = _degrees(_fit(heavy[:12]), _fit(heavy[12:]))
+    np.testing.assert_allclose([*few[0], few[1]], 2 * 22 / 24, rtol=0.01)
 
 
 def test_holm():
