@@ -49,7 +49,6 @@ from runtime.records.record import Record
 from runtime.resolution.advice import (
     ALL,
     LIMITS,
-    NAMES,
     Advice,
     EncoderAdvice,
     Limit,
@@ -125,12 +124,12 @@ def advise(
     confirm: bool = True,
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
-    real: bool | None = None,
+    readers: Sequence[Reader] | None = None,
 ) -> Advice:
     """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted;
     side, rounding, columns and runs by study.cestac.
 
-    Real encoders, law phase, are judged twice: read as positions and read as counts
+    Real encoders, law phase, are judged by each of `readers`: read as positions, read as counts
     (`runtime.resolution.readers`).
 
     Parameters
@@ -156,8 +155,9 @@ def advise(
         Called with the number of choices of encoders done and their total.
     provenance : mapping, optional
         Further entries of Advice.provenance; names and time stamps of the records are there.
-    real : bool, optional
-        Judge real encoders; default: where study.cestac.rounding is phase.
+    readers : sequence of "lowpass" or "counts", optional
+        By which real encoders are judged; default: both where study.cestac.rounding is phase, else
+        none.
 
     Raises
     ------
@@ -195,8 +195,8 @@ def advise(
         label: " or ".join(sorted({joints[i] for i in own}, reverse=True))
         for label, own in selections.items()
     }
-    real = real or law == "phase"
-    total = len(selections) * ((law != "phase") + len(NAMES) * real)
+    readers = readers or (READERS if law == "phase" else ())
+    total = len(selections) * ((law != "phase") + len(readers))
     done = count(1)
 
     def advance() -> None:
@@ -214,7 +214,7 @@ def advise(
     by_reader: list[ReaderAdvice] = []
     advices = []
     try:
-        for reader in READERS if real else ():
+        for reader in readers:
             by_reader.append(
                 reader_advice(
                     coarse("phase", reader),
@@ -240,7 +240,8 @@ def advise(
         len(asked), len(names)
     )
     if law == "phase":
-        steps = next(one.steps for one in by_reader if one.reader == study.signals.reader)
+        readings = {one.reader: one.steps for one in by_reader}
+        steps = readings.get(study.signals.reader, by_reader[0].steps)
     return Advice(
         names=names,
         reference=reference,

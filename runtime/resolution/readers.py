@@ -88,16 +88,16 @@ def curves(
 
     def evaluate(k: float) -> dict[str, float]:
         delta = start * LIMIT.READER_RATIO**k
-        moving = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
+        coarse = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
         asked = {
             label: own
             for label, own in selections.items()
-            if set(own) <= {*moving, *np.flatnonzero(np.isinf(coarsest))}
+            if set(own) <= {*coarse, *np.flatnonzero(np.isinf(coarsest))}
         }
-        if not asked or delta < finest * (1 - 1e-9) or not moving:
+        if not asked or delta < finest * (1 - 1e-9) or not coarse:
             return {}
         try:
-            nodes = real.nodes(delta, moving)
+            nodes = real.nodes(delta, coarse)
         except np.linalg.LinAlgError:  # steps that this reader does not resolve
             return {}
         for label, own in asked.items():
@@ -121,28 +121,26 @@ def curves(
         if share[1:-1].max() > LIMIT.LOCKED_POWER * max(share[0], share[-1]):
             for k in between[1:-1].tolist():
                 evaluate(k)
-    sharp: dict[str, set[float]] = {label: set() for label in selections}
-    for label, limit in product(selections, LIMITS):
-        moving = [i for i in selections[label] if np.isfinite(coarsest[i])]
-        while vague := {
-            at: n
-            for at, n in beside(real.reader, known[label], decisive, limit).items()
-            if at not in sharp[label]
-        }:
-            for at, count in vague.items():
-                known[label][at] = real.change(
-                    real.nodes(start * LIMIT.READER_RATIO**at, moving, count), moving
-                )
-            sharp[label].update(vague)
-            onward = (
-                max(known[label]) in vague
-            )  # the walk ended where the change is now below the last limit
+    moving = {
+        label: [i for i in own if np.isfinite(coarsest[i])] for label, own in selections.items()
+    }
+    sharp = set[float]()
+    while vague := vague_steps(real.reader, known, decisive, sharp):
+        for at, wanted in vague.items():
+            read = sorted({i for label in wanted for i in moving[label]})
+            nodes = real.nodes(start * LIMIT.READER_RATIO**at, read, max(wanted.values()))
+            for label, own in moving.items():
+                if at in known[label] and {*own} <= {*read}:
+                    known[label][at] = real.change(nodes, own)
+        sharp.update(vague)
+        for label, changes in known.items():  # a walk that ended where it is now below the limit
+            last = max(changes)
             while (
-                onward
-                and np.abs(known[label][(last := max(known[label]))][0, decisive]).max()
-                < LIMITS[-1]
+                last in vague
+                and np.abs(changes[last][0, decisive]).max() < LIMITS[-1]
+                and label in evaluate(last + 1)
             ):
-                onward = label in evaluate(last + 1)
+                last = max(changes)
     order = {label: sorted(own) for label, own in known.items()}
     b = len(real.reference)
     return {
@@ -152,6 +150,24 @@ def curves(
         )
         for label, ks in order.items()
     }
+
+
+def vague_steps(
+    reader: Reader,
+    known: Mapping[str, Mapping[float, Array]],
+    decisive: Sequence[int],
+    sharp: set[float],
+) -> dict[float, dict[str, int]]:
+    """Steps beside a limit whose nodes tell the change of a choice of encoders too badly, by step
+    and label how many nodes would do; those in `sharp` have had theirs.
+    """
+    vague: dict[float, dict[str, int]] = {}
+    for label, limit in product(known, LIMITS):
+        for at, count in beside(reader, known[label], decisive, limit).items():
+            if at not in sharp:
+                own = vague.setdefault(at, {})
+                own[label] = max(count, own.get(label, 0))
+    return vague
 
 
 def beside(

@@ -46,7 +46,8 @@ def cestac(
     """Study the encoder resolution. Exit code 1 where the estimate is biased at one of the steps.
 
     With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs
-    contradict the prediction.
+    contradict the prediction. Encoders are read as positions and as counts; with --reader by that
+    one alone, lowpass in a sixth of the time.
 
     A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same
     command goes on.
@@ -55,6 +56,7 @@ def cestac(
         import runtime
         from runtime.records.reading import read_records
         from runtime.resolution.checkpoint import Checkpoint
+        from runtime.resolution.coarse_encoders import READERS
 
         model = session.model_of(
             robot, "numpy" if advise else target, trust=trust, exact=exact, records=record
@@ -84,8 +86,9 @@ def cestac(
             with session.progress_bar("encoders" if advise else "runs") as progress:
                 if advise:
                     asked, real = study.cestac.delta if delta else (), rounding in (None, "phase")
+                    readers = [one for one in READERS if real and reader in (None, one)]
                     result = advice = runtime.advise(
-                        model, records, study, asked=asked, progress=progress, real=real
+                        model, records, study, asked=asked, progress=progress, readers=readers
                     )
                     said, good = advice.verdict, not advice.negative
                 else:
