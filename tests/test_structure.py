@@ -94,7 +94,7 @@ BUDGET = {
         "": 65,
         "description": 3207,
         "derive": 3011,
-        "regroup": 991,
+        "regroup": 987,
         "emit": 1065,
         "symbols": 1305,
         "certify": 1099,

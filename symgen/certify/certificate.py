@@ -16,7 +16,8 @@ until (2 d/p)**draws is below SURE. Numbers are
 not random: a false identity among them is a fixed nonzero number, which only its own few prime
 factors divide.
 
-General loops: the same identities at random points of the closed mechanism (`regroup.closed_draw`).
+General loops: the same identities at random points of the closed mechanism (`regroup.closed_draw`),
+lengths that are numbers of the file at their values; the rank at random ones.
 
 Numeric, in floats at the lengths of the robot file: the standard regressor W of a dynamics by
 energies (`derive.lagrange`), which shares
@@ -383,10 +384,10 @@ def _modulo(
     robot = regrouping.robot
     names, own = robot.parameters, [robot.parameters.index(name) for name in regrouping.own]
     if close(robot).tied:
-        robot = numbered(robot)
-        try:
+        states = len(own) // len(robot.joints) + 10
+        try:  # identities at the numbers of the file, where some were recognised; rank at any
             draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p)
-            fixed = closed_draw(robot, seed, len(own) // len(robot.joints) + 10, p=p)
+            fixed = closed_draw(numbered(robot), seed, states, p=p)
         except ArithmeticError:
             return None, list(names) if regrouping.method == EXACT else []
         few = np.moveaxis(sample(draw, names), 0, 1)

@@ -83,10 +83,12 @@ def _screw(axis: int, angle: SX, shift: SX) -> SX:
     return T
 
 
-def poses(robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX]) -> dict[int, SX]:
-    """0Tj of every frame, by frame number; q by joint number."""
-    T = {0: ca.SX.eye(4)}
-    for f in robot.frames:
+def poses(
+    robot: Robot, q: Mapping[int, SX], constants: Mapping[str, SX], root: int = 0
+) -> dict[int, SX]:
+    """rTj of every frame that frame r, the `root`, carries, by frame number; q by joint number."""
+    T = {root: ca.SX.eye(4)}
+    for f in (f for f in robot.frames if f.ant in T):
         T[f.j] = T[f.ant] @ pose(f, q.get(f.j, 0), constants)
     return T
 
@@ -358,7 +360,7 @@ def _functions(robot: Robot) -> dict[str, Any]:
     T = poses(robot, {j: q[k] for k, j in enumerate(robot.moving)}, constants)
     t = ca.vertcat(*(ca.vec(T[f.j]) for f in robot.frames))
     rate = ca.jtimes(t, q, qd)
-    phi = _closure(robot, T, q, constants)
+    phi = _closure(robot, q, constants)
     actuated, start = _start(robot, q, constants)
     outputs = {
         "poses": ([q], t),
@@ -382,16 +384,25 @@ def _functions(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _closure(robot: Robot, T: Mapping[int, SX], q: SX, constants: Mapping[str, SX]) -> SX:
+def _closure(robot: Robot, q: SX, constants: Mapping[str, SX]) -> SX:
     """phi(q), zero where every twin coincides with its cut frame and every constrained joint has
     its value.
+
+    Positions per longest length, from the frame that carries a loop: beside the lengths of an arm
+    the digits of a small loop on it would be lost.
     """
-    phi = []
+    phi, by_joint = [], {j: q[k] for k, j in enumerate(robot.moving)}
     for loop in robot.loops:
+        T = poses(robot, by_joint, constants, robot.root(loop))
         cut, twin = T[loop.cut], T[loop.twin]
-        phi += [ca.vec(cut[:3, :3].T @ twin[:3, :3] - ca.SX.eye(3)), twin[:3, 3] - cut[:3, 3]]
-    names = {f"q{j}": q[k] for k, j in enumerate(robot.moving)}
-    phi += [names[f"q{j}"] - _symbolic(e, names, constants) for j, e in robot.constraints.items()]
+        phi += [
+            ca.vec(cut[:3, :3].T @ twin[:3, :3] - ca.SX.eye(3)),
+            (twin[:3, 3] - cut[:3, 3]) / robot.longest,
+        ]
+    phi += [
+        by_joint[j] - _symbolic(e, {f"q{i}": x for i, x in by_joint.items()}, constants)
+        for j, e in robot.constraints.items()
+    ]
     return ca.densify(ca.vertcat(*phi)) if phi else ca.SX.zeros(0)
 
 
