@@ -106,6 +106,7 @@ def test_the_record_that_does_not_fit_is_seen(folder, tmp_path):
     assert [record["name"] for record in again["by_record"]] == ["a", "b", "c"]
 
 
+@pytest.mark.campaign
 def test_errors_by_blocks_are_those_in_memory(folder):
     whole, blocks = (
         identified(folder / "also.yaml"),

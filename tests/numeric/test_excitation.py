@@ -214,6 +214,7 @@ def test_torque_limits_hold(planar: tuple, free: object) -> None:
     assert np.all(np.sqrt(np.mean(tau**2, axis=0)) <= 0.5 * largest)
 
 
+@pytest.mark.campaign
 def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple, free: object) -> None:
     """A reversal of joint 1 switches 2 * 2 N m of dry friction between two samples: 4000 N m/s at 1
     kHz, whatever the motion does.

@@ -72,8 +72,8 @@ def robot(body: str, gravity: str = "0, 0, -9.81") -> Robot:
     [
         (SPHERICAL, "0, 0, -9.81", 9),
         (WEDGE, "0, -9.81, 0", 2),
-        (RSSR, "0, 0, -9.81", 14),
-        (PEAUCELLIER, "0, -9.81, 0", 12),
+        pytest.param(RSSR, "0, 0, -9.81", 14, marks=pytest.mark.campaign),
+        pytest.param(PEAUCELLIER, "0, -9.81, 0", 12, marks=pytest.mark.campaign),
     ],
 )
 def test_base_parameters_and_module(body: str, gravity: str, count: int) -> None:
