@@ -15,9 +15,9 @@ Khalil and Dombre 2002, chapter 7 and section 10.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import prod
+from math import lcm, prod
 
 from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
 from symgen.description.expression import ONE, ZERO, Expression
@@ -76,8 +76,8 @@ class Closure:
                 )
                 raise DescriptionError(
                     f"constraints.q{j}: {theirs} turns {g} times with {other}; a passive angle "
-                    "needs whole multiples of other angles, or fractions of them with small "
-                    "denominators outside of general loops (write 1/3, not 0.333)",
+                    "needs whole multiples of other angles, or outside of general loops fractions "
+                    f"of them with a common denominator of at most {FINEST} (write 1/3, not 0.333)",
                     path=("constraints", f"q{j}"),
                     file=self.robot.file or None,
                 )
@@ -112,16 +112,21 @@ class Closure:
 
 
 def parts(robot: Robot) -> int:
-    """D, so that every passive angle is a whole multiple of q_i/D: the product of the denominators
-    of the declared relations between angles; 1 where it is beyond FINEST.
+    """D, so that every passive angle is a whole multiple of q_i/D: the least common denominator of
+    the declared relations of angles in the joints that have none, or, where loops may put others
+    between them, the product of the denominators; 1 where it is beyond FINEST.
     """
-    joints = {f"q{j}" for j in robot.moving}
-    D = prod(
-        c.denominator
-        for j, e in robot.constraints.items()
-        for m, c in e.terms.items()
-        if robot.frame(j).sigma == REVOLUTE and joints & {a for a, _ in m}
-    )
+    joints = {f"q{j}": j for j in robot.moving}
+
+    def denominators(j: int) -> Iterator[int]:
+        for m, c in robot.constraints[j].terms.items():
+            for i in (joints[a] for a, _ in m if a in joints):
+                chained = i in robot.constraints and not robot.loops
+                yield c.denominator * (lcm(*denominators(i)) if chained else 1)
+
+    angles = (j for j in robot.constraints if robot.frame(j).sigma == REVOLUTE)
+    every = [d for j in angles for d in denominators(j)]
+    D = prod(every) if robot.loops else lcm(*every)
     return D if D <= FINEST else 1
 
 

@@ -46,7 +46,13 @@ def hand(ratio: str, other: str, alpha: str = "0", tilt: str = "0") -> Robot:
 @pytest.mark.parametrize("alpha", ["0", "pi/3"])
 @pytest.mark.parametrize(
     ("ratio", "other"),
-    [("-q2/2", "q1/2 + 0.3"), ("-2/3*q2", "-q3"), ("q2/4", "q3/3"), ("2*q2/5 - q1/2", "-q2/2")],
+    [
+        ("-q2/2", "q1/2 + 0.3"),
+        ("-2/3*q2", "-q3"),
+        ("q2/4", "q3/3"),
+        ("2*q2/5 - q1/2", "-q2/2"),
+        ("4/21*q2", "q3/2 - 4/21*q1"),  # the least common denominator is 42, the product 882
+    ],
 )
 def test_torques_and_rank(ratio: str, other: str, alpha: str, tmp_path: Path) -> None:
     """To 1e-10 of the largest torque, at all angles; the number of base parameters is the rank of
