@@ -73,7 +73,7 @@ def convert(
     """
     with reported_errors():
         from symgen.description.files import read_robot, write_robot
-        from symgen.description.urdf import DROPPED, SNAPPED
+        from symgen.description.tree import DROPPED, SNAPPED
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
 
         if output.exists() and not force:

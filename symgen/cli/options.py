@@ -42,7 +42,7 @@ Exact = Annotated[
     bool,
     typer.Option(
         "--exact",
-        help="Angles of a URDF or .par file as written. Default: those within 1e-4 rad of a "
+        help="Angles of a URDF, MJCF or .par file as written. Default: those within 1e-4 rad of a "
         "multiple of pi/12 are taken as that.",
     ),
 ]

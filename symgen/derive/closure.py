@@ -15,7 +15,7 @@ Khalil and Dombre 2002, chapter 7 and section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import lcm, prod
 
@@ -113,20 +113,20 @@ class Closure:
 
 def parts(robot: Robot) -> int:
     """D, so that every passive angle is a whole multiple of q_i/D: the least common denominator of
-    the declared relations of angles in the joints that have none, or, where loops may put others
-    between them, the product of the denominators; 1 where it is beyond FINEST.
+    the declared relations between angles, or their product where one relation is put into another,
+    or a loop may do so; 1 where it is beyond FINEST.
     """
-    joints = {f"q{j}": j for j in robot.moving}
-
-    def denominators(j: int) -> Iterator[int]:
-        for m, c in robot.constraints[j].terms.items():
-            for i in (joints[a] for a, _ in m if a in joints):
-                chained = i in robot.constraints and not robot.loops
-                yield c.denominator * (lcm(*denominators(i)) if chained else 1)
-
-    angles = (j for j in robot.constraints if robot.frame(j).sigma == REVOLUTE)
-    every = [d for j in angles for d in denominators(j)]
-    D = prod(every) if robot.loops else lcm(*every)
+    joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
+    denominators = [
+        c.denominator
+        for j, e in relations.items()
+        for m, c in e.terms.items()
+        if robot.frame(j).sigma == REVOLUTE and joints & {a for a, _ in m}
+    ]
+    chained = robot.loops or {f"q{j}" for j in relations} & {
+        a for e in relations.values() for a in e.atoms
+    }
+    D = prod(denominators) if chained else lcm(*denominators)
     return D if D <= FINEST else 1
 
 

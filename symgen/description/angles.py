@@ -16,7 +16,7 @@ from fractions import Fraction
 
 from symgen.description.expression import PI, twelfths
 
-SNAP = 1e-4  # rad: angles of a URDF this close to a multiple of pi/12 are taken as that
+SNAP = 1e-4  # rad: angles of a file this close to a multiple of pi/12 are taken as that
 LISTED = 1e-8  # rad: changes of less are nine digits of pi, and are not listed in the warning
 SHOWN = 20  # angles, or names, in a message
 

@@ -45,9 +45,9 @@ def load_robot(source: str | Path, *, keep_fixed: bool = False, exact: bool = Fa
         Of a URDF or MJCF: links that fixed joints hold are fixed frames of their own, as by
         `read_tree`.
     exact : bool
-        Of a URDF or `.par` file: angles are those of the file, as a calibrated one needs it. Else
-        angles within 1e-4 rad of a multiple of pi/12 are taken as that, and an AngleWarning tells
-        which, and by how much the tool then moves.
+        Of a URDF, MJCF or `.par` file: angles are those of the file, as a calibrated one needs it.
+        Else angles within 1e-4 rad of a multiple of pi/12 are taken as that, and an AngleWarning
+        tells which, and by how much the tool then moves.
 
     Returns
     -------

@@ -15,16 +15,28 @@ names no file (`mjcf_text`).
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from symgen.description.expression import ZERO, Expression
+from symgen.description.angles import SNAP, Angles, reaches
+from symgen.description.expression import ZERO, Expression, twelfths
 from symgen.description.mjcf_text import Mjcf, reduced
-from symgen.description.tree import FIXED_TYPE, FREE_TYPE, MAX_JOINTS, Array, Inertial, Joint, Tree
+from symgen.description.tree import (
+    FIXED_TYPE,
+    FREE_TYPE,
+    MAX_JOINTS,
+    SNAPPED,
+    Array,
+    Inertial,
+    Joint,
+    Tree,
+    rotation,
+)
 from symgen.description.xml_text import LARGEST
 from symgen.errors import DescriptionError
 
@@ -32,10 +44,38 @@ FREE_JOINT, BALL, SLIDE_JOINT, HINGE = range(4)  # mjtJoint
 JOINT_RELATION = 2  # mjtEq; the others left in the text are relations of tendons
 
 
-def parse_mjcf(content: bytes, *, sites: bool = False) -> Tree:
-    """Links and joints of an MJCF file; `sites`: each is a link on a fixed joint."""
-    mjcf = reduced(content)
-    return _tree(_compiled(mjcf), mjcf, sites=sites)
+def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = False) -> Tree:
+    """Links and joints of an MJCF file; `exact` as of `read_tree`; `sites`: each is a link on a
+    fixed joint.
+    """
+    mjcf, angles = reduced(content), Angles(exact)
+    model = _compiled(mjcf)
+    tree = _tree(model, mjcf, angles, sites=sites)
+    text, changes = angles.report(file, reaches(_distances(model), "moved 0"))
+    return replace(
+        tree, angles=text, notes=(*tree.notes, *(f"{SNAPPED} {change}" for change in changes))
+    )
+
+
+def _distances(model: Any) -> list[tuple[str, str, float]]:
+    """Frames of bodies and sites by number, each body in a frame "moved" by its joints, with the
+    distance that may lie between, m: a hinge at p moves its body by up to 2 |p|.
+    """
+    strokes = np.where(
+        model.jnt_type == SLIDE_JOINT,
+        np.abs(model.jnt_range).max(axis=1),
+        2 * np.linalg.norm(model.jnt_pos, axis=1),
+    )
+    bodies = range(1, model.nbody)
+    ways = [
+        *((f"moved {model.body_parentid[b]}", f"{b}", model.body_pos[b]) for b in bodies),
+        *((f"{b}", f"moved {b}", strokes[model.jnt_bodyid == b].sum()) for b in bodies),
+        *(
+            (f"moved {model.site_bodyid[s]}", f"site {s}", model.site_pos[s])
+            for s in range(model.nsite)
+        ),
+    ]
+    return [(ant, end, float(np.linalg.norm(way))) for ant, end, way in ways]
 
 
 def _compiled(mjcf: Mjcf) -> Any:
@@ -74,6 +114,8 @@ class _Growing:
         What MuJoCo compiled.
     mjcf : Mjcf
         The reduced text and its lines.
+    angles : Angles
+        Of the rotations of bodies and sites.
     names : list of str
         Of the joints, in the order of the model.
     links, bare, joints
@@ -84,6 +126,7 @@ class _Growing:
 
     model: Any
     mjcf: Mjcf
+    angles: Angles
     names: list[str]
     links: dict[str, Inertial | None] = field(default_factory=lambda: {"world": None})
     bare: set[str] = field(default_factory=set)
@@ -91,7 +134,7 @@ class _Growing:
     place: dict[int, tuple[str, Array]] = field(default_factory=lambda: {0: ("world", np.eye(4))})
 
 
-def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
+def _tree(model: Any, mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     if model.njnt > MAX_JOINTS:
         raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
     for values in (
@@ -105,7 +148,7 @@ def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
     ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(f"a number is not finite or larger than {LARGEST:g}")
-    growing = _Growing(model, mjcf, _joint_names(model))
+    growing = _Growing(model, mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
         _body(growing, b)
     places = dict(list(growing.place.values())[1:])
@@ -114,9 +157,8 @@ def _tree(model: Any, mjcf: Mjcf, *, sites: bool) -> Tree:
             link, pose = growing.place[int(model.site_bodyid[s])]
             name = _new(growing, model.site(s).name or f"site{s}")
             growing.links[name] = None
-            growing.joints.append(
-                _fixed(name, link, pose @ _pose(model.site_pos[s], model.site_quat[s]))
-            )
+            own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", "", angles)
+            growing.joints.append(_fixed(name, link, pose @ own))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     notes = (*mjcf.notes, *_left_out(model))
     relations, joints = _relations(growing), tuple(growing.joints)
@@ -169,12 +211,28 @@ def _pose(position: Array, quaternion: Array) -> Array:
     return T
 
 
+def _turned(position: Array, quaternion: Array, what: str, frame: str, angles: Angles) -> Array:
+    """`_pose` of a body or site, whose roll, pitch and yaw, as a URDF has them, are taken as
+    `angles` says; with a pitch of a quarter turn roll and yaw are one angle.
+    """
+    T = _pose(position, quaternion)
+    R = T[:3, :3]
+    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    quarter = twelfths(pitch, SNAP) in (-6, 6)
+    roll = 0.0 if quarter else math.atan2(R[2, 1], R[2, 2])
+    yaw = math.atan2(-R[0, 1], R[1, 1]) if quarter else math.atan2(R[1, 0], R[0, 0])
+    taken = rotation((roll, pitch, yaw), what, frame, angles)
+    T[:3, :3] = R if angles.exact else taken
+    return T
+
+
 def _body(growing: _Growing, b: int) -> None:
     """The links of body b: one for each of its joints, or one that is fixed."""
     model = growing.model
     name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
-    pose = pose @ _pose(model.body_pos[b], model.body_quat[b])
+    what = f"body {name!a:.60} (line {growing.mjcf.bodies[b - 1]})"
+    pose = pose @ _turned(model.body_pos[b], model.body_quat[b], what, f"{b}", growing.angles)
     first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
     if not count:
         growing.joints.append(_fixed(name, link, pose))

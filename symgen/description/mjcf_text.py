@@ -121,11 +121,9 @@ class Mjcf:
         Whether geoms tell the mass of every body that moves, of those with an <inertial> too.
     all_weighed : bool
         Whether bodies that never move have a mass that matters, by settotalmass.
-    lines, joints, relations : list of int
-        Line of the file of each line of the text but the first, which is empty, of each joint, and
-        of each relation of joints or tendons.
-    bodies : int
-        Their number.
+    lines, bodies, joints, relations : list of int
+        Line of the file of each line of the text but the first, which is empty, of each body, of
+        each joint, and of each relation of joints or tendons.
     driven : frozenset of str
         Names of the joints that an actuator drives.
     notes : tuple of str
@@ -138,9 +136,9 @@ class Mjcf:
     from_geoms: bool = False
     all_weighed: bool = False
     lines: list[int] = field(default_factory=list)
+    bodies: list[int] = field(default_factory=list)
     joints: list[int] = field(default_factory=list)
     relations: list[int] = field(default_factory=list)
-    bodies: int = 0
     driven: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 
@@ -221,8 +219,8 @@ def _copied(
     body that does, `weighed`: geoms tell the mass of its body.
     """
     if e.tag == "body":
-        mjcf.bodies += 1
-        if mjcf.bodies > MAX_BODIES:
+        mjcf.bodies.append(e.line)
+        if len(mjcf.bodies) > MAX_BODIES:
             raise DescriptionError(f"more than {MAX_BODIES} bodies", line=e.line)
         tags = {child.tag for child in e.own("joint", "freejoint", "inertial")}
         moves = moves or bool(tags - {"inertial"})

@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from symgen.description.angles import Angles
 from symgen.description.expression import Expression
 
 Array = np.ndarray
 MAX_JOINTS = 200
+SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
 EARTH = 9.81  # m/s^2, along -z of the root link
 MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed", "free"
 
@@ -127,6 +129,17 @@ def turn(axis: int, angle: float) -> Array:
     R = np.eye(3)
     R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
     return R
+
+
+def rotation(rpy: Sequence[float], what: str, frame: str, angles: Angles) -> Array:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), each as `angles` takes it; they are of `what`, and turn the
+    link `frame`.
+    """
+    roll, pitch, yaw = (
+        x if (k := angles.twelfths(x, f"{name} of {what}", frame)) is None else k * (math.pi / 12)
+        for name, x in zip(("roll", "pitch", "yaw"), rpy, strict=True)
+    )
+    return np.asarray(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll))
 
 
 def transform(row: Sequence[float]) -> Array:

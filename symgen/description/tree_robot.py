@@ -58,8 +58,9 @@ def read_tree(
     file : str
         Its name; its suffix names the format.
     exact : bool
-        Angles of a URDF are those of the file; else those within SNAP of a multiple of pi/12 are
-        taken as that, since files say 1.5708, and an AngleWarning lists them.
+        Angles are those of the file; else roll, pitch and yaw within SNAP of a multiple of pi/12
+        are taken as that, since files say 1.5708, and an AngleWarning lists them. Those of an MJCF
+        are of the rotations of bodies and sites, however written.
     keep_fixed : bool
         Links held by fixed joints (tool0, flange), bodies without joints, and sites, are fixed
         frames (sigma 2) without parameters, for frame_poses and jacobian; else such links and
@@ -83,7 +84,7 @@ def parse_tree(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     """Links and joints of a URDF or MJCF file, by its suffix; `sites` of an MJCF are links too."""
     if file.lower().endswith(".urdf"):
         return parse_urdf(content, file, exact=exact)
-    return parse_mjcf(content, sites=sites)
+    return parse_mjcf(content, file, exact=exact, sites=sites)
 
 
 def robot_of_tree(

@@ -8,7 +8,6 @@ entities (`xml_text` reads neither). Every error names its line.
 
 from __future__ import annotations
 
-import math
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -18,20 +17,21 @@ import numpy as np
 from symgen.description.angles import Angles, reaches
 from symgen.description.expression import Expression
 from symgen.description.tree import (
+    DROPPED,
     FIXED_TYPE,
     MAX_JOINTS,
     MOVING,
+    SNAPPED,
     Inertial,
     Joint,
     Tree,
-    turn,
+    rotation,
 )
 from symgen.description.xml_text import LARGEST, Array, XmlElement, read_elements
 from symgen.errors import DescriptionError
 
 Mimic = tuple[str, Expression]  # joint that is followed, and the position by its own
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
 # children of an element that are read, and <material>, which says nothing that is left out
 READ = {
     "robot": {"link", "joint", "material"},
@@ -149,11 +149,8 @@ def _pose(holder: XmlElement, what: str, frame: str, angles: Angles) -> Array:
     T, e = np.eye(4), holder.first("origin")
     if e is None:
         return T
-    row = []
-    for name, x in zip(("roll", "pitch", "yaw"), e.numbers("rpy", 3, "0 0 0"), strict=True):
-        k = angles.twelfths(float(x), f"{name} of {what} (line {e.line})", frame)
-        row.append(float(x) if k is None else k * (math.pi / 12))
-    T[:3, :3] = turn(2, row[2]) @ turn(1, row[1]) @ turn(0, row[0])
+    rpy = e.numbers("rpy", 3, "0 0 0").tolist()
+    T[:3, :3] = rotation(rpy, f"{what} (line {e.line})", frame, angles)
     T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
     return T
 

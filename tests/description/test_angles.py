@@ -14,6 +14,8 @@ from symgen.description import AngleWarning, load_robot
 from symgen.description.tree_robot import read_tree
 from symgen.emit.generate import generate_module
 
+from oracles.test_mjcf_agrees import difference  # isort: skip
+
 LINK = (
     '<link name="{0}"><inertial><mass value="1"/>'
     '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
@@ -78,6 +80,35 @@ def test_the_tool_moves_by_no_more_than_is_told(tmp_path):
     moved = np.linalg.norm(tool(robot, q, tmp_path) - tool(exact, q, tmp_path), axis=1).max()
     limit = float(robot.angles.split()[-2])
     assert 0.2 * limit < moved < 1.05 * limit  # two digits are told
+
+
+MJCF = b"""<mujoco model="arm"><compiler angle="radian"/><worldbody>
+<body name="a" pos="0 0 0.5" euler="-1.57079632679 0 0"><joint name="s"/>
+<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.1 0.2 0.15"/>
+<body name="b" pos="0.4 0 0.1" quat="0.707105 0.707108 0 0"><joint name="e" pos="0 0.1 0"/>
+<inertial pos="0 0.1 0.2" mass="1" fullinertia="0.1 0.2 0.15 0.01 0.02 0.03"/>
+<body name="c" pos="0 0.3 0" quat="0.5 0.5 0.50001 0.49999">
+<joint name="l" type="slide" axis="0 1 0" range="-3.2 3.2"/>
+<inertial pos="0 0.1 0.2" mass="1" diaginertia="0.1 0.2 0.15"/>
+<site name="tool" pos="0.2 0 0.1" xyaxes="0 1 0 -1 0.00001 0"/></body></body></body>
+</worldbody></mujoco>"""
+
+
+def test_rotations_of_an_mjcf_are_taken_alike(tmp_path):
+    """However written; torques stay near MuJoCo's, and the tool moves by no more than is told."""
+    with pytest.warns(AngleWarning, match=r"roll of body 'b' \(line 4\) from 1.5708\d* to pi/2"):
+        robot, notes = read_tree(MJCF, "arm.xml", keep_fixed=True)
+    angles = [str(getattr(f, key)) for f in robot.frames for key in ("gamma", "alpha", "theta")]
+    assert not any("." in angle for angle in angles) and "taken as these" in robot.angles
+    assert difference(MJCF.decode(), robot, notes, 1) < 1e-4
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        exact, notes = read_tree(MJCF, "arm.xml", keep_fixed=True, exact=True)
+    assert difference(MJCF.decode(), exact, notes, 1) < 1e-9 and "are those" in exact.angles
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (2000, 3))
+    moved = np.linalg.norm(tool(robot, q, tmp_path) - tool(exact, q, tmp_path), axis=1).max()
+    limit = float(robot.angles.split()[-2])
+    assert 0.2 * limit < moved < 1.05 * limit
 
 
 def test_verbs_note_it_and_keep_the_file_when_told_to(tmp_path):

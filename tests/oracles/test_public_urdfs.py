@@ -13,8 +13,9 @@ import pytest
 from oracles.test_urdf_agrees import kept_frames, legend, pose_difference
 from oracles.urdf_table import FOUND, difference, snapped_text
 from symgen.certify.modules import certify
+from symgen.description.tree import SNAPPED
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf import SNAPPED, parse_urdf
+from symgen.description.urdf import parse_urdf
 from symgen.description.urdf_write import write_urdf
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import regroup

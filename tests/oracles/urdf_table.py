@@ -23,8 +23,8 @@ from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.description import Robot
 from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
+from symgen.description.tree import SNAPPED
 from symgen.description.tree_robot import read_tree
-from symgen.description.urdf import SNAPPED
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
 
