@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from symgen.derive.lagrange import Sample
 
 Sampler = Callable[[Draw, tuple[str, ...]], Array]
+LOST = 1e12  # sums of numbers as large keep less than three decimals of numbers of size 1
 ROUNDED = 1e-7  # of the largest entry: columns by coefficients that are numbers
 ZERO_BELOW = 1e-9  # rad, m or a cosine: a denominator that is zero but for rounding
 AT_VALUES = "say --at-values for the regrouping that does"
@@ -269,11 +270,15 @@ def certify_formulas(
             "double precision; give them in one order of size"
         )
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters)) * ~is_assumed(robot)
-    tau = witness.W @ chi
-    error = float(
-        np.abs(tau - witness.W[:, base] @ base_values(regrouping, chi, robot.constants)).max()
-        / np.abs(tau).max()
-    )
+    tau, X = witness.W @ chi, base_values(regrouping, chi, robot.constants)
+    error = float(np.abs(tau - witness.W[:, base] @ X).max() / np.abs(tau).max())
+    if error >= TOLERANCE and (size := np.abs(X).max()) > LOST:
+        name = regrouping.names[int(np.abs(X).argmax())]
+        failures.append(
+            f"the formula of {name} gives {size:.0e} where standard parameters are of size 1: double "
+            f"precision keeps no digit of that sum. Lengths as small as {sizes[0]:.2g} m divide in it; "
+            "write 0 where nothing is meant"
+        )
     if failures or rank != exact_rank:
         require_simple_roots(robot)
     return Certificate(

@@ -42,7 +42,7 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
                 notes.append(
                     f"frame {f.j}: {name} has {angle}, not {meant}: "
                     f"another robot, with other formulas; if {meant} is meant, write it (in a URDF "
-                    "the angles or offsets that give it; or leave out --exact)"
+                    "or MJCF the angles or offsets that give it)"
                 )
     return notes
 

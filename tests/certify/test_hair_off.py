@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 import sympy
 
+from symgen.certify.certificate import certify_formulas
 from symgen.certify.modules import certify
 from symgen.derive.doubts import doubts
-from symgen.description import parse_robot
+from symgen.description import load_robot, parse_robot
 from symgen.description.at_values import at_values
 from symgen.description.expression import PI
 from symgen.regroup.regrouping import regroup
@@ -118,3 +119,15 @@ def test_what_the_certificate_says_is_so_in_60_digits(alpha: str) -> None:
     assert certificate.valid == (alpha not in ("1e-9", "1e-7")), str(certificate)
     if not certificate.valid:
         assert f"geometry: {small} combinations of base param" in certificate.failures[0]
+
+
+def test_coefficients_beyond_double_precision_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Offsets of 4e-5 m that divide along a spine gave coefficients of 1e25: torques were off by
+    3e4 of the largest, and nothing said why.
+    """
+    found = regroup(load_robot("scara"))
+    monkeypatch.setattr(
+        "symgen.certify.certificate.base_values", lambda found, *_: np.full(len(found), 1e20)
+    )
+    (told,) = certify_formulas(found).failures
+    assert "gives 1e+20 where" in told and "write 0 where nothing is meant" in told
