@@ -275,9 +275,9 @@ def certify_formulas(
     if error >= TOLERANCE and (size := np.abs(X).max()) > LOST:
         name = regrouping.names[int(np.abs(X).argmax())]
         failures.append(
-            f"the formula of {name} gives {size:.0e} where standard parameters are of size 1: double "
-            f"precision keeps no digit of that sum. Lengths as small as {sizes[0]:.2g} m divide in it; "
-            "write 0 where nothing is meant"
+            f"the formula of {name} gives {size:.0e} where standard parameters are of size 1: "
+            "double precision keeps no digit of that sum. Lengths as small as "
+            f"{sizes[0]:.2g} m divide in it; write 0 where nothing is meant"
         )
     if failures or rank != exact_rank:
         require_simple_roots(robot)
