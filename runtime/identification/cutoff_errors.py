@@ -1,10 +1,13 @@
-"""What another cut-off of the low-pass predicts: a check on `signals.lowpass.cutoff: auto`, shown
-beside it.
+"""What another cut-off of the low-pass predicts, or, of positions read as counts, the low-pass: a
+check on `signals.lowpass.cutoff: auto` and on `signals.reader: counts`, shown beside them.
 
-X_c, the parameters of the first half of the records filtered at c, predicts the second half
-filtered at every k of the same cut-offs, so that none wins by torques that are smoother:
+X_c, the parameters of the first half of the records by the study c, predicts the second half by
+every study k, so that none wins by torques that are smoother:
 
     e_c = (prod_k e_ck)^(1/K),   e_ck = 100 ||Y_k - W_k X_c|| / ||Y_k||
+
+Rows that counts leave out, since they tell no direction of dry friction, are among those of the
+low-pass: parameters that the others do not tell apart show there.
 """
 
 from __future__ import annotations
@@ -22,53 +25,64 @@ from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import halves
 from runtime.rows.observe import observe
-from runtime.rows.prepared import Prepared
-from runtime.settings.study import Study
+from runtime.rows.prepared import Prepared, resolved
+from runtime.settings.study import Lowpass, Study
 
-BETTER = "set signals.lowpass.cutoff"
+BETTER = "set signals"
 
 
-def cutoff_errors(
-    model: GeneratedModel, records: Sequence[Prepared], study: Study
-) -> dict[float, float]:
-    """e_c, %, by cut-off, Hz: that of the study and LIMIT.CUTOFFS_TRIED times it, as far as the
-    rates allow; empty where a half of the records does not determine the parameters at that of the
-    study.
+def other_studies(records: Sequence[Prepared], study: Study) -> dict[str, Study]:
+    """Studies of the records by label, that of the study among them: LIMIT.CUTOFFS_TRIED times its
+    cut-off, as far as the rates allow; of counts the low-pass with the cut-off that suits it.
     """
-    low = study.signals.lowpass
+    signals, low = study.signals, study.signals.lowpass
+    if signals.reader == "counts":
+        plain = replace(signals, reader="lowpass", step=None, lines="detected", lowpass=Lowpass())
+        return {"low-pass": resolved(replace(study, signals=plain), records)[0], "counts": study}
     assert low is not None
-    highest = LIMIT.HIGHEST_CUTOFF * min(own.record.rate for own in records)
+    highest = max(LIMIT.HIGHEST_CUTOFF * min(own.record.rate for own in records), low.hertz)
+    tried = [float(f"{factor * low.hertz:.2g}") for factor in LIMIT.CUTOFFS_TRIED]
+    filters = [replace(low, cutoff=hertz) for hertz in tried if hertz <= highest]
+    others = [replace(study, signals=replace(signals, lowpass=own)) for own in filters]
+    return {f"{own.hertz:g}": other for own, other in zip(filters, others, strict=True)}
+
+
+def unseen_errors(
+    model: GeneratedModel, records: Sequence[Prepared], studies: Mapping[str, Study]
+) -> dict[str, float]:
+    """e_c, %, by label, without studies by which a half of the records does not determine the
+    parameters.
+    """
     fits, seconds = {}, []
-    for hertz in (float(f"{factor * low.hertz:.2g}") for factor in LIMIT.CUTOFFS_TRIED):
-        if hertz > max(highest, low.hertz):
-            continue
-        signals = replace(study.signals, lowpass=replace(low, cutoff=hertz))
-        own = replace(study, signals=signals)
+    for label, own in studies.items():
         try:
             rows = observe(model, [one.by(own) for one in records], own)
             first, second = (rows.between(*window) for window in halves(*rows.span))
-            fit = estimate_of(first, linear_companion(study.estimate), model=model)
+            fit = estimate_of(first, linear_companion(own.estimate), model=model)
         except InputError:
             continue
         if fit.status == "ok":
-            fits[hertz] = fit
+            fits[label] = fit
             seconds.append(second)
     return {
-        hertz: float(np.exp(np.mean([np.log(prediction_errors(rows, fit)[0]) for rows in seconds])))
-        for hertz, fit in fits.items()
+        label: float(np.exp(np.mean([np.log(prediction_errors(rows, fit)[0]) for rows in seconds])))
+        for label, fit in fits.items()
     }
 
 
-def cutoff_text(errors: Mapping[float, float], hertz: float) -> str:
-    """The errors in a sentence, and what to set where another cut-off predicts clearly better;
-    hertz : that of the study.
+def errors_text(errors: Mapping[str, float], label: str) -> str:
+    """The errors in a sentence, and what to set where another study than that of the label predicts
+    clearly better.
     """
-    own = errors.get(hertz)
+    own = errors.get(label)
     if own is None or len(errors) < 2:
         return ""
     best = min(errors, key=lambda one: errors[one])
-    listed = ", ".join(f"{one:g} Hz {error:.3g} %" for one, error in errors.items())
+    by, unit, better = "cut-off", " Hz", f"lowpass.cutoff: {best}"
+    if label == "counts":
+        by, unit, better = "reader", "", "reader: lowpass"
+    listed = ", ".join(f"{one}{unit} {error:.3g} %" for one, error in errors.items())
     clear = own > LIMIT.CUTOFF_GAIN * errors[best] and own - errors[best] > LIMIT.LEAST_CUTOFF_GAIN
-    return f" Unseen half by cut-off: {listed}" + (
-        f"; {BETTER}: {best:g} and compare." if clear else "."
+    return f" Unseen half by {by}: {listed}" + (
+        f"; {BETTER}.{better} and compare." if clear else "."
     )

@@ -20,7 +20,7 @@ from runtime.blas import single_threaded
 from runtime.checks.plausibility import plausibility
 from runtime.errors import InputError
 from runtime.identification.coupling import coupling_fits
-from runtime.identification.cutoff_errors import cutoff_errors, cutoff_text
+from runtime.identification.cutoff_errors import errors_text, other_studies, unseen_errors
 from runtime.identification.elastic import elasticity
 from runtime.identification.fits import agreement, fitted, validated
 from runtime.identification.friction import friction_curves
@@ -157,7 +157,7 @@ def identify(
         observe = partial(method_observation, model, study=study, workers=processes)
         observation = observe(measured, simulator=simulator)
         observation = _with_findings(observation, law.text if law else "", load, statement)
-        if plausible and lowpass:
+        if lowpass and (plausible or study.signals.reader == "counts"):
             provenance["lowpass"] += _other_cutoffs(model, measured, study, asked_study)
         fits = fitted(observation, study, model, provenance)
         doubt = gain_doubt(model, study, measured, fits.estimate.relative_error)
@@ -241,17 +241,18 @@ def _with_findings(observation: Observation, *sentences: str) -> Observation:
 def _other_cutoffs(
     model: GeneratedModel, measured: Measured, study: Study, asked_study: Study
 ) -> str:
-    """What other cut-offs than an automatic one would give, a sentence; "" where the cut-off was
-    given or the records are long.
+    """What other cut-offs than an automatic one would give, or another reader than that of counts,
+    a sentence; "" where the cut-off was given or the records are long.
     """
     records, asked = [one for one in measured if isinstance(one, Prepared)], asked_study.signals
     short = sum(len(one.record) for one in records) <= LIMIT.CUTOFF_SAMPLES
+    low, counts = study.signals.lowpass, study.signals.reader == "counts"
     automatic = asked.lowpass is not None and asked.lowpass.cutoff == "auto"
-    if not automatic or not short or len(records) < len(measured):
+    if low is None or not automatic or not short or len(records) < len(measured):
         return ""
     at("other cut-offs")
-    hertz = study.signals.lowpass.hertz if study.signals.lowpass else 0.0
-    return cutoff_text(cutoff_errors(model, records, study), hertz)
+    errors = unseen_errors(model, records, other_studies(records, study))
+    return errors_text(errors, "counts" if counts else f"{low.hertz:g}")
 
 
 def _with_elasticity(result: Identification) -> Identification:

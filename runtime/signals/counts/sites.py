@@ -57,7 +57,7 @@ either side as these are, or as half a count, is none of a motion.
 """
 FEWEST = 150
 """Bounds from which an error of the counts is told: fewer do not tell it from an unusual motion."""
-EVEN = 40.0
+UNEVEN = 40.0
 """Nats by which errors are more likely than the least ones before they are taken: a slow motion
 departs from white jerk by up to 36, counts that are off do not settle without them.
 """
@@ -193,7 +193,7 @@ class Counts:
         return Counts(self.y[part], inside, self.rest[part], self.Ts)
 
     def searched(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
-        """The motion with the errors of most evidence, the least ones unless others have EVEN nats
+        """The motion with the errors of most evidence, with the least unless that has UNEVEN nats
         more; a jittering clock is thought of where errors are wide.
         """
         wide = max((x for x in sizes if x <= WIDE), default=sizes[0])
@@ -205,9 +205,9 @@ class Counts:
             found = [(b, of_most_evidence(b, sizes, r)) for b, r in others if r.settled]
             boxes, read = max([(boxes, read), *found], key=lambda each: each[1].evidence)
         least = Errors(sizes[0])
-        if read.settled and read.errors != least and boxes.promised(least, read) > -2 * EVEN:
+        if read.settled and read.errors != least and boxes.promised(least, read) > -2 * UNEVEN:
             even = boxes.again(least, read)
-            read = even if even.evidence > read.evidence - EVEN else read
+            read = even if even.evidence > read.evidence - UNEVEN else read
         return boxes, read
 
     def first(self, errors: Errors) -> tuple[Boxes, Posterior]:
