@@ -2,7 +2,7 @@
 (docs/theory/counts.md).
 
     reading = read_counts(position, rate, step)        encoder side, shape (N, n)
-    reading.q, reading.s_q, reading.sign, reading.findings
+    reading.q, reading.s_q, reading.findings
 
 Records longer than STRETCH samples are read in stretches that overlap by MARGIN samples on either
 side: memory and time are linear in their length.
@@ -18,7 +18,6 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import binary_opening, binary_propagation, maximum_filter1d
-from scipy.special import erf
 
 from runtime.signals.counts.lattice import (
     SHAKEN,
@@ -40,21 +39,17 @@ TURNED = 4e-3
 """Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a
 quarter of a period of usual cut-offs.
 """
-UNKNOWN = 0.5
-"""Deviation of a missing position, steps, above which the state is unknown in the whole gap: the
-bound that a count would be.
-"""
-REACH = 0.02
-"""Time ahead of an unknown state and behind it that filters bring it to, s: a period of usual
-cut-offs.
+UNKNOWN, REACH, RESTS = 0.5, 0.02, 0.05
+"""Of missing positions: the deviation, steps, above which the state is unknown in the whole gap,
+the bound that a count would be; the time ahead of an unknown state and behind it that filters bring
+it to, s, a period of usual cut-offs; the longest gap, s, in which an encoder whose count never
+changes is taken as at rest.
 """
 STANDS, LONG = 0.1, 2.0
 """Time without a change of the count in which a joint may stand, s, and how many times the longest
 turn between two lines at its usual acceleration a it must be, sqrt(8/a): no direction is known
 there.
 """
-RESTS = 0.05
-"""Longest gap, s, in which an encoder whose count never changes is taken as at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +86,6 @@ class Reading:
     phase: Array
     findings: tuple[str, ...]
     parts: tuple[Part, ...]
-
-    @property
-    def sign(self) -> Array:
-        """E[sign qd] = erf(qd/(sqrt(2) s_qd)), shape (N, n); 0 at rest."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(
-                np.where(self.s_qd > 0, erf(self.qd / (np.sqrt(2) * self.s_qd)), np.sign(self.qd))
-            )
 
     @property
     def motion(self) -> tuple[Array, Array]:
