@@ -12,6 +12,8 @@ from typing import Any
 
 from runtime.markup import Markup, element, symbol, unit
 
+IN_LINE = 4  # of values in a line
+
 
 @dataclass(frozen=True)
 class Table:
@@ -105,6 +107,21 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
         ]
         text.append("  ".join(cells).rstrip())
     return "\n".join(text)
+
+
+def in_lines(cells: Sequence[str], columns: int = IN_LINE) -> list[str]:
+    """Cells of one width, so many to a line."""
+    width = max(map(len, cells), default=0) + 2
+    rows = [cells[k : k + columns] for k in range(0, len(cells), columns)]
+    return ["".join(cell.ljust(width) for cell in row).rstrip() for row in rows]
+
+
+def with_intervals(
+    names: Iterable[str], values: Iterable[float], sigma: Iterable[float]
+) -> list[str]:
+    """Values with their 95 % intervals, such as ZZ1R 1.79 +- 0.02, from their deviations."""
+    known = zip(names, values, sigma, strict=True)
+    return [f"{name} {value:.4g} +- {1.96 * deviation:.2g}" for name, value, deviation in known]
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

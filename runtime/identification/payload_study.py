@@ -20,6 +20,7 @@ from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared, resolved
 from runtime.settings.study import Study
+from runtime.table import in_lines, with_intervals
 
 Array = np.ndarray
 
@@ -38,6 +39,20 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
 
     payload: Payload
     gains: DriveGains | None
+
+    def brief(self) -> str:
+        """Load and torque constants with their 95 % intervals, four in a line."""
+        load, gains = self.payload, self.gains
+        given = [f"{name} {value:.4g} (given)" for name, value in load.given.items()]
+        estimated = with_intervals(load.names, load.value, load.sigma)
+        lines = [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
+        if gains is not None:
+            known = np.isin(gains.joints, gains.refused, invert=True)
+            names = [f"motor {joint}" for joint in np.array(gains.joints)[known]]
+            value, sigma = (gains.constant * x for x in (gains.together, gains.sigma))
+            values = with_intervals(names, value[known], sigma[known])
+            lines += ["Torque constants, SI, +- 95 %", *in_lines(values), gains.text]
+        return "\n".join(lines)
 
     def to_table(self) -> str:
         """The tables one below the other."""

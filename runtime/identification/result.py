@@ -56,7 +56,7 @@ from runtime.rows.prepared import Prepared, record_of
 from runtime.rows.selection import unused_joints
 from runtime.settings.study import Study
 from runtime.signals.encoder_advice import encoder_sentences
-from runtime.table import Table, notebook
+from runtime.table import IN_LINE, Table, in_lines, notebook, with_intervals
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
@@ -385,48 +385,44 @@ class Identification:
     def __str__(self) -> str:
         return self.brief()
 
-    def brief(self) -> str:
+    def brief(self, above: int = 0) -> str:
         """Values with their 95 % intervals, errors by joint, what to look at, what was asked for
         besides; the verdict with its largest doubt and the next step last.
+
+        Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; above : so
+        many lines are printed ahead of these.
         """
         fit = self.model_estimate
-        values = [
-            f"{name} {value:.4g} +- {1.96 * sigma:.2g}"
-            for name, value, sigma in zip(fit.names, fit.X, fit.sigma_corrected, strict=True)
-        ]
-        columns = 4
-        shown = values[: columns * LIMIT.LINES_OF_VALUES]
-        width = max(map(len, shown), default=0) + 2
-        rows = [shown[k : k + columns] for k in range(0, len(shown), columns)]
-        more = len(values) - len(shown)
-        head = (
-            f"{len(values)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
-            f"{fit.method}, SI units, +- 95 %"
-        )
         by_joint = ", ".join(
             f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint if one.rows
         )
         cutoff = self.estimate.provenance.get("lowpass", "")
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
         notes += [cutoff] if BETTER in cutoff else []
-        asked = (self.payload, *self.friction)
-        parts = [
-            "\n".join(
-                [
-                    head + (f"; {more} more by --verbose" if more else ""),
-                    *("".join(value.ljust(width) for value in row).rstrip() for row in rows),
-                    f"Unexplained by joint: {by_joint}",
-                ]
-            )
-            if self.determined and self.usable
-            else "",
+        if len(notes) > LIMIT.NOTES_PRINTED:
+            more = len(notes) - LIMIT.NOTES_PRINTED + 1
+            notes = [*notes[:-more], f"{more} more by --verbose"]
+        others = [
             "\n".join(f"note: {note}" for note in notes),
             self.laws.line if self.laws else "",
-            *(table.to_table() for table in asked if table is not None),
+            self.payload.brief() if self.payload else "",
+            *(curve.to_table() for curve in self.friction),
             f"The parameters are {self.feasibility.text}." if self.feasibility else "",
             self.checklist.to_text(),
         ]
-        return "\n\n".join(part for part in parts if part)
+        text = "\n\n".join(part for part in others if part)
+        if not (self.determined and self.usable):
+            return text
+        values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
+        free = LIMIT.LINES_PRINTED - above - len(text.splitlines()) - 3
+        room = max(free, LIMIT.LINES_OF_VALUES)
+        more = len(fit.names) - IN_LINE * room
+        head = (
+            f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
+            f"{fit.method}, SI units, +- 95 %"
+        )
+        head += f"; {more} more by --verbose" if more > 0 else ""
+        return "\n".join([head, *values[:room], f"Unexplained by joint: {by_joint}", "", text])
 
     def _repr_html_(self) -> str:
         parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()
@@ -472,6 +468,7 @@ class Identification:
             *(table.to_table() for table in last if table is not None),
             self.advice.verdict if self.advice else "",
             self.resolution.to_table() if self.resolution else "",
+            *self.observation.findings,
             *self.missing,
             self.plausibility.line if self.plausibility else "",
             self.checklist.to_text(),

@@ -103,8 +103,8 @@ def identify(
         )
         if results is not None:
             runtime.report(result, results)
-        text = result.to_text() if verbose else result.brief()
         said = session.assumptions_of(robot, records, study, exact=exact)
+        text = result.to_text() if verbose else result.brief(len(said))
         text = "\n".join([*(f"assume: {line}" for line in said), text])
         session.show(result.to_json() if json else text, results, json=json)
     session.end(good=result.checklist.state != "no")
