@@ -109,10 +109,10 @@ def aligned(lines: Sequence[Sequence[str]]) -> str:
     return "\n".join(text)
 
 
-def in_lines(cells: Sequence[str], columns: int = IN_LINE) -> list[str]:
-    """Cells of one width, so many to a line."""
+def in_lines(cells: Sequence[str]) -> list[str]:
+    """Cells of one width, IN_LINE to a line."""
     width = max(map(len, cells), default=0) + 2
-    rows = [cells[k : k + columns] for k in range(0, len(cells), columns)]
+    rows = [cells[k : k + IN_LINE] for k in range(0, len(cells), IN_LINE)]
     return ["".join(cell.ljust(width) for cell in row).rstrip() for row in rows]
 
 
@@ -120,8 +120,7 @@ def with_intervals(
     names: Iterable[str], values: Iterable[float], sigma: Iterable[float]
 ) -> list[str]:
     """Values with their 95 % intervals, such as ZZ1R 1.79 +- 0.02, from their deviations."""
-    known = zip(names, values, sigma, strict=True)
-    return [f"{name} {value:.4g} +- {1.96 * deviation:.2g}" for name, value, deviation in known]
+    return [f"{n} {x:.4g} +- {1.96 * s:.2g}" for n, x, s in zip(names, values, sigma, strict=True)]
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

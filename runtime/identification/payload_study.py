@@ -47,11 +47,10 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
         estimated = with_intervals(load.names, load.value, load.sigma)
         lines = [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
         if gains is not None:
-            known = np.isin(gains.joints, gains.refused, invert=True)
-            names = [f"motor {joint}" for joint in np.array(gains.joints)[known]]
             value, sigma = (gains.constant * x for x in (gains.together, gains.sigma))
-            values = with_intervals(names, value[known], sigma[known])
-            lines += ["Torque constants, SI, +- 95 %", *in_lines(values), gains.text]
+            values = with_intervals([f"motor {joint}" for joint in gains.joints], value, sigma)
+            known = [x for j, x in zip(gains.joints, values, strict=True) if j not in gains.refused]
+            lines += ["Torque constants, SI, +- 95 %", *in_lines(known), gains.text]
         return "\n".join(lines)
 
     def to_table(self) -> str:

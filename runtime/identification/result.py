@@ -414,8 +414,7 @@ class Identification:
         if not (self.determined and self.usable):
             return text
         values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
-        free = LIMIT.LINES_PRINTED - above - len(text.splitlines()) - 3
-        room = max(free, LIMIT.LINES_OF_VALUES)
+        room = max(LIMIT.LINES_PRINTED - above - len(text.splitlines()) - 3, LIMIT.LINES_OF_VALUES)
         more = len(fit.names) - IN_LINE * room
         head = (
             f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
@@ -468,7 +467,6 @@ class Identification:
             *(table.to_table() for table in last if table is not None),
             self.advice.verdict if self.advice else "",
             self.resolution.to_table() if self.resolution else "",
-            *self.observation.findings,
             *self.missing,
             self.plausibility.line if self.plausibility else "",
             self.checklist.to_text(),

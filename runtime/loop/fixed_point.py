@@ -268,11 +268,16 @@ def outcome_of(loop: ClosedLoop, fixed: Fixed, method: str) -> tuple[Status, str
     """
     parts = [part for part in (fixed.message, loop.assumption) if part]
     if not fixed.converged:
-        parts.insert(0, f"{method.upper()} has not converged after {len(fixed.trail)} passes.")
+        parts.insert(
+            0,
+            f"{method.upper()} has not converged after {len(fixed.trail)} "
+            f"pass{'es' * (len(fixed.trail) > 1)}.",
+        )
         if not fixed.message:
             parts.append(
                 "Likely causes: a wrong controller, delay or reference; parameters the record "
-                "hardly determines. Raise passes, or start from values."
+                "hardly determines. Raise passes"
+                + (", or start from values." if getattr(loop.model, "VALUES", None) else ".")
             )
     elif fixed.contraction > LIMIT.SLOW_CONTRACTION:
         parts.append(
