@@ -49,19 +49,11 @@ def check_robot(robot: Any) -> None:
     _check_loops(robot)
     _check_drives(robot)
     _check_limits(robot)
-    for name in sorted(robot.assume):
-        if name not in robot.parameters:
+    for key, names in (("assume", sorted(robot.assume)), ("values", robot.values)):
+        for name in (name for name in names if name not in robot.parameters):
             raise DescriptionError(
-                f"assume: {name!r} is not a standard parameter of {robot.name}"
-                f"{_meant(name, robot)}",
-                path=("assume", name),
-            )
-    for name in robot.values:
-        if name not in robot.parameters:
-            raise DescriptionError(
-                f"values: {name!r} is not a standard parameter of {robot.name}"
-                f"{_meant(name, robot)}",
-                path=("values", name),
+                f"{key}: {name!r} is not a standard parameter of {robot.name}{_meant(name, robot)}",
+                path=(key, name),
             )
 
 

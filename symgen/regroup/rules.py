@@ -108,13 +108,13 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
     A = axis_rotation(cg, sg, ca, sa)
     p = displacement(A, f.b, f.d, f.r0)
     relations: dict[str, dict[tuple[str, int], Expression]] = {}
+    mass = {"M": {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))}
     if f.sigma == REVOLUTE:
         a = apply(A, (ZERO, ZERO, ONE))
         zz = [[A[k][0] * A[m][0] + A[k][1] * A[m][1] for m in range(3)] for k in range(3)]
         relations["YY"] = {("XX", 0): -ONE} | _tensor(zz)
         relations["MZ"] = _first(a) | _tensor(_steiner(p, a, 1))
-        relations["M"] = {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))
-        return relations
+        return relations | mass
     turned = Rotation(A, call("cos", f.theta0), call("sin", f.theta0))
     R = [turned.up(e) for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]  # axes of frame j in frame i
     for name, (k, m) in TENSOR.items():
@@ -128,8 +128,7 @@ def link_relations(f: Frame) -> dict[str, dict[tuple[str, int], Expression]]:
         return relations
     for k, name in enumerate(FIRST):
         relations[name] = _first(R[k]) | _tensor(_steiner(p, R[k], 1))
-    relations["M"] = {("M", 1): ONE} | _first(p) | _tensor(_steiner(p, p, 0))
-    return relations
+    return relations | mass
 
 
 def _steiner(p: Vector, u: Vector, symmetric: int) -> list[list[Expression]]:
