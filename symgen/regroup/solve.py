@@ -312,7 +312,7 @@ class Recognition:
     def _rationals(
         self, vector: dict[int, int], name: str, k: int, P: Products, Q: Products
     ) -> dict[int, Fraction] | None:
-        """The vector as rationals: small ones from one prime, others by the Chinese remainder
+        """The vector as rationals: very small ones from one prime, others by the Chinese remainder
         theorem until one more prime agrees.
         """
         small = {c: small_rational(x, self.pools[0].p) for c, x in vector.items()}

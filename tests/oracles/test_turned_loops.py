@@ -91,10 +91,20 @@ IN_NUMBERS = [
 ]
 
 
-def test_coefficients_at_the_numbers_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("kind", "behind", "seed"),
+    [
+        ("four-bar", 1, 1),
+        ("five-bar", 2, 7),  # -0.43623**2/0.25808 is -491/983 over the first prime
+    ],
+)
+def test_coefficients_at_the_numbers_of_the_file(
+    kind: str, behind: int, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """All of them are taken for true of these lengths alone, the last thing that is tried."""
     monkeypatch.setattr(solve, "FREEDOMS", ((),))
-    certificate = certify_formulas(_regrouped.__wrapped__(random_loop("four-bar", 1, behind=1), 1))
+    robot = random_loop(kind, seed, behind=behind)
+    certificate = certify_formulas(_regrouped.__wrapped__(robot, 1))
     assert certificate.valid, certificate.failures
     assert certificate.method == EXACT
 
