@@ -508,7 +508,7 @@ def test_settings_are_checked():
             study_from_mapping({"controller": given})
 
 
-def test_without_a_compiler_the_same_bits(tx40, truth, monkeypatch):
+def test_without_a_compiler_the_same_motion(tx40, truth, monkeypatch):
     settings = controller(reference={"points": {"duration": 0.3}})
     reference = reference_of(settings, tx40)
     compiled = simulate(tx40, truth, settings, reference)
