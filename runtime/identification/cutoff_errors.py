@@ -2,9 +2,10 @@
 check on `signals.lowpass.cutoff: auto` and on `signals.reader: counts`, shown beside them.
 
 X_c, the parameters of the first half of the records by the study c, predicts the second half by
-every study k, so that none wins by torques that are smoother:
+every study k, so that none wins by torques that are smoother; of counts and low-pass every fifth is
+predicted by all others:
 
-    e_c = (prod_k e_ck)^(1/K),   e_ck = 100 ||Y_k - W_k X_c|| / ||Y_k||
+    e_c = (prod_k e_ck)^(1/K),   e_ck = 100 ||Y_k - W_k X_c|| / ||Y_k||, over the fifths too
 
 Rows that counts leave out, since they tell no direction of dry friction, are among those of the
 low-pass: parameters that the others do not tell apart show there.
@@ -23,7 +24,6 @@ from runtime.identification.validation import prediction_errors
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
-from runtime.rows.observation import halves
 from runtime.rows.observe import observe
 from runtime.rows.prepared import Prepared, resolved
 from runtime.settings.study import Lowpass, Study
@@ -50,24 +50,29 @@ def other_studies(records: Sequence[Prepared], study: Study) -> dict[str, Study]
 def unseen_errors(
     model: GeneratedModel, records: Sequence[Prepared], studies: Mapping[str, Study]
 ) -> dict[str, float]:
-    """e_c, %, by label, without studies by which a half of the records does not determine the
+    """e_c, %, by label, without studies by which a part of the records does not determine the
     parameters.
     """
-    fits, seconds = {}, []
+    count, tested = (LIMIT.HELD_OUT_PARTS, 0) if "counts" in studies else (2, 1)
+    fits, parts = {}, []
     for label, own in studies.items():
         try:
             rows = observe(model, [one.by(own) for one in records], own)
-            first, second = (rows.between(*window) for window in halves(*rows.span))
-            fit = estimate_of(first, linear_companion(own.estimate), model=model)
+            number, settings = rows.equal_parts(count), linear_companion(own.estimate)
+            rest = [rows.where(number != p) for p in range(tested, count)]
+            found = [estimate_of(each, settings, model=model) for each in rest]
         except InputError:
             continue
-        if fit.status == "ok":
-            fits[label] = fit
-            seconds.append(second)
-    return {
-        label: float(np.exp(np.mean([np.log(prediction_errors(rows, fit)[0]) for rows in seconds])))
-        for label, fit in fits.items()
+        if all(fit.status == "ok" for fit in found):
+            fits[label] = found
+            parts.append([rows.where(number == p) for p in range(tested, count)])
+    errors = {
+        label: [
+            prediction_errors(*pair)[0] for each in parts for pair in zip(each, own, strict=True)
+        ]
+        for label, own in fits.items()
     }
+    return {label: float(np.exp(np.mean(np.log(own)))) for label, own in errors.items()}
 
 
 def errors_text(errors: Mapping[str, float], label: str) -> str:
@@ -78,11 +83,11 @@ def errors_text(errors: Mapping[str, float], label: str) -> str:
     if own is None or len(errors) < 2:
         return ""
     best = min(errors, key=lambda one: errors[one])
-    by, unit, better = "cut-off", " Hz", f"lowpass.cutoff: {best}"
-    if label == "counts":
-        by, unit, better = "reader", "", "reader: lowpass"
+    by, unit, better = (
+        ("fifths by reader", "", "reader: lowpass")
+        if label == "counts"
+        else ("half by cut-off", " Hz", f"lowpass.cutoff: {best}")
+    )
     listed = ", ".join(f"{one}{unit} {error:.3g} %" for one, error in errors.items())
     clear = own > LIMIT.CUTOFF_GAIN * errors[best] and own - errors[best] > LIMIT.LEAST_CUTOFF_GAIN
-    return f" Unseen half by {by}: {listed}" + (
-        f"; {BETTER}.{better} and compare." if clear else "."
-    )
+    return f" Unseen {by}: {listed}" + (f"; {BETTER}.{better} and compare." if clear else ".")

@@ -327,7 +327,7 @@ def _told(errors: Errors, least: float, sites: int) -> list[str]:
             "lines or noise; bounds and stated deviations are widened, lines: estimated asks for "
             "the places of the lines"
         )
-    if errors.time > CLOCK_ERRORS[0]:
+    if errors.time > CLOCK_ERRORS[0] and sites > FEWEST:
         said.append(
             f"time stamps are off by {errors.time:g} periods (rms); bounds and stated deviations "
             "are widened where the joint is fast"
