@@ -106,7 +106,7 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
         if not self.refused:
             return (
                 "every gain is determined by the load, whose parameters are those with them; "
-                "those of the robot are not: set record.torque_constant to the last column"
+                "those of the robot are not: set record.torque_constant to these constants"
             )
         return (
             "REFUSED, the load does not change their torque enough (%sigma from "

@@ -111,7 +111,14 @@ def initial(loop: ClosedLoop, start: Beginning, which: str | Mapping[str, float]
         return start.solution.X
     model: Any = loop.model
     if which == "values":
-        base = parameters_of(model)
+        try:
+            base = parameters_of(model)
+        except InputError as e:
+            raise SettingsError(
+                f"values, but {e.message.partition(';')[0]}; give them in the robot file (0 where "
+                "one is zero), or use start: ols and gains: one",
+                path=("estimate", "options"),
+            ) from e
     else:
         standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0)
         for j in model.JOINTS:

@@ -93,3 +93,28 @@ def test_what_is_printed_has_at_most_25_lines(kind, tmp_path):
     assert len(lines) <= LIMIT.LINES_PRINTED == 25, result.stdout
     assert "Unexplained by joint: 1 axle1 " in result.stdout or kind in OPEN
     assert "1 passes" not in result.output and "RuntimeWarning" not in result.output
+
+
+def test_values_as_a_start_without_values(tmp_path):
+    """The message names what a method that simulates can start from instead."""
+    yaml = YAML()
+    document = yaml.load(ROBOTS.joinpath("planar_2r.yaml").read_text(encoding="utf-8"))
+    del document["values"]
+    with (tmp_path / "arm.yaml").open("w") as file:
+        yaml.dump(document, file)
+    t, q, qd, qdd = motion(model := symgen.model(tmp_path / "arm.yaml"), 600)
+    tau = model.inverse_dynamics(q, qd, qdd, np.ones(len(model.BASE_PARAMETERS)))
+    table, head = np.column_stack([t, q, tau, q]), "t,q1,q2,tau1,tau2,r1,r2"
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=head, comments="")
+    law = {"law": {"kind": "pid", "kp": 200, "kd": 20}, "rate": 200, "reference": {"record": 0}}
+    study = {
+        "symgen": 1,
+        "record": {"files": ["log.csv"], "columns": {"q_ref": ["r1", "r2"]}},
+        "controller": law,
+        "estimate": {"method": "didim", "options": {"start": "values", "gains": "one"}},
+    }
+    with (tmp_path / "study.yaml").open("w") as file:
+        yaml.dump(study, file)
+    files = [str(tmp_path / name) for name in ("arm.yaml", "study.yaml")]
+    result = CliRunner().invoke(app, ["identify", *files])
+    assert result.exit_code == 2 and "use start: ols and gains: one" in result.output
