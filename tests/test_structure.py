@@ -97,7 +97,7 @@ BUDGET = {
         "regroup": 986,
         "emit": 1065,
         "symbols": 1305,
-        "certify": 1103,
+        "certify": 1104,
         "report": 295,
         "update": 757,
         "demo": 226,
@@ -120,7 +120,7 @@ BUDGET = {
         "reporting": 964,
     },
 }
-TOTAL = {"symgen": 13_752, "runtime": 20_008}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_749, "runtime": 20_008}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is
