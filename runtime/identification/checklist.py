@@ -18,6 +18,7 @@ import numpy as np
 
 from runtime.checks.check import WORST, Answer, Check, Question, State, named, worst_of
 from runtime.estimators.estimate import Estimate
+from runtime.identification.expected_error import Expected
 from runtime.identification.homogeneity import Homogeneity
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
@@ -142,7 +143,7 @@ def checklist_of(
     plausible: Sequence[Check] = (),
     homogeneity: Homogeneity | None = None,
     halves: bool = False,
-    expected: float = float("nan"),
+    expected: Expected | float = float("nan"),
     single: bool = False,
 ) -> Checklist:
     """The checklist of an identification; rank alone where the record does not determine the
@@ -175,13 +176,15 @@ def checklist_of(
         what follows.
     homogeneity : Homogeneity, optional
         Whether several records agree.
-    expected : float, %
-        Expected error of predictions of other motions; nan where it is not known.
+    expected : Expected or float, %
+        Expected error of predictions of other motions, with its interval or as it is; nan where it
+        is not known.
     single : bool
         Whether values are to be used one by one: deviations and correlations are doubts then, and
         where `expected` is not known; else remarks.
     """
-    rank = determined(estimate, fit)
+    likely = expected if isinstance(expected, Expected) else Expected(*3 * (expected,))
+    rank, expected = determined(estimate, fit), likely.error
     first, last = (
         ([], [rank]) if rank.state == "doubtful" else ([rank], [])
     )  # a bad condition is the least of several doubts
@@ -194,7 +197,7 @@ def checklist_of(
             explained_by_joint(estimate, fit, expected),
             predicted(fit, prediction_error, halves, differ=differ, expected=expected),
             None if homogeneity is None else agreeing(homogeneity),
-            expected_off(expected),
+            expected_off(likely),
             signs(negative),
             *(remark(check, single or np.isnan(expected)) for check in of_values),
             physical(fit if "standard" in fit.details else estimate, feasibility),
@@ -217,19 +220,19 @@ def remark(check: Check, counts: bool) -> Check:
 
 @Question(
     "How far off are predictions of other motions?",
-    f"{LIMIT.EXPECTED_ERROR[0]:g} % (usable to {LIMIT.EXPECTED_ERROR[1]:g} %)",
+    f"{LIMIT.EXPECTED_ERROR:g} % (usable where it may be less)",
     "record a motion over the range and the speeds that the model is for, longer, or with finer "
     "positions (symgen excite; signals: {reader: counts})",
 )
-def expected_off(error: float) -> Answer | None:
-    """Expected error of predictions (`runtime.identification.expected_error`); None where it is not
-    known.
-    """
-    if np.isnan(error):
+def expected_off(likely: Expected) -> Answer | None:
+    """Expected error of predictions, by its interval; None where it is not known."""
+    if np.isnan(likely.error):
         return None
+    limit = LIMIT.EXPECTED_ERROR
     return Answer(
-        _state(error, *LIMIT.EXPECTED_ERROR),
-        f"{error:.2g} % of the torques are expected to be off over the range of the robot",
+        "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
+        f"{likely.error:.2g} % of the torques are expected to be off over the range of the robot"
+        + (f", {likely.low:.2g} to {likely.high:.2g} % likely" if likely.low < likely.high else ""),
     )
 
 
@@ -283,7 +286,7 @@ def explained_by_joint(
         return None
     state = _state(worst.relative_error, *LIMIT.JOINT_ERROR)
     return Answer(
-        "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR[0] else state,
+        "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR else state,
         f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained",
         lost_joints(estimate, fit)
         or f"look at the torque of joint {worst.joint}: coupling of the drives, friction, offset, "
@@ -342,7 +345,7 @@ def predicted(
         for (times, least), most in zip(LIMIT.PREDICTION_ERROR, LIMIT.PREDICTION_MOST, strict=True)
     ]
     if halves:
-        sure = expected <= LIMIT.EXPECTED_ERROR[0]
+        sure = expected <= LIMIT.EXPECTED_ERROR
         limits = [LIMIT.PREDICTION_MOST[1] if sure else limits[1], np.inf]
     state: State = "open" if not np.isfinite(error) else _state(error, *limits)
     remedy = "a longer or richer record"

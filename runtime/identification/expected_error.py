@@ -16,13 +16,22 @@ The first part is what the record leaves open, the second how far the fit is fro
 values say together, the third how much too small the steps make inertias (the record's own lattice:
 `runtime.signals.encoder_advice`). What the model leaves out is not in it, but as far as it is in
 the residuals of C.
+
+The square of the error that one record makes is a sum of b squares, of which a few weigh most:
+with M = K'D'D K V it scatters as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
+interval of the expected error has the first two parts times quantiles of that. Where one direction
+is open, nu is 1: 30 % expected may be 2 %.
+
+Reference: Satterthwaite (1946) for nu.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import chi2
 
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
@@ -39,14 +48,22 @@ from runtime.signals.encoder_advice import acceleration_error
 Array = np.ndarray
 
 
+class Expected(NamedTuple):
+    """Expected error of predictions, %, and the interval of LIMIT.EXPECTED_INTERVAL around it."""
+
+    error: float
+    low: float
+    high: float
+
+
 def expected_error(
     model: GeneratedModel,
     observation: Observation,
     settings: EstimateSettings,
     fit: Estimate,
     records: Sequence[Prepared | Stream],
-) -> float:
-    """Expected error of predictions, %, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
+) -> Expected:
+    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
     file nor records in memory tell a range, or a loop does not close in it.
 
     Parameters
@@ -63,11 +80,11 @@ def expected_error(
     """
     states = reference_states(model, records)
     if states is None or channels_of(model):
-        return float("nan")
+        return Expected(*3 * (float("nan"),))
     try:
         D = np.asarray(model.regressor(*states))
     except ValueError:  # a loop that does not close
-        return float("nan")
+        return Expected(*3 * (float("nan"),))
     linear = linear_companion(settings)
     if linear.weights == "none":
         linear = EstimateSettings("wls", "joint", linear.columns)
@@ -83,8 +100,9 @@ def expected_error(
         variance = wider * (1.0 if system.known_variance else every.sigma_rho**2)
         near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
         D, X = D @ K, np.linalg.lstsq(K, X, rcond=None)[0]
-    size = np.linalg.norm(D @ X)
-    spread = np.sqrt(max(np.einsum("kja,ab,kjb->", D, V, D, optimize=True), 0.0)) / size
+    A = D.reshape(-1, len(X))
+    size, M = np.linalg.norm(A @ X), A.T @ A @ V
+    spread, nu = max(np.trace(M), 0.0), max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     steps = max(
         (
             acceleration_error(own.record, own.states, own.study.signals, own.drives)
@@ -93,8 +111,10 @@ def expected_error(
         ),
         default=0.0,
     )
-    parts = np.array([spread, np.linalg.norm(D @ (X - near)) / size, steps / (1 + steps)])
-    return float(min(100 * np.linalg.norm(parts), LIMIT.LARGEST_EXPECTED))
+    open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
+    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
+    errors = 100 * np.sqrt(open_part * times + (steps / (1 + steps)) ** 2)
+    return Expected(*np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist())
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from runtime.estimators.method import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
 from runtime.identification.cutoff_errors import BETTER
-from runtime.identification.expected_error import expected_error
+from runtime.identification.expected_error import Expected, expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
 from runtime.identification.laws import FittedLaws
@@ -282,16 +282,19 @@ class Identification:
         """
         return "standard" in self.model_estimate.details
 
-    @cached_property
+    @property
     def expected_error(self) -> float:
         """Expected error of predictions of other motions, %, of `model_estimate`; nan where it is
         not known (`runtime.identification.expected_error`), LIMIT.LARGEST_EXPECTED where the
         records do not determine the parameters.
         """
-        if not self.determined:
-            return float(LIMIT.LARGEST_EXPECTED)
-        if not self.usable:
-            return float("nan")
+        return self.expected.error
+
+    @cached_property
+    def expected(self) -> Expected:
+        """`expected_error`, and the interval in which it is likely, %."""
+        if not (self.determined and self.usable):
+            return Expected(*3 * (float("nan") if self.determined else LIMIT.LARGEST_EXPECTED,))
         return expected_error(
             self.model, self.observation, self.study.estimate, self.model_estimate, self.prepared
         )
@@ -312,7 +315,7 @@ class Identification:
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
             homogeneity=self.homogeneity,
-            expected=self.expected_error,
+            expected=self.expected,
             single=self.study.validate.values,
             advice=self.advice,
             plausible=self.plausibility.checks if self.plausibility is not None else (),

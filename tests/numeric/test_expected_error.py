@@ -45,6 +45,7 @@ def test_rich_motion_still_joint_and_steps(arm):
         )
     )
     assert rich.expected_error < 2 and rich.checklist.grade == rich.expected_error
+    assert rich.expected.low < rich.expected_error < rich.expected.high < 5
     assert still.expected_error > 5 * rich.expected_error
     assert steps.expected_error > 15 and steps.checklist.state == "no"
 
@@ -53,7 +54,7 @@ def test_range_not_known_and_not_determined(arm):
     result = runtime.identify(arm, record(arm, (1, 1)))
     bare = type("Bare", (), {**{k: getattr(arm, k) for k in dir(arm) if k[0] != "_"}, "LIMITS": {}})
     fit = result.model_estimate
-    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ()))
+    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ())).all()
     lost = replace(result, estimate=replace(result.estimate, status="rank-deficient"))
     assert lost.expected_error == 999
 

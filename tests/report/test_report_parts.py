@@ -13,6 +13,7 @@ import pytest
 
 from runtime.estimators.estimate import Estimate, JointFit
 from runtime.identification.checklist import _state, checklist_of, lost_joints, separate
+from runtime.identification.expected_error import Expected
 from runtime.identification.validation import JointComparison
 from runtime.markup import split, symbol, unit
 from runtime.model.generated import load_model
@@ -185,8 +186,16 @@ def test_single_values_are_remarks_where_the_expected_error_is_known():
         assert checked(estimate, expected=2.0, single=True).state != "good"
 
 
-@pytest.mark.parametrize(("expected", "state"), [(4.9, "good"), (5.1, "doubtful"), (15.1, "no")])
-def test_expected_error_grades(expected, state):
+@pytest.mark.parametrize(
+    ("expected", "state"),
+    [
+        (Expected(3.0, 1.0, 4.9), "good"),
+        (Expected(4.0, 1.0, 5.1), "doubtful"),
+        (Expected(30.0, 4.9, 60.0), "doubtful"),
+        (Expected(8.0, 5.1, 12.0), "no"),
+    ],
+)
+def test_expected_error_grades_by_its_interval(expected, state):
     checklist = checked(fit(), expected=expected)
     assert checklist.state == state
     assert state == "good" or "other motions" in checklist.worst.question
