@@ -115,7 +115,7 @@ BUDGET = {
         "loop": 1660,
         "excitation": 613,
         "resolution": 1876,
-        "checks": 2009,
+        "checks": 2182,
         "identification": 2840,
         "reporting": 964,
     },

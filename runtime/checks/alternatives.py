@@ -2,8 +2,11 @@
 samples and entries of the table of frames.
 
     q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,
-    tau' = T tau - s known - (a q + b sin q + c cos q),
+    tau' = T tau - s known - (a q + b sin q + c cos q + d),
     free_... = another value
+
+What is wrong since an instant, or grows with time, is the share w(t) of the change:
+P(t) = I + w(t) (P - I), and so on.
 
 A robot of n joints has some 10 n^2 of them. Each is tried at the cost of the regressor
 (`runtime.checks.trials`).
@@ -29,7 +32,7 @@ Array = np.ndarray
 TURNS = {"90 degrees": np.pi / 2, "-90 degrees": -np.pi / 2, "180 degrees": np.pi}
 FACTORS = {"1000": 1e3, "1/1000": 1e-3}
 DEGREE = np.pi / 180
-TORQUE_UNITS = ("N*mm", "N*cm", "kgf*cm", "lbf*inch", "ozf*inch")
+TORQUE_UNITS = ("kN*m", "N*mm", "N*cm", "kgf*cm", "lbf*inch", "ozf*inch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +56,10 @@ class Alternative:
         Factor on the sampling rate.
     known_factor : float or ndarray, shape (n,)
         Factor s on the known torques.
-    spring : ndarray, shape (n, 3), or 0
-        a, b, c of a torque that each joint has by its position.
+    spring : ndarray, shape (n, 4), or 0
+        a, b, c, d of a torque that each joint has by its position, or always.
+    share : ndarray, shape (K,), or 1
+        w at every sample.
     constants : mapping of str to float
         Entries of the table of frames, SI.
     of : str
@@ -70,6 +75,7 @@ class Alternative:
     rate: float = 1.0
     known_factor: Array | float = 1.0
     spring: Array | float = 0.0
+    share: Array | float = 1.0
     constants: Mapping[str, float] = field(default_factory=dict)
     of: str = ""
 
@@ -80,11 +86,20 @@ class Alternative:
 
     def states(self, samples: Samples) -> tuple[Array, Array, Array]:
         """q, qd, qdd, shape (K, n) each."""
+        w = np.reshape(self.share, (-1, 1))
+        q, qd, qdd = samples.q, samples.qd, samples.qdd
         return (
-            samples.q @ self.P.T + self.p,
-            self.rate * samples.qd @ self.P.T,
-            self.rate**2 * samples.qdd @ self.P.T,
+            q + w * (q @ self.P.T + self.p - q),
+            qd + w * (self.rate * qd @ self.P.T - qd),
+            qdd + w * (self.rate**2 * qdd @ self.P.T - qdd),
         )
+
+    def back(self, F: Array) -> Array:
+        """F T^-1, shape (n, n), or (K, n, n) where T changes with time."""
+        if np.ndim(self.share) == 0:
+            return np.asarray(F @ np.linalg.inv(self.T))
+        one, w = np.eye(len(F)), np.reshape(self.share, (-1, 1, 1))
+        return np.asarray(F @ np.linalg.inv(one + w * (self.T - one)))
 
     def torque(self, samples: Samples) -> Array:
         """Torques left for the model, shape (K, n)."""
@@ -93,6 +108,7 @@ class Alternative:
     def subtracted(self, samples: Samples) -> Array:
         """Torques known beside the model, shape (K, n)."""
         by_position = (self.spring * springs(samples.q)).sum(axis=2)
+        by_position = by_position * np.reshape(self.share, (-1, 1))
         return np.asarray(self.known_factor * samples.tau_known + by_position)
 
     @property
@@ -102,8 +118,10 @@ class Alternative:
 
 
 def springs(q: Array) -> Array:
-    """q, sin q and cos q of every joint: what springs and counterbalances do, shape (K, n, 3)."""
-    return np.stack([q, np.sin(q), np.cos(q)], axis=2)
+    """q, sin q and cos q of every joint: what springs and counterbalances do, and 1, shape
+    (K, n, 4).
+    """
+    return np.stack([q, np.sin(q), np.cos(q), np.ones_like(q)], axis=2)
 
 
 def unchanged(n: int, **changed: Any) -> Alternative:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from runtime.checks.delay import Delay, delay
+from runtime.checks.delay import Delay, LatePositions, delays
 from runtime.checks.fits import Grams
 from runtime.checks.gravity import Gravity, gravity_direction
 from runtime.checks.known import KnownValues, known_values
@@ -154,12 +154,19 @@ class Case:
         """Direction of gravity fitted freely."""
         return None if self.problem is None else gravity_direction(self.problem)
 
-    @cached_property
+    @property
     def late(self) -> Delay | None:
-        """Delay of the longest record; None where it is too short."""
+        """Delay of the torques of the longest record; None where it is too short."""
+        return self.delays[0]
+
+    @cached_property
+    def delays(self) -> tuple[Delay | None, LatePositions | None]:
+        """Delay of the torques of the longest record, and the positions that are late instead; None
+        where it is too short.
+        """
         own = max(self.straight, key=lambda one: len(one.record))
         longest = min(LIMIT.LONGEST_DELAY, float(own.record.t[-1] - own.record.t[0]) / 20)
         try:
-            return delay(self.model, own, self.study, longest=longest)
+            return delays(self.model, own, self.study, longest)
         except (InputError, ValueError):
-            return None
+            return None, None

@@ -14,6 +14,10 @@ robot at values of the number, by golden section.
 
 A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c
 of the same step.
+
+A zero, a factor and a constant torque of a joint may be wrong always, since an instant, or more and
+more: the effect of the number times a share w(t), so that J serves them all. Beside what is wrong
+always, the share whose first step gains most is searched; it has to gain LIMIT.VARYING_GAIN more.
 """
 
 from __future__ import annotations
@@ -38,6 +42,7 @@ from runtime.checks.alternatives import (
 from runtime.checks.fits import Grams, quick_fit, solved
 from runtime.checks.gravity import gauss_newton_step
 from runtime.checks.trials import Problem, Trial
+from runtime.errors import instant
 from runtime.limits import LIMIT
 from runtime.model.generated import joint_labels, joint_units
 
@@ -59,7 +64,7 @@ class Quantity:
     Attributes
     ----------
     kind : str
-        factor, zero, rate, coupling, length, angle, spring.
+        factor, zero, offset, rate, coupling, length, angle, spring.
     of : str
         What it is, in words.
     span : float
@@ -68,6 +73,10 @@ class Quantity:
         xi to what it changes of an Alternative.
     plain : Alternative
         The study as it is.
+    since : str
+        When it is wrong, in words; "" for always.
+    share : ndarray, shape (K,), or 1
+        w at every sample.
     """
 
     kind: str
@@ -75,10 +84,19 @@ class Quantity:
     span: float
     fields: Callable[[float], dict[str, Any]]
     plain: Alternative
+    since: str = ""
+    share: Array | float = 1.0
 
     def change(self, xi: float) -> Alternative:
         """The study with this xi."""
-        return replace(self.plain, kind=self.kind, of=self.of, **self.fields(xi))
+        fields = self.fields(xi)
+        if self.since:
+            fields["cause"] += self.since
+            fields["remedy"] = (
+                f"look for what changes {self.of} within the record, or use a part of it "
+                "(rows.window)"
+            )
+        return replace(self.plain, kind=self.kind, of=self.of, share=self.share, **fields)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +135,10 @@ def quantities(problem: Problem) -> list[Quantity]:
             which.append(
                 ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
             )
+        size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))
+        of = f"a constant torque of joint {joint}"
+        unit = "N m" if units[j] == "rad" else "N"
+        which.append(("offset", of, 2.0, partial(_offset, joint, unit, number == j, size)))
         if units[j] == "rad" and (ratios := _ratios(problem, j)) is not None:
             of = f"a spring or counterbalance of joint {joint}"
             which.append(("spring", of, 2.0, partial(_spring, of, number == j, ratios)))
@@ -177,17 +199,26 @@ def _spring(of: str, chosen: Array, ratios: Array, xi: float) -> dict[str, Any]:
     }
 
 
+def _offset(joint: str, unit: str, chosen: Array, size: float, xi: float) -> dict[str, Any]:
+    return {
+        "cause": f"the torque of joint {joint} is off by {xi * size:.3g} {unit}",
+        "remedy": f"look at the zero of the torque of joint {joint}, or give it as a known torque "
+        "(record.columns.tau_known)",
+        "spring": xi * np.outer(chosen, (0.0, 0.0, 0.0, size)),
+    }
+
+
 def _ratios(problem: Problem, j: int) -> Array | None:
     """a, b, c of a spring or counterbalance of a joint beside the model, to first order; None where
     the samples do not tell them from it.
     """
     D, now, mask = _rows(problem, unchanged(problem.samples.n))
     size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))  # a, b, c in this unit
-    J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j], problem.F[:, j])
+    J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j, :3], problem.F[:, j])
     found = gauss_newton_step(
         problem, D, J, problem.given, problem.tau - now + D @ problem.given.X, mask
     )
-    return None if found is None else size * found[0]
+    return None if found is None else size * np.append(found[0], 0.0)
 
 
 def _angle(key: str, name: str, frame: str, value: float, xi: float) -> dict[str, Any]:
@@ -219,16 +250,33 @@ def _guess(factor: float) -> str:
     )
 
 
-def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
-    """xi, sigma, gain of each quantity on its own, to first order."""
+def shares(problem: Problem) -> list[tuple[str, Array | float]]:
+    """When a number is wrong, in words, and w at every sample: always, since one of LIMIT.SPLITS
+    instants, more and more; of several records always.
+    """
+    t = problem.samples.t
+    varied: list[tuple[str, Array | float]] = [("", 1.0)]
+    if np.ptp(problem.samples.record) == 0:
+        text = ", growing to that from nothing at the beginning: a drift"
+        varied.append((text, (t - t[0]) / (t[-1] - t[0])))
+        for split in np.linspace(t[0], t[-1], LIMIT.SPLITS + 2)[1:-1]:
+            varied.append((f" since {instant(round(float(split), 1))} s", 1.0 * (t >= split)))
+    return varied
+
+
+def first_steps(problem: Problem, which: list[Quantity]) -> list[tuple[Quantity, Step]]:
+    """xi, sigma, gain of each quantity on its own, to first order; of those that may change with
+    time, also at the share that gains most.
+    """
     chi, sigma = problem.given.X, problem.given.sigma
     D, now, mask = _rows(problem, unchanged(problem.samples.n))
-    e = (problem.tau - now) / sigma * mask
+    e = ((problem.tau - now) / sigma * mask).ravel()
     A, _ = Grams.of(D, problem.tau, mask).weighted(sigma)
     _, B = problem.barrier.derivatives(chi, LIMIT.BARRIER[-1])
-    H = A + B
-    share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
-    steps = []
+    number = max(float(mask.sum(axis=0).mean()), 1.0)
+    share = max(problem.N / number, LIMIT.LEAST_SHARE)
+    DT = (D / sigma[:, None]).reshape(-1, D.shape[2]).T
+    varied, steps = shares(problem), []
     for quantity in which:
         J = (
             _rows(problem, quantity.change(LIMIT.DIFFERENCE_STEP))[1] - now
@@ -237,15 +285,21 @@ def first_steps(problem: Problem, which: list[Quantity]) -> list[Step]:
             np.linalg.norm(J) < LIMIT.DIFFERENCE_STEP**2 * np.linalg.norm(now)
             or problem.beyond(J[:, :, None]) < LIMIT.NEARLY_HIDDEN
         )
-        J = J / sigma * mask
-        WJ = np.einsum("kjp,kj->p", D, J / sigma)
-        left = float((J * J).sum() - WJ @ solved(H, WJ))
         told = quantity.kind == "spring" and problem.barrier.near_values  # by the values alone
-        if (within and not told) or left <= 0:
-            steps.append(Step(0.0, np.inf, 0.0, within))
-            continue
-        xi = float((J * e).sum()) / left
-        steps.append(Step(xi, float((left * share) ** -0.5), 0.5 * share * xi**2 * left))
+        found: list[tuple[Quantity, Step]] = []
+        for since, w in varied if quantity.kind in LIMIT.VARYING else varied[:1]:
+            one = replace(quantity, since=since, share=w)
+            rows = (np.reshape(w, (-1, 1)) * J / sigma * mask).ravel()
+            WJ = DT @ rows
+            left = float(rows @ rows - WJ @ solved(A + B, WJ))
+            hidden = within and not since
+            if (hidden and not told) or left <= LIMIT.NEARLY_HIDDEN**2 * float(rows @ rows):
+                found.append((one, Step(0.0, np.inf, 0.0, hidden)))
+                continue
+            xi = float(rows @ e) / left
+            gain = 0.5 * share * xi**2 * left
+            found.append((one, Step(xi, float((left * share) ** -0.5), gain, hidden)))
+        steps += [found[0], *sorted(found[1:], key=lambda one: -one[1].gain)[:1]]
     return steps
 
 
@@ -263,17 +317,17 @@ def _rows(problem: Problem, alternative: Alternative) -> tuple[Array, Array, Arr
 
 def searched(problem: Problem) -> list[Trial]:
     """The quantities whose first step is worth it, each at its best value."""
-    which = quantities(problem)
-    steps = first_steps(problem, which)
-    order = sorted(range(len(which)), key=lambda k: -steps[k].gain)[: LIMIT.NUMBERS_SEARCHED]
-    trials = []
-    for k in order:
-        if steps[k].gain >= LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE:
-            trials.append(_best(problem, which[k], steps[k]))
+    steps = first_steps(problem, quantities(problem))
+    first = sorted(steps, key=lambda one: -one[1].gain)[: LIMIT.NUMBERS_SEARCHED]
+    trials = [
+        _best(problem, quantity, step)
+        for quantity, step in first
+        if step.gain >= LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
+    ]
     small = [
         one.change(LIMIT.SMALLEST_CHANGE[one.kind])
-        for one, step in zip(which, steps, strict=True)
-        if step.within
+        for one, step in steps
+        if step.within and one.kind != "offset"  # a model may have its column
     ]
     hidden = [
         Trial(one, -np.inf, None, -np.inf, equivalent=True) for one in small if problem.hides(one)
@@ -303,7 +357,8 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     bounds = max(best - width, -quantity.span), min(best + width, quantity.span)
     minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
     xi = min(scores, key=scores.__getitem__)
-    if abs(xi) < LIMIT.SMALLEST_CHANGE[quantity.kind]:
+    least = LIMIT.SMALLEST_CHANGE[quantity.kind] * (0.5 if quantity.since else 1.0)
+    if abs(xi) < least:
         return None
     grams = problem.grams(quantity.change(xi))
     assert grams is not None

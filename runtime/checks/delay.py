@@ -12,14 +12,23 @@ least squares and that of blocks of time taken as independent.
 
 A delay of a few ms is what controllers and field buses make of a record; at 1 Hz and 10 rad/s^2 it
 costs some per cent of the torque.
+
+Positions of some joints J that are late, alone or with their torques, are another delay, of one
+number:
+
+    Y_j(t + [j in J] delta) = W_j(q_J(t + delta), q(t)) X + rho
+
+Its first step tells which joints, one or all from some joint on, are searched.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
+from scipy.optimize import minimize_scalar
 
 from runtime.checks.fits import Grams, solved
 from runtime.checks.samples import lowpassed, usable
@@ -81,6 +90,27 @@ class Delay(Result):
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LatePositions:
+    """Positions of some joints, recorded later than the others.
+
+    Attributes
+    ----------
+    joints : ndarray of bool, shape (n,)
+    torques : bool
+        Whether the torques of these joints are late by as much.
+    shift : float, s
+    before, after : ndarray, shape (n,), %
+        As those of `Delay`.
+    """
+
+    joints: Array
+    torques: bool
+    shift: float
+    before: Array
+    after: Array
+
+
 def delay(
     model: GeneratedModel,
     record: Record | Prepared,
@@ -108,6 +138,15 @@ def delay(
     ------
     InputError
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
+    """
+    return delays(model, record, study, longest)[0]
+
+
+def delays(
+    model: GeneratedModel, record: Record | Prepared, study: Study | None, longest: float
+) -> tuple[Delay, LatePositions | None]:
+    """As `delay`; also the positions that are late instead, those that leave least, None where none
+    leave less than the record as it is.
     """
     study = study or Study()
     require_motion(study.signals, "a delay")
@@ -138,7 +177,11 @@ def delay(
     common, sigma_common = _mean(shift[known], sigma[known])
     labels = joint_labels(model)
     before, after = problem.errors(np.zeros(record.n)), problem.errors(np.where(known, shift, 0.0))
-    return Delay(labels, shift, sigma, common, sigma_common, before, after)
+    late = Delay(labels, shift, sigma, common, sigma_common, before, after)
+    try:
+        return late, problem.late_positions(before)
+    except ValueError:  # a loop that does not close in other positions
+        return late, None
 
 
 def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
@@ -196,12 +239,14 @@ class _Problem:
         def W(k: Array) -> Array:
             return np.asarray(model.regressor(states.q[k], states.qd[k], states.qdd[k]))
 
+        self.model = model
+        self.states = CubicSpline(record.t, np.stack([states.q, states.qd, states.qdd], axis=1))
         self.D = W(kept)
         self.rate = (W(kept + 1) - W(kept - 1)) * (record.rate / 2)
         # a step of dry friction is smeared by the filter of the torques: rows near a jump of a
         # column of signs are left out
         flat = np.isin(np.abs(self.D), (0.0, 1.0)).all(axis=0)
-        self.rate[:, flat] = 0.0
+        self.rate[:, flat], self.flat = 0.0, flat
         smeared = int(LIMIT.SMEARED * record.rate / cutoff)
         steps = [
             np.sign(W(kept + k)) != np.sign(self.D)
@@ -216,22 +261,77 @@ class _Problem:
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]
         )
 
-    def fit(self, shift: Array) -> tuple[Array, Array, Array]:
-        """X, sigma by joint, and the residuals, shape (K, n)."""
+    def rows(self, shift: Array) -> tuple[Array, Array]:
+        """W with the positions of each joint taken a time later, shape (K, n, b), and its rows away
+        from jumps.
+        """
+        states, mask = self.states(self.t), self.mask.copy()
+        for j in np.flatnonzero(shift):
+            later = self.t + shift[j]
+            states[:, :, j] = self.states(later)[:, :, j]
+            mask[:, j] = self.mask[np.searchsorted(self.t, later).clip(max=len(self.t) - 1), j]
+        return np.asarray(self.model.regressor(*states.transpose(1, 0, 2))), mask
+
+    def late_positions(self, before: Array) -> LatePositions | None:
+        """The set of joints, one or all from some joint on, and the time by which their positions,
+        or positions and torques, are late, that leave least.
+        """
+        zero, number = np.zeros(self.n), np.arange(self.n)
+        X, sigma, e = self.fit(zero)
+        w = self.mask / sigma
+        slope = np.zeros((self.n, len(self.t), self.n))  # of the torques by the time of each joint
+        for j in number:
+            change = self.rows(LIMIT.DELAY_STEP * (number == j))[0] - self.D
+            change[:, self.flat] = 0.0
+            slope[j] = w * (change @ X) / LIMIT.DELAY_STEP
+        own = np.einsum("kj,kj,ji->jki", w, self.rate @ X, np.eye(self.n))
+        sets = [number == j for j in number]
+        sets += [number >= j for j in range(1, self.n - 1)]
+        which = [(joints, both) for joints in sets for both in (False, True)]
+        Z = np.stack([(slope - both * own)[joints].sum(axis=0).ravel() for joints, both in which])
+        D = (self.D * w[:, :, None]).reshape(-1, self.b)
+        Z = Z - Z @ D @ np.linalg.pinv(D.T @ D, rcond=1e-10, hermitian=True) @ D.T
+        size = np.maximum((Z * Z).sum(axis=1), 1e-12)
+        along = Z @ (e / sigma).ravel()
+        best = None
+        for k in np.argsort(-(along**2) / size)[: LIMIT.LATE_SETS]:
+            joints, both = which[k]
+
+            def left(d: float, joints: Array = joints, both: bool = both) -> Array:
+                return self.errors(d * joints if both else zero, d * joints)
+
+            def total(d: float, left: Callable[[float], Array] = left) -> float:
+                return float(np.log(np.maximum(left(d), 0.1)).sum())
+
+            first = float(np.clip(along[k] / size[k], -self.longest, self.longest))
+            near = min((0.5 * first, first, 1.5 * first), key=total)
+            bounds = sorted(np.clip((0.6 * near, 1.5 * near), -self.longest, self.longest))
+            d = float(
+                minimize_scalar(total, bounds=bounds, method="bounded", options={"maxiter": 10}).x
+            )
+            of = joints if d > 0 or not both else ~joints  # early ones are others that are late
+            found = LatePositions(of, both, abs(d) if both else d, before, left(d))
+            if best is None or total(d) < np.log(np.maximum(best.after, 0.1)).sum():
+                best = found
+        return best
+
+    def fit(self, shift: Array, late: Array | None = None) -> tuple[Array, Array, Array]:
+        """X, sigma by joint, and the residuals, shape (K, n). late : time of the positions."""
+        D, mask = (self.D, self.mask) if late is None else self.rows(late)
         Y = self.shifted(shift)
-        grams, rows = Grams.of(self.D, Y, self.mask), np.maximum(self.mask.sum(axis=0), 1)
+        grams, rows = Grams.of(D, Y, mask), np.maximum(mask.sum(axis=0), 1)
         sigma = np.sqrt(np.maximum(grams.measured, 1e-300) / rows)
         for _ in range(4):
             X = solved(*grams.weighted(sigma))
             sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)
-        return X, sigma, (Y - self.D @ X) * self.mask
+        return X, sigma, (Y - D @ X) * mask
 
-    def errors(self, shift: Array) -> Array:
-        """Relative error by joint, %."""
-        Y = self.shifted(shift) * self.mask
+    def errors(self, shift: Array, late: Array | None = None) -> Array:
+        """Relative error by joint, %. late : time of the positions."""
+        Y = self.shifted(shift) * (self.mask if late is None else self.rows(late)[1])
         return np.asarray(
             100
-            * np.linalg.norm(self.fit(shift)[2], axis=0)
+            * np.linalg.norm(self.fit(shift, late)[2], axis=0)
             / np.maximum(np.linalg.norm(Y, axis=0), 1e-300)
         )
 

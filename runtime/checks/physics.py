@@ -10,7 +10,7 @@ import numpy as np
 
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State
-from runtime.checks.delay import Delay
+from runtime.checks.delay import Delay, LatePositions
 from runtime.checks.trials import Trial, reach
 from runtime.limits import LIMIT
 
@@ -103,12 +103,25 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     late = None if case.problem is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
-    own, gain = late_joints(late), late.before - late.after
+    if (logged := late_positions(case)) is not None:
+        first = not named or gained(case, logged) >= explained(case, named[0])
+        columns = "Positions and torques" if logged.torques else "Positions"
+        sense, ms = "late" if logged.shift > 0 else "early", abs(1e3 * logged.shift)
+        j = int(np.argmax(logged.before - logged.after))
+        return Answer(
+            "doubtful" if first else "open",
+            f"{columns} of joint {case.joints(logged.joints)} are recorded {sense} by {ms:.1f} ms; "
+            f"correcting it changes the error of joint {case.labels[j]} from "
+            f"{logged.before[j]:.1f} to {logged.after[j]:.1f} %",
+            f"shift these columns by {-1e3 * logged.shift:+.1f} ms against the others before "
+            "reading the record, or mend the logger",
+        )
+    own, gain = certain_joints(case), late.before - late.after
     which, shift, sigma = "Torques are", np.array([late.common]), late.sigma_common
     if own.any() and not own.all():
         which = f"Torques of joint {case.joints(own)} are"
         shift, sigma = late.shift[own], float(late.sigma[own].max())
-    first = not named or late_gain(case) >= named[0].gain
+    first = not named or late_gain(case) >= explained(case, named[0])
     state: State = "good" if not own.any() else "doubtful" if first else "open"
     j = int(np.nanargmax(np.where(own | ~own.any(), gain, -np.inf)))
     sense, each = (
@@ -143,12 +156,45 @@ def late_joints(late: Delay) -> Array:
     return np.asarray(own & (late.shift * strongest > 0))
 
 
+def late_positions(case: Case) -> LatePositions | None:
+    """Positions that are certainly late: by more than LIMIT.LATE_JOINT, gaining LIMIT.RATE_GAIN
+    beyond LIMIT.DECISIVE, and more by LIMIT.DECISIVE than delays of the torques.
+    """
+    late, logged = case.delays
+    if logged is None or late is None or abs(logged.shift) < LIMIT.LATE_JOINT:
+        return None
+    visible = (logged.before > LIMIT.DELAY_VISIBLE * logged.after).any()
+    torques = gained(case, late) if certain_joints(case).any() else LIMIT.RATE_GAIN
+    return logged if visible and gained(case, logged) > torques + LIMIT.DECISIVE else None
+
+
+def gained(case: Case, late: Delay | LatePositions) -> float:
+    """What delays gain, nats."""
+    N = 0.0 if case.problem is None else case.problem.N
+    return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
+
+
+def explained(case: Case, trial: Trial) -> float:
+    """What an alternative gains, nats, rows counted as for a delay."""
+    assert case.problem is not None and trial.fit is not None
+    return case.problem.given.score - trial.fit.score
+
+
 def late_gain(case: Case) -> float:
     """What certain delays gain, nats; 0 where there are none."""
-    late, problem = case.late, case.problem
-    if late is None or problem is None or not late_joints(late).any():
+    if case.problem is None or case.late is None:
         return 0.0
-    return problem.N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
+    if (logged := late_positions(case)) is not None:
+        return gained(case, logged)
+    return gained(case, case.late) if certain_joints(case).any() else 0.0
+
+
+def certain_joints(case: Case) -> Array:
+    """Joints whose torques are certainly late, bool (n,): none where that gains less than
+    LIMIT.LATE_GAIN.
+    """
+    assert case.late is not None
+    return np.asarray(late_joints(case.late) & (gained(case, case.late) >= LIMIT.LATE_GAIN))
 
 
 @Question(

@@ -28,6 +28,7 @@ from runtime.checks.physics import (
     better,
     delayed,
     direction,
+    explained,
     late_gain,
     not_asked,
     physics,
@@ -209,7 +210,7 @@ def plausibility(
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = [t for t in decisive(trials, case.problem) if t.gain > late_gain(case)]
+    named = [t for t in decisive(trials, case.problem) if explained(case, t) > late_gain(case)]
     if named and (moved := answers[change]) is not None:  # what a wrong study does to both parts
         checks[checks.index(moved)] = replace(moved, state="open")
     asked = EXPLAINED if trials else EXPLAINED[:-1]
@@ -265,16 +266,18 @@ def _case(
 
 def _ranked(trials: Sequence[Trial], penalty: float) -> list[Trial]:
     """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
-    gives the parameters more room, and so has a coupling, and a spring unless it brings them nearer
-    to the values of the robot file. penalty : distance of the study from those, nats.
+    gives the parameters more room, and so has a coupling, a constant torque, and a spring unless it
+    brings them nearer to the values of the robot file; what changes with time has to gain
+    LIMIT.VARYING_GAIN more. penalty : distance of the study from those, nats.
     """
 
     def price(trial: Trial) -> float:
         nearer = trial.fit is not None and penalty - trial.fit.penalty > LIMIT.DECISIVE
         kind = trial.alternative.kind
-        return float(LIMIT.RATE_GAIN) * (
-            kind in ("rate", "coupling") or (kind == "spring" and not nearer)
-        )
+        if np.ndim(trial.alternative.share):
+            return float(LIMIT.VARYING_GAIN)
+        dear = kind in ("rate", "coupling", "offset") or (kind == "spring" and not nearer)
+        return float(LIMIT.RATE_GAIN) * dear
 
     return sorted(
         (replace(trial, gain=trial.gain - price(trial)) for trial in trials),

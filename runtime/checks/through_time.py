@@ -1,8 +1,9 @@
 """Along the record: positions that jump, torques that are cut off, a robot that changes.
 
-jumps      a step of q between two samples that is LIMIT.JUMP times the usual one and faster than
-           any robot: an encoder that dropped out, samples that are
-           missing, angles that wrap, two records joined into one
+jumps      a step of q between two samples that differs from those around it by LIMIT.JUMP times
+           what is usual, and by more than any robot accelerates: an encoder that dropped out,
+           samples that are missing, angles that wrap, two records joined into one
+frozen     a joint in motion that holds one value for LIMIT.HELD samples from one sample to the next
 cut        the largest or the smallest torque holds for many samples, and the model that is fitted
            to the others goes beyond it: a clipped signal. It meets a torque that saturates the
            drive and is recorded as it acted
@@ -17,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question
@@ -31,18 +33,35 @@ Array = np.ndarray
 
 @Question(
     "Are the positions those of a motion?",
-    f"steps below {LIMIT.JUMP:g} times the usual ones, or below the speed of any robot",
+    f"steps that differ by less than {LIMIT.JUMP:g} times what is usual, or than any robot "
+    "accelerates",
 )
 def jumps(case: Case) -> Answer:
     """Positions that no joint can have passed through."""
     median, units, limits = case.study.signals.median, case.units, case.limits("qd")
     fastest = np.array([LIMIT.LARGEST_SPEED[unit][1] for unit in units])
     fastest = fastest if limits is None else 4 * limits
+    good, none = np.array([LIMIT.LARGEST_ACCELERATION[unit] for unit in units]).T
     for record in case.records:
         q = median_filtered(record.q, median)
         steps = np.abs(np.diff(q, axis=0))
-        usual = np.array([np.quantile(s[s > 0], 0.9) if s.any() else np.inf for s in steps.T])
-        high = steps > np.maximum(LIMIT.JUMP * usual, fastest / record.rate)
+        usual = _usual(steps)
+        around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))
+        apart = np.abs(np.diff(q, axis=0) - around)
+        least = np.minimum(fastest / record.rate, none / record.rate**2)
+        high = apart > np.maximum(LIMIT.JUMP * _usual(apart), least)
+        changes = np.abs(np.diff(q, 2, axis=0))
+        sharp = changes > np.maximum(LIMIT.JUMP * _usual(changes), good / record.rate**2)
+        frozen = np.array([_frozen(x, own) for x, own in zip(steps.T, sharp.T, strict=True)])
+        if frozen.any():
+            still = np.asarray(frozen.any(axis=1))
+            k = int(np.flatnonzero(frozen.any(axis=0))[0])
+            return Answer(
+                "no",
+                f"Joint {case.joints(still)} moves, and holds one value from one sample to the "
+                f"next at {instant(record.t[k])} s",
+                "an encoder froze: leave this time out (rows.window), or repair the record",
+            )
         if not high.any():
             continue
         first, _ = _runs(high.any(axis=1), median)
@@ -57,7 +76,7 @@ def jumps(case: Case) -> Answer:
             text += f", and at {more} more {'instant' if more == 1 else 'instants'}"
         if _wrap(q, high, usual, median):
             remedy = "it wraps: unwrap it, or record counts and let signals: {reader: counts} do so"
-        elif len(joints) == len(units):
+        elif len(joints) > 1 or len(units) == 1:
             remedy = (
                 "samples are missing there, or two records are joined: give each its own file "
                 "(record.also), or cut (rows.window)"
@@ -69,6 +88,23 @@ def jumps(case: Case) -> Answer:
             )
         return Answer("no", text, remedy)
     return Answer("good", "No joint jumps between two samples")
+
+
+def _usual(x: Array) -> Array:
+    """What nine in ten of the values of each column other than zero stay below, (n,)."""
+    return np.array([np.quantile(own[own > 0], 0.9) if own.any() else np.inf for own in x.T])
+
+
+def _frozen(steps: Array, sharp: Array) -> Array:
+    """Where a position is held for LIMIT.HELD samples once its speed has changed sharply, bool
+    (N,). sharp : such changes, (N - 2,).
+    """
+    still = np.append(np.cumsum(steps == 0), 0)
+    k = np.flatnonzero(sharp) + 1  # the first of the steps after each change
+    k = k[(k + LIMIT.HELD < len(steps)) & (steps[k - 1] > 0)]
+    held = np.zeros(len(steps) + 1, dtype=bool)
+    held[k] = still[k + LIMIT.HELD - 1] - still[k - 1] == LIMIT.HELD
+    return held
 
 
 def _runs(high: Array, median: int) -> tuple[Array, Array]:

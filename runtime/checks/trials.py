@@ -120,11 +120,12 @@ class Problem:
         D = self.regressor(alternative)
         if D is None:
             return None
-        back = self.F @ np.linalg.inv(alternative.T)
+        back = alternative.back(self.F)
         still = ~moving(alternative.states(self.samples)[1])
         still |= ~self.samples.steady @ (np.abs(alternative.P.T) > 1e-12)
-        mask = still @ (np.abs(back) > 1e-12).T == 0
-        return back @ D, self.tau - alternative.subtracted(self.samples) @ back.T, mask
+        used = (np.abs(back) > 1e-12).reshape(-1, *self.F.shape).any(axis=0)
+        known = np.einsum("...ij,...j->...i", back, alternative.subtracted(self.samples))
+        return back @ D, self.tau - known, still @ used.T == 0
 
     @property
     def tau(self) -> Array:
@@ -146,9 +147,17 @@ class Problem:
         return how(over, self.barrier, self.N, sigma, **options)
 
     def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
-        """An alternative under the conditions of a physical robot."""
-        fit = self.fit(grams)
-        return Trial(alternative, bound, fit, self.given.score - fit.score)
+        """An alternative under the conditions of a physical robot. Rows count as much as they do
+        for the residuals of the study, or for its own: what it explains makes those of the study
+        alike.
+        """
+        fit, rows, N, nearer = self.fit(grams), self.rows(alternative), self.N, 0.0
+        if rows is not None:
+            D = rows[0] @ self.physical.K if alternative.on_data else rows[0]
+            N = max(N, counting_rows(D, *rows[1:], fit.X))
+            nearer = self.given.penalty - fit.penalty
+        gain = (self.given.score - fit.score - nearer) * N / self.N + nearer
+        return Trial(alternative, bound, fit, gain)
 
     def unseen(self, alternative: Alternative) -> float:
         """Score of an alternative in nats, each of two parts of the rows by the parameters of the
@@ -317,9 +326,16 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
             visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2)).any()
             if visible.any() or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
                 better.append(trial)
+    better = [trial for trial in better if explains_change(trial, problem)]
     if not better:
         return []
-    alike = [trial for trial in better if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain]
+    varying = {t.alternative.subject: t.gain for t in better if np.ndim(t.alternative.share)}
+    alike = [
+        trial
+        for trial in better
+        if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain
+        and trial.gain >= varying.get(trial.alternative.subject, 0.0)
+    ]
     before = problem.unseen(unchanged(problem.samples.n))
     named = [
         trial
@@ -331,6 +347,22 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
     named += [load for load in loads(problem) if load.gain > least]
     return sorted(named, key=lambda trial: -trial.gain)
+
+
+def explains_change(trial: Trial, problem: Problem) -> bool:
+    """Whether what changes with time leaves 1/LIMIT.CHANGE of what the study leaves of a joint, and
+    about as little of every joint as all parameters that change likewise do: a load that was put on
+    is no factor of a torque.
+    """
+    share, rows = trial.alternative.share, problem.rows(unchanged(problem.samples.n))
+    if np.ndim(share) == 0 or trial.fit is None or rows is None:
+        return True
+    (D, Y, mask), before, after = rows, problem.given.errors, trial.fit.errors
+    if not ((before - after > LIMIT.LEAST_CHANGE) & (before > LIMIT.CHANGE * after)).any():
+        return False
+    both = np.concatenate([D, np.reshape(share, (-1, 1, 1)) * D], axis=2)
+    least = least_squares(Grams.of(both, Y, mask, problem.tau), problem.N).errors
+    return bool((after < LIMIT.CHANGE * least + LIMIT.LEAST_CHANGE).all())
 
 
 def loads(problem: Problem) -> list[Trial]:
