@@ -272,14 +272,20 @@ class Program:
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
-            solution = clarabel.DefaultSolver(
-                sparse.csc_matrix(np.triu(Q)),
-                self.linear,
-                sparse.csc_matrix(-whole),
-                np.concatenate(b),
-                list(cones),
-                settings,
-            ).solve()
+            try:
+                solution = clarabel.DefaultSolver(
+                    sparse.csc_matrix(np.triu(Q)),
+                    self.linear,
+                    sparse.csc_matrix(-whole),
+                    np.concatenate(b),
+                    list(cones),
+                    settings,
+                ).solve()
+            except BaseException as e:  # a panic of Rust is no Exception
+                if type(e).__name__ != "PanicException":
+                    raise
+                status = "Clarabel stopped by an error of its own"
+                continue
             status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
             if status in SOLVED:
                 x, z = np.array(solution.x), np.array(solution.z)

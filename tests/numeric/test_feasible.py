@@ -401,6 +401,20 @@ def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
         estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
 
 
+def test_a_solver_that_panics_is_told(arm, monkeypatch) -> None:
+    """A panic of Rust is no Exception: it ended the process of whoever called identify."""
+
+    class PanicException(BaseException):
+        pass
+
+    def panics(*problem):
+        raise PanicException("index out of bounds")
+
+    monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", panics)
+    with pytest.raises(InputError, match=r"was not solved \(Clarabel stopped by an error"):
+        estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
+
+
 @pytest.mark.parametrize("kind", ["euclidean", "entropic", "pullback"])
 def test_the_pull_is_at_its_minimum(arm, kind) -> None:
     """Criterion written down from the definitions of the distances: no step towards another robot
