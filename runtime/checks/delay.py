@@ -139,14 +139,19 @@ def delay(
     InputError
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
     """
-    return delays(model, record, study, longest)[0]
+    return delays(model, record, study, longest, positions=False)[0]
 
 
 def delays(
-    model: GeneratedModel, record: Record | Prepared, study: Study | None, longest: float
+    model: GeneratedModel,
+    record: Record | Prepared,
+    study: Study | None,
+    longest: float,
+    *,
+    positions: bool = True,
 ) -> tuple[Delay, LatePositions | None]:
     """As `delay`; also the positions that are late instead, those that leave least, None where none
-    leave less than the record as it is.
+    leave less than the record as it is, or where they are not asked for.
     """
     study = study or Study()
     require_motion(study.signals, "a delay")
@@ -179,7 +184,7 @@ def delays(
     before, after = problem.errors(np.zeros(record.n)), problem.errors(np.where(known, shift, 0.0))
     late = Delay(labels, shift, sigma, common, sigma_common, before, after)
     try:
-        return late, problem.late_positions(before)
+        return late, problem.late_positions(before) if positions else None
     except ValueError:  # a loop that does not close in other positions
         return late, None
 

@@ -124,7 +124,7 @@ def curves(
     moving = {
         label: [i for i in own if np.isfinite(coarsest[i])] for label, own in selections.items()
     }
-    sharp = set[float]()
+    sharp = set[tuple[str, float]]()
     while vague := vague_steps(real.reader, known, decisive, sharp):
         for at, wanted in vague.items():
             read = sorted({i for label in wanted for i in moving[label]})
@@ -132,7 +132,7 @@ def curves(
             for label, own in moving.items():
                 if at in known[label] and {*own} <= {*read}:
                     known[label][at] = real.change(nodes, own)
-        sharp.update(vague)
+                    sharp.add((label, at))
         for label, changes in known.items():  # a walk that ended where it is now below the limit
             last = max(changes)
             while (
@@ -156,7 +156,7 @@ def vague_steps(
     reader: Reader,
     known: Mapping[str, Mapping[float, Array]],
     decisive: Sequence[int],
-    sharp: set[float],
+    sharp: set[tuple[str, float]],
 ) -> dict[float, dict[str, int]]:
     """Steps beside a limit whose nodes tell the change of a choice of encoders too badly, by step
     and label how many nodes would do; those in `sharp` have had theirs.
@@ -164,7 +164,7 @@ def vague_steps(
     vague: dict[float, dict[str, int]] = {}
     for label, limit in product(known, LIMITS):
         for at, count in beside(reader, known[label], decisive, limit).items():
-            if at not in sharp:
+            if (label, at) not in sharp:
                 own = vague.setdefault(at, {})
                 own[label] = max(count, own.get(label, 0))
     return vague

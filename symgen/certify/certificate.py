@@ -270,7 +270,7 @@ def certify_formulas(
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters)) * ~is_assumed(robot)
     tau, X = witness.W @ chi, base_values(regrouping, chi, robot.constants)
     error = float(np.abs(tau - witness.W[:, base] @ X).max() / np.abs(tau).max())
-    if error >= TOLERANCE and not vanishing and (size := np.abs(X).max()) > LOST:
+    if sizes and error >= TOLERANCE and not vanishing and (size := np.abs(X).max()) > LOST:
         name = regrouping.names[int(np.abs(X).argmax())]
         failures.append(
             f"the formula of {name} gives {size:.0e} where standard parameters are of size 1: "

@@ -49,13 +49,10 @@ SUSPECTS, BESIDE = 2, 2048
 """Windows of time in which a jump of the counts is looked for, beside that of the densest jerk, and
 the samples on either side that tell it.
 """
-COUNT_ERRORS, CLOCK_ERRORS = (
-    (0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0),
-    (0.0, 0.05, 0.1, 0.2, 0.4),
-)
-"""Errors that are compared, rms: of a count beside its rounding, steps; of a time stamp, sampling
-periods.
-"""
+# Errors of a count beside its rounding that are compared, steps (rms).
+COUNT_ERRORS = (0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
+# Errors of a time stamp that are compared, sampling periods (rms).
+CLOCK_ERRORS = (0.0, 0.05, 0.1, 0.2, 0.4)
 MOVES = ((-1, 0), (1, 0), (0, 1), (0, -1), (-1, 1), (-1, 0), (1, 0))
 """Steps of the search in COUNT_ERRORS and in CLOCK_ERRORS, each as long as the evidence rises."""
 CLEAR, TELLING = 3.0, 1000

@@ -31,25 +31,24 @@ from runtime.signals.counts.sites import Lines, Smoothed, smoothed
 Array = np.ndarray
 
 STRETCH, MARGIN = 65536, 4096
+# Error of a line where the motion shakes, steps: a change of the count then says as much as the
+# count itself, a position within one step.
 ANYWHERE = 12**-0.5
-"""Error of a line where the motion shakes, steps: a change of the count then says as much as the
-count itself, a position within one step.
-"""
+# Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a
+# quarter of a period of usual cut-offs.
 TURNED = 4e-3
-"""Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a
-quarter of a period of usual cut-offs.
-"""
-UNKNOWN, REACH, RESTS = 0.5, 0.02, 0.05
-"""Of missing positions: the deviation, steps, above which the state is unknown in the whole gap,
-the bound that a count would be; the time ahead of an unknown state and behind it that filters bring
-it to, s, a period of usual cut-offs; the longest gap, s, in which an encoder whose count never
-changes is taken as at rest.
-"""
+# Deviation of a missing position, steps, above which the state is unknown in the whole gap: the
+# bound that a count would be.
+UNKNOWN = 0.5
+# Time ahead of an unknown state and behind it that filters bring it to, s: a period of usual
+# cut-offs.
+REACH = 0.02
+# Longest gap, s, in which an encoder whose count never changes is taken as at rest.
+RESTS = 0.05
+# Time without a change of the count in which a joint may stand, s, and how many times the longest
+# turn between two lines at its usual acceleration a it must be, sqrt(8/a): no direction is known
+# there.
 STANDS, LONG = 0.1, 2.0
-"""Time without a change of the count in which a joint may stand, s, and how many times the longest
-turn between two lines at its usual acceleration a it must be, sqrt(8/a): no direction is known
-there.
-"""
 
 
 @dataclass(frozen=True, eq=False)

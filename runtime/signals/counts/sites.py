@@ -55,21 +55,22 @@ LEAP, NEIGHBOURS = 5.0, 10
 """A change of the count so many times as far off the parabola through those of so many samples on
 either side as these are, or as half a count, is none of a motion.
 """
-FEWEST, UNEVEN = 150, 40.0
-"""Bounds from which an error of the counts is told: fewer do not tell it from an unusual motion.
-Nats by which errors are more likely than the least ones before they are taken: a slow motion
-departs from white jerk by up to 36, counts that are off do not settle without them.
-"""
+# Bounds from which an error of the counts is told: fewer do not tell it from an unusual motion.
+FEWEST = 150
+# Nats by which errors are more likely than the least ones before they are taken: a slow motion
+# departs from white jerk by up to 36, counts that are off do not settle without them.
+UNEVEN = 40.0
 FIRST, SETTLED, FIRST_DENSITY = 30, 0.1, 1e8
 """Most passes over the changes alone, ahead of those over the sites; the relative change of the
 jerk density at which they end; the density that they start from, above any that a record asks for,
 ranges of the counts^2/s^5.
 """
-GAP, SPACING = 10.0, 0.3
-"""Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long
-gap remains one that Cholesky factors. Distance of bounds inside an interval, in units of the time
-r^(-1/5) in which white jerk of density r crosses it.
-"""
+# Deviation of a missing sample, ranges of the counts: as good as none, but the precision of a long
+# gap remains one that Cholesky factors.
+GAP = 10.0
+# Distance of bounds inside an interval, in units of the time r^(-1/5) in which white jerk of
+# density r crosses it.
+SPACING = 0.3
 
 
 @dataclass(frozen=True, eq=False)
