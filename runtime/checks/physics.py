@@ -88,8 +88,9 @@ def values(case: Case) -> Answer | None:
     ratios = [x for x in (*case.robot_values.gravity, *case.robot_values.inertia) if np.isfinite(x)]
     if not ratios:
         return Answer("good", "Too small beside friction to tell")
-    text = f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}"
-    return Answer("good", text)
+    return Answer(
+        "good", f"Ratios of gravity and inertia torques from {min(ratios):.2f} to {max(ratios):.2f}"
+    )
 
 
 @Question(
@@ -128,16 +129,28 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
         "late" if shift[0] > 0 else "early",
         ", ".join(f"{1e3 * abs(x):.1f}" for x in shift),
     )
-    certain = own.any() or np.abs(shift).max() <= LIMIT.LATE
-    beyond = "" if certain else ", more than the record tells for certain"
+    beyond = (
+        ""
+        if own.any() or np.abs(shift).max() <= LIMIT.LATE
+        else ", more than the record tells for certain"
+    )
     return Answer(
         state,
-        f"{which} {sense} by {each} ms, deviation {1e3 * sigma:.1f} ms{beyond}; correcting the "
-        f"delays changes the error of joint {late.joints[j]} from {late.before[j]:.1f} to "
-        f"{late.after[j]:.1f} %",
+        f"{which} {sense} by {each} ms, deviation {1e3 * sigma:.1f} ms{beyond}"
+        + _from_to(
+            f"correcting the delays changes the error of joint {late.joints[j]}",
+            late.before[j],
+            late.after[j],
+        ),
         f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
         "positions before reading the record, or mend the logger",
     )
+
+
+def _from_to(text: str, before: float, after: float) -> str:
+    """The text and how an error goes, %; "" where it stays."""
+    a, b = f"{before:.1f}", f"{after:.1f}"
+    return "" if a == b else f"; {text} from {a} to {b} %"
 
 
 def late_joints(late: Delay) -> Array:
@@ -226,17 +239,16 @@ def direction(case: Case, named: Sequence[Trial]) -> Answer | None:
 def better(case: Case, named: Sequence[Trial]) -> Answer:
     """The alternatives that explain the record decisively better."""
     if not named:
-        text = "No single change of signs, columns, units, angles or lengths explains it better"
-        return Answer("good", text)
+        return Answer(
+            "good",
+            "No single change of signs, columns, units, angles or lengths explains it better",
+        )
     assert case.problem is not None and named[0].fit is not None
     before, after = case.problem.given.errors, named[0].fit.errors
     j = int(np.argmax(before / np.maximum(after, 0.3)))
     cause, *others = (t.alternative.cause for t in named)
     text = f"No: {cause}" + (f" (or: {'; '.join(others)})" if others else "")
-    errors = [f"{error[j]:.1f}" for error in (before, after)]
-    text += (
-        f"; the error of joint {case.labels[j]} goes from {' to '.join(errors)} %"
-        if errors[0] != errors[1]
-        else "; the errors stay, the parameters come nearer to the values of the robot file"
+    text += _from_to(f"the error of joint {case.labels[j]} goes", before[j], after[j]) or (
+        "; the errors stay, the parameters come nearer to the values of the robot file"
     )
     return Answer("no", text, named[0].alternative.remedy)

@@ -222,8 +222,10 @@ class Observation:
 
     def equal_parts(self, count: int) -> Array:
         """Of `count` parts of the span, of equal length, that of each row, from 0, shape (r,)."""
-        t0, t1 = self.span
-        return np.asarray((count * (self.t - t0) / (t1 - t0)).astype(int).clip(max=count - 1))
+        start, end = self.span  # the same of rows of one instant
+        return np.asarray(
+            (count * (self.t - start) / ((end - start) or 1.0)).astype(int).clip(max=count - 1)
+        )
 
     def where(self, mask: Array) -> Observation:
         """The rows where `mask`, bool of shape (r,), is true."""

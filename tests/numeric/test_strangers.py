@@ -297,6 +297,16 @@ def test_a_delay_that_the_record_does_not_tell_says_so() -> None:
     pytest.fail("no record with a delay that is not certain")
 
 
+def test_a_delay_that_changes_no_error_names_none() -> None:
+    """Bug 16: "goes from 2.7 to 2.7 %"."""
+    model = symgen.model("planar_2r")
+    check = judged(model, *motion(model, 10.0))[
+        "Do positions and torques belong to the same instants?"
+    ]
+    assert check.state == "good"
+    assert "changes the error" not in check.finding
+
+
 def test_compare_takes_the_set_that_predicts_best() -> None:
     """Bug 15: `all` stood for feasible and irls where the essential ones predict better."""
     model = symgen.model("tx40")
