@@ -92,9 +92,7 @@ def gravity_direction(problem: Problem) -> Gravity | None:
             return None
         step, C = found
         sigma = float(np.degrees(np.sqrt(np.linalg.eigvalsh(C)[-1])))
-        length = float(np.linalg.norm(step))
-        step = step * min(1.0, 0.5 / length) if length else step
-        turned = u + step @ tangents
+        turned = u + step * min(1.0, 0.5 / max(float(np.linalg.norm(step)), 1e-9)) @ tangents
         turned = turned / np.linalg.norm(turned)
         better = fit(turned)
         if better.score > now.score - 0.05:
@@ -109,8 +107,8 @@ def gravity_direction(problem: Problem) -> Gravity | None:
 def gauss_newton_step(
     problem: Problem, D: Array, J: Array, fit: Fit, Y: Array, mask: Array
 ) -> tuple[Array, Array] | None:
-    """Step of some numbers of effect J, shape (a, K, n), and their covariance; None where they act
-    on nothing that the samples show.
+    """Step of some numbers of effect J, shape (a, K, n), and their covariance, without combinations
+    that the samples do not show (their variance is finite, large); None where they show none.
     """
     weight = mask / fit.sigma
     J = J * weight
@@ -123,7 +121,8 @@ def gauss_newton_step(
     )
     share = problem.N / max(float(mask.sum(axis=0).mean()), 1.0)
     eigenvalues, V = np.linalg.eigh(left)
-    if not eigenvalues[0] * share > 0.1:
+    if not eigenvalues[-1] * share > 0.1:
         return None
-    inverse = (V / eigenvalues) @ V.T
-    return inverse @ np.einsum("akj,kj->a", J, e), inverse / share
+    certain, variances = eigenvalues * share > 0.1, 1 / eigenvalues.clip(1e-9 * eigenvalues[-1])
+    step = (V * variances * certain) @ V.T @ np.einsum("akj,kj->a", J, e)
+    return step, (V * variances) @ V.T / share

@@ -540,3 +540,38 @@ def test_a_torque_by_position_that_nobody_told_is_named(kind) -> None:
     found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"), variants=free)
     named = [trial.alternative.subject for trial in found.named]
     assert named[:1] == ([] if kind == "none" else ["a spring or counterbalance of joint 1"]), named
+
+
+LEVEL = """
+symgen: 1
+name: level
+gravity: [0, 0, -g]
+constants: {D2: 0.2, g: 9.81}
+values: {ZZ1: 0.05, M2: 1.5, MX2: 0.2, MY2: 0.03, MZ2: 0.05, XX2: 0.01, YY2: 0.06, ZZ2: 0.06, XY2: -0.004, XZ2: -0.006}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, alpha: pi/2, d: D2, theta: q2, r: 0}
+elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
+"""  # gravity of joint 2 depends on q2 alone
+
+
+def test_a_spring_over_a_small_range_is_named() -> None:
+    """Over 0.3 rad a q, b sin q and the gravity of MX2, MY2 are nearly one: a counterbalance was
+    told as "d and r of frame 2 are exchanged (or: the sampling rate is 1/2.5 of the stated one)".
+    """
+    robot = parse_robot(LEVEL.encode(), "level.yaml")
+    model, rng = symgen.model(robot), np.random.default_rng(1)
+    t, w = np.arange(4000) / 200, rng.uniform(0.5, 3, (2, 3))[:, :, None]
+    q, qd, qdd = (
+        np.array([1.2, 0.2]) * x.sum(axis=1).T
+        for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
+    )
+    friction = {"FV1": 0.1, "FV2": 0.1, "FS1": 0.2, "FS2": 0.2}
+    bodies = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES | friction
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(bodies))
+    tau = tau + 0.005 * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    tau[:, 1] += np.sin(q[:, 1])
+    record = runtime.Record(t, q, tau, name="run")
+    found = runtime.plausibility(model, record, variants=symgen.variants(robot))
+    subjects = [trial.alternative.subject for trial in found.named]
+    assert subjects == ["a spring or counterbalance of joint 2"]
