@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from runtime.settings.controller import Controller
 from runtime.settings.schema import (
@@ -24,15 +24,19 @@ from runtime.settings.schema import (
 from runtime.settings.units import COMMANDS, position_unit, time_unit, torque_unit
 
 
-def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
-    double = next((name for name in names if names.count(name) > 1), None)
-    if double is not None:
-        raise ValueError(f"{double!r} twice; expected one column per joint")
+def _one_by_one(names: Any) -> Any:
+    if isinstance(names, Mapping):
+        raise ValueError(
+            f"a table of {', '.join(map(str, names))}; expected a list, one column per joint in "
+            "the order of the robot file"
+        )
     return names
 
 
-def _distinct_but_none(names: tuple[str, ...]) -> tuple[str, ...]:
-    _distinct(tuple(name for name in names if name != NONE))
+def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    double = next((name for name in names if names.count(name) > 1 and name != NONE), None)
+    if double is not None:
+        raise ValueError(f"{double!r} twice; expected one column per joint")
     return names
 
 
@@ -45,8 +49,7 @@ def _known(read: Callable[[str], Any]) -> AfterValidator:
 
 
 NONE = "0"  # in place of a column: no such torque on this joint
-Names = Annotated[Many[Text], AfterValidator(_distinct)]
-SomeNames = Annotated[Many[Text], AfterValidator(_distinct_but_none)]
+Names = Annotated[Many[Text], BeforeValidator(_one_by_one), AfterValidator(_distinct)]
 TimeUnit = Annotated[Text, _known(time_unit)]
 PositionUnit = Annotated[Text, _known(position_unit)]
 TorqueUnit = Annotated[Text, _known(torque_unit)]
@@ -111,9 +114,9 @@ class Columns(Settings):
     qr: Names = ()
     qd: Names = ()
     qd_ref: Names = ()
-    q_link: SomeNames = ()
+    q_link: Names = ()
     tau_ff: Names = ()
-    tau_known: SomeNames = ()
+    tau_known: Names = ()
     channels: Mapping[Text, Text] = field(default_factory=dict)
     wrench: Mapping[Annotated[int, Field(ge=0)], Names] = field(default_factory=dict)
 
