@@ -1,7 +1,8 @@
 """Which columns of a file are likely to be time, positions and torques, by their names: a proposal,
 for a study that a person looks at.
 
-    actual_q_0 ... actual_q_5    one quantity: a stem, and the numbers behind it
+    actual_q_0 ... actual_q_5    one quantity: a stem, and numbers in it
+    q_J_1 [deg], axis2.pos       also before a unit in brackets, or within
     elbow_pos, wrist_pos         or the names of the joints, in the order of the robot
     actual, q                    words of the stem
 """
@@ -10,15 +11,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import product
 from typing import Any
 
+from runtime.errors import InputError
+from runtime.settings.units import position_unit, time_unit, torque_unit
+
 QUANTITY_WORDS = {  # the first words are taken before the others
-    "q": ("q", "pos", "position", "positions", "angle", "angles"),
-    "tau": ("tau", "torque", "torques", "effort", "moment", "current", "currents", "cur"),
+    "q": ("q", "pos", "position", "positions", "angle", "angles", "winkel"),
+    "tau": (
+        *("tau", "torque", "torques", "effort", "moment", "drehmoment", "trq", "tq"),
+        *("current", "currents", "cur"),
+    ),
 }
-TIME = {"t", "time", "timestamp", "stamp", "seconds"}
-NAMED_UNITS = {"t": "ms", "q": "deg", "tau": "mA"}
+TIME = {"t", "time", "timestamp", "stamp", "seconds", "zeit", "temps"}
+NAMED_UNITS = {"ms", "deg", "mA"}  # words of a name; others stand in brackets
 NOT_MEASURED = {"target", "desired", "ref", "reference", "cmd", "command", "setpoint", "window"}
 
 
@@ -32,36 +40,44 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
         stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "", name)
         if found:
             stems.setdefault(stem, []).append(name)
-    for name in names:
-        if match := re.fullmatch(r"(.*?)[\s_.(\[-]*\d+[)\]]?", name):
-            stems.setdefault(match[1], []).append(name)
+    for name in sorted(names, key=lambda name: [int(x) for x in re.findall("[0-9]+", name)]):
+        for number in re.finditer("[0-9]+", name):
+            stems.setdefault(f"{name[: number.start()]}#{name[number.end() :]}", []).append(name)
 
-    def ranked(key: str) -> list[tuple[bool, int, str]]:
+    def ranked(key: str) -> list[tuple[bool, int, int, str]]:
         return sorted(
-            (bool(NOT_MEASURED & _words(stem)), QUANTITY_WORDS[key].index(word), stem)
-            for stem in stems
+            (bool(NOT_MEASURED & _words(stem)), QUANTITY_WORDS[key].index(word), -len(own), stem)
+            for stem, own in stems.items()
             for word in _words(stem) & {*QUANTITY_WORDS[key]}
         )
 
     positions = [stem for *_, stem in ranked("q")][:1]
-    alike = [one for one in ranked("tau") if positions and _same(stems, one[2], positions[0])]
+    alike = [
+        one
+        for one in ranked("tau")
+        if positions and one[-1] != positions[0] and one[2] == -len(stems[positions[0]])
+    ]
     if not alike:
         return {}
-    torques = stems[alike[0][2]]
-    columns: dict[str, Any] = {"q": stems[positions[0]], "tau": torques}
-    if time := next((name for name in names if _words(name) & TIME), None):
-        columns["t"] = time
-    units = {"tau": "A"} if QUANTITY_WORDS["tau"][alike[0][1]].startswith("cur") else {}
-    stated = {"t": time or "", "q": positions[0], "tau": alike[0][2]}
-    for key, name in stated.items():
-        if NAMED_UNITS[key].lower() in re.split(r"[\W\d_]+", name.lower()):
-            units[key] = NAMED_UNITS[key]
+    _, word, _, torques = alike[0]
+    time = next((name for name in names if _words(name) & TIME), "")
+    columns = {"q": stems[positions[0]], "tau": stems[torques], **({"t": time} if time else {})}
+    units = {"tau": "A"} if QUANTITY_WORDS["tau"][word].startswith("cur") else {}
+    for key, name, read in (
+        ("t", time, time_unit),
+        ("q", positions[0], position_unit),
+        ("tau", torques, torque_unit),
+    ):
+        words = re.split(r"[\W\d_]+", name.lower())
+        for unit in (
+            *re.findall(r"[\[(]([^\])#]+)[\])]", name),
+            *(unit for unit in NAMED_UNITS if unit.lower() in words),
+        ):
+            with suppress(InputError):  # of something else, or no unit
+                read(unit)
+                units[key] = unit
     return {"columns": columns, **({"units": units} if units else {})}
 
 
 def _words(name: str) -> set[str]:
     return {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)}
-
-
-def _same(stems: dict[str, list[str]], one: str, other: str) -> bool:
-    return one != other and len(stems[one]) == len(stems[other])

@@ -339,7 +339,8 @@ NAMES = {  # of three loggers: columns of q, of tau, of time, and what is beside
 
 @pytest.mark.parametrize("logger", sampled(NAMES, 0, always=("camel",)))
 def test_a_study_is_suggested_where_a_record_is_refused(tmp_path, logger) -> None:
-    """First number fast: columns of another logger, stamps that jitter, samples that are missing.
+    """First number fast: columns of another logger, decimal commas, stamps that jitter, samples
+    that are missing.
     One command writes the study and gives the number; that study alone gives it again.
     """
     model = symgen.model("planar_2r")
@@ -350,8 +351,9 @@ def test_a_study_is_suggested_where_a_record_is_refused(tmp_path, logger) -> Non
     for j in range(2):
         columns |= {other.format(j): 0 * t[keep] for other in names[3]}
         columns |= {names[0].format(j): q[keep, j], names[1].format(j): tau[keep, j]}
-    header, table = ",".join(columns), np.column_stack(list(columns.values()))
-    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+    header, table = ";".join(columns), np.column_stack(list(columns.values()))
+    np.savetxt(tmp_path / "log.csv", table, delimiter=";", header=header, comments="")
+    (tmp_path / "log.csv").write_text((tmp_path / "log.csv").read_text().replace(".", ","))
     record, study = str(tmp_path / "log.csv"), tmp_path / "new" / "study.yaml"
     refused = CliRunner().invoke(app, ["identify", "planar_2r", record])
     assert refused.exit_code == 2 and "--suggest FILE" in refused.stderr
@@ -372,6 +374,28 @@ def test_units_that_names_tell() -> None:
     assert likely_columns(names)["units"] == {"t": "ms", "q": "deg", "tau": "mA"}
     assert likely_columns(["t", "pos_1", "cur_1"])["units"] == {"tau": "A"}
     assert "units" not in likely_columns(["t", "pos_1", "effort_1"])
+
+
+@pytest.mark.parametrize(
+    ("time", "q", "tau", "others", "units"),
+    [
+        ("Zeit [ms]", "q_J_{} [deg]", "tau_J_{} [Nm]", "dq_J_{} [deg/s]", "ms deg Nm"),
+        ("t", "Axis {} ActPos (°)", "Axis {} ActTorque (Nm)", "Axis {} SetPos (°)", "- ° Nm"),
+        ("__time", "/states/joint{}/position", "/states/joint{}/effort", "/name{}", "- - -"),
+        ("Time", "robot1.AIPos.A{}", "robot1.MACur.A{}", "robot2.Temp.A{}", "- - A"),
+    ],
+)
+def test_numbers_within_names_and_units_in_brackets(time, q, tau, others, units) -> None:
+    """They were told as "no columns q1, q2", without a proposal."""
+    names = [time, *(text.format(j) for text in (others, q, tau) for j in range(1, 4))]
+    likely = likely_columns(names)
+    assert likely["columns"] == {
+        "t": time,
+        "q": [q.format(j) for j in range(1, 4)],
+        "tau": [tau.format(j) for j in range(1, 4)],
+    }
+    told = {key: x for key, x in zip(("t", "q", "tau"), units.split(), strict=True) if x != "-"}
+    assert likely.get("units", {}) == told
 
 
 def test_names_that_tell_nothing_are_refused_as_before(tmp_path) -> None:
@@ -396,7 +420,10 @@ def test_columns_that_carry_the_names_of_joints_are_suggested() -> None:
         "q": ["joint_1_pos", "elbow_pos", "joint_10_pos"],
         "tau": ["joint_1_effort", "elbow_effort", "joint_10_effort"],
     }
-    assert likely_columns(["time", *names]) == {}
+    words = [
+        name.replace("joint_", "joint").translate({ord("1"): "a", ord("0"): "b"}) for name in names
+    ]
+    assert likely_columns(["time", *words]) == {}
 
 
 def test_currents_read_as_torques_are_no_wrong_rate() -> None:

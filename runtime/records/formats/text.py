@@ -203,6 +203,7 @@ class TextTable(Table):
                         file=self.file,
                         column=self.names[i],
                         row=f"line {k}",
+                        remedy={"decimal": ","} if "," in fields[i] else None,
                     )
         return None if self.missing else InputError("a field that is not a number", file=self.file)
 
