@@ -38,7 +38,7 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
-from symgen.derive.angles import rows_of, units_of
+from symgen.derive.angles import LARGEST_MULTIPLE, rows_of, units_of
 from symgen.derive.closure import parts
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
@@ -358,7 +358,11 @@ def degree(regrouping: Regrouping) -> int:
 
     def frame(f: Frame) -> int:
         turn = (
-            2 * int(sum(abs(Fraction(n)) * parts(robot) for _, n in closure.turn(f.j)[0]))
+            2
+            * sum(
+                int(abs(n)) + (n.denominator > 1) * (2 * LARGEST_MULTIPLE + 1)
+                for n in (Fraction(n) * parts(robot) for _, n in closure.turn(f.j)[0])
+            )
             + angle(closure.offset[f.j])
             if f.sigma == REVOLUTE
             else 1

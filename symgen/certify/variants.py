@@ -64,7 +64,14 @@ def freed(robot: Robot) -> Robot:
     """The robot with symbols in place of its angles, lengths and gravity; of a robot with loops, of
     its gravity.
     """
-    constants, tied = dict(robot.constants), tied_frames(robot)
+    constants = dict(robot.constants)
+    tied = {  # frames on the paths between the joints that constraints tie to each other
+        frame
+        for j, e in robot.constraints.items()
+        for i in robot.joints
+        if f"q{i}" in e.symbols
+        for frame in {*robot.path(j)} ^ {*robot.path(i)}
+    }
 
     def symbol(name: str, entry: Expression) -> Expression:
         constants[f"{FREE}{name}"] = float(entry.value(robot.constants))
@@ -88,14 +95,3 @@ def freed(robot: Robot) -> Robot:
         symbol(f"g{axis}", entry) for axis, entry in zip("xyz", robot.gravity, strict=True)
     )
     return replace(robot, frames=frames, gravity=(gx, gy, gz), constants=constants)
-
-
-def tied_frames(robot: Robot) -> set[int]:
-    """Frames on the paths between the joints that constraints tie to each other."""
-    return {
-        frame
-        for j, e in robot.constraints.items()
-        for i in robot.joints
-        if f"q{i}" in e.symbols
-        for frame in {*robot.path(j)} ^ {*robot.path(i)}
-    }

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import lcm, prod
+from fractions import Fraction
+from math import lcm
 
 from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
 from symgen.description.expression import ONE, ZERO, Expression
@@ -63,26 +64,36 @@ class Closure:
         return sum((g * Expression.symbol(f"q{i}") for i, g in self.row[j].items()), self.offset[j])
 
     def turn(self, j: int) -> tuple[Turn, Expression]:
-        """The angle of revolute joint j: multiples of independent angles, and a constant. Fractions
-        of an angle are whole multiples of its `parts`.
-        """
-        turn, whole = [], 1 if self.tied else parts(self.robot)
+        """The angle of revolute joint j: multiples of independent angles, and a constant."""
+        turn = []
         for i, g in sorted(self.row[j].items()):
             c = g.constant
-            if c is None or whole % c.denominator:
+            if c is None:
                 theirs, other = (
                     f"{label!a:.60} (q{k})" if (label := self.robot.labels.get(k)) else f"q{k}"
                     for k in (j, i)
                 )
                 raise DescriptionError(
-                    f"constraints.q{j}: {theirs} turns {g} times with {other}; a passive angle "
-                    "needs whole multiples of other angles, or outside of general loops fractions "
-                    f"of them with a common denominator of at most {FINEST} (write 1/3, not 0.333)",
+                    f"constraints.q{j}: {theirs} turns {g} times with {other}; the ratio of two "
+                    f"angles is a number: write {g.value(self.robot.constants):.12g}",
                     path=("constraints", f"q{j}"),
                     file=self.robot.file or None,
                 )
             turn.append((i, int(c) if c.denominator == 1 else c))
         return tuple(turn), self.offset[j]
+
+    @property
+    def incommensurable(self) -> list[str]:
+        """Hinges that turn by no whole multiple of q_i/D, D of `parts`, as texts: exact arithmetic
+        takes what is left over for an angle of its own.
+        """
+        D = 1 if self.tied else parts(self.robot)
+        return [
+            f"q{j} = {self.formula(j)}"
+            for j in self.robot.passive
+            if self.robot.frame(j).sigma == REVOLUTE
+            and any(D % Fraction(n).denominator for _, n in self.turn(j)[0])
+        ]
 
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
         """s = row q + c in the independent joints: its row, and its constant."""
@@ -112,9 +123,9 @@ class Closure:
 
 
 def parts(robot: Robot) -> int:
-    """D, so that every passive angle is a whole multiple of q_i/D: the least common denominator of
-    the declared relations between angles, or their product where one relation is put into another,
-    or a loop may do so; 1 where it is beyond FINEST.
+    """D, at most FINEST, so that passive angles are whole multiples of q_i/D: the least common
+    denominator of the declared relations between angles, or their product where one relation is
+    put into another, or a loop may do so. Denominators beyond it are left out, the largest first.
     """
     joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
     denominators = [
@@ -126,8 +137,11 @@ def parts(robot: Robot) -> int:
     chained = robot.loops or {f"q{j}" for j in relations} & {
         a for e in relations.values() for a in e.atoms
     }
-    D = prod(denominators) if chained else lcm(*denominators)
-    return D if D <= FINEST else 1
+    D = 1
+    for d in sorted(denominators):
+        common = D * d if chained else lcm(D, d)
+        D = common if common <= FINEST else D
+    return D
 
 
 def open_tree(robot: Robot) -> Closure:

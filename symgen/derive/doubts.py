@@ -13,7 +13,9 @@ from symgen.description.expression import PI, twelfths
 from symgen.description.robot import REVOLUTE, Robot
 
 FAR = 0.3  # rad, or of the longest length
-CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
+# rad, or of a ratio of angles: nearer to a round angle or to a fraction of a denominator up to
+# FINE than a drawing shows, and not on it
+CLOSE, FINE = 1e-3, 12
 
 GRAVITY = 0.5, 30.0  # m/s^2, of small moons and large planets
 LONGEST = 100.0  # m
@@ -24,7 +26,13 @@ UNLIMITED = 1000.0  # ... unless it stands for none at all
 
 def doubts(robot: Robot) -> list[str]:
     """A sentence for each. Raises DescriptionError where a loop does not close."""
-    return [*nearly_round(robot), *other_units(robot), *equal_sides(robot), *far_starts(robot)]
+    return [
+        *nearly_round(robot),
+        *nearly_fractions(robot),
+        *other_units(robot),
+        *equal_sides(robot),
+        *far_starts(robot),
+    ]
 
 
 def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
@@ -45,6 +53,18 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
                     "or MJCF the angles or offsets that give it)"
                 )
     return notes
+
+
+def nearly_fractions(robot: Robot) -> list[str]:
+    """Ratios of two angles written as decimals, such as 0.333."""
+    return [
+        f"q{j} turns {float(n):g} times with q{i}, not {meant}: another robot, with other base "
+        f"parameters; if {meant} is meant, write it"
+        for j in robot.constraints
+        if robot.frame(j).sigma == REVOLUTE
+        for i, n in close(robot).turn(j)[0]
+        if 0 < abs(n - (meant := Fraction(n).limit_denominator(FINE))) < CLOSE
+    ]
 
 
 def other_units(robot: Robot) -> list[str]:

@@ -1,18 +1,16 @@
 """Robots over the prime field F_p: an algebra in which random states and geometries are exact.
 
 p < 2**31, so products fit in int64. p = 3 (mod 4): 1 + t**2 is never 0 and every angle is a point
-((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of
-the unit circle. The points form a group of order p + 1; p is chosen so that this order is a
-multiple of 2D, D the common denominator of
-the robot's fractions of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
+((1 - t**2)/(1 + t**2), 2t/(1 + t**2)) of the unit circle. The points form a group of order p + 1; p
+is chosen so that this order is a multiple of 2D, D the common denominator of the robot's fractions
+of pi: pi/3 or pi/4 are then exact roots of unity of F_p, not approximations.
 
 Every other fixed angle is a whole multiple of a unit, a random point (`derive.angles`).
 
 Square roots of rationals lie in the cyclotomic field of the fractions of pi and are taken from the
-same root of unity, so that sqrt(3)/2 is
-cos(pi/6) and never -cos(pi/6). For an odd prime l, by Gauss, with the Legendre symbol (k/l)
-(Ireland and Rosen, A Classical Introduction to Modern
-Number Theory, 6.4):
+same root of unity, so that sqrt(3)/2 is cos(pi/6) and never -cos(pi/6). For an odd prime l, by
+Gauss, with the Legendre symbol (k/l) (Ireland and Rosen, A Classical Introduction to Modern Number
+Theory, 6.4):
 
     sqrt(l) = sum_k (k/l) cos(2 pi k/l)  if l = 1 (mod 4),      sum_k (k/l) sin(2 pi k/l)
             if l = 3 (mod 4),      sqrt(2) = 2 cos(pi/4).
@@ -25,9 +23,8 @@ x -> (x + k)**m with a k of the function and one large m: equal where what they 
 related in no other way. What else relates them shows in numbers (`regroup.regrouping`).
 
 Directions of motion: sign(sd) = 2b - 1 with b = 1 forward, 0 backward, one b for each class of
-proportional rows G; max(sd, 0) = b sd. A torque is a
-polynomial of degree one in each b, hence zero for b = 0, 1 if and only if it is the zero
-polynomial; b is drawn from F_p as every other variable.
+proportional rows G; max(sd, 0) = b sd. A torque is a polynomial of degree one in each b, hence zero
+for b = 0, 1 if and only if it is the zero polynomial; b is drawn from F_p as every other variable.
 """
 
 from __future__ import annotations
@@ -43,6 +40,7 @@ import numpy as np
 from symgen.derive.angles import (
     LARGEST_RADICAND,
     PI,
+    SMALL,
     Unit,
     Variable,
     is_prime,
@@ -58,10 +56,7 @@ from symgen.errors import SymgenError
 
 Array = np.ndarray
 KEY, OPAQUE_POWER = 40_503, 479_001_599  # of functions that F_p does not have; the latter a prime
-FEW, MOST_PRIMES = (
-    12,
-    300,
-)  # draws over a prime, and primes looked at, for nested square roots of numbers
+FEW, MOST_PRIMES = 12, 300  # draws over a prime, and primes looked at, for nested square roots
 
 
 class Fp:
@@ -115,9 +110,8 @@ class Draw(Unnamed):
     """One random robot and `samples` random states over F_p: an Algebra of the derivation.
 
     `geometry` gives residues, shape (count, 1), for constants by name and for half-angle tangents
-    of fixed angles by their unit: `count`
-    robots in the same states. Without it everything is random and redrawn until every square root
-    exists, `attempts` times at most.
+    of fixed angles by their unit: `count` robots in the same states. Without it everything is
+    random and redrawn until every square root exists, `attempts` times at most.
     """
 
     def __init__(
@@ -157,6 +151,8 @@ class Draw(Unnamed):
         self._qdd = {j: self._random(samples) for j in robot.moving}
         self.parts = parts(robot)
         self._point = {j: self._circle(samples) for j in robot.moving}  # of q_j/parts
+        # {(joint, part of q_j/parts): (unit, k, turns) with part = k unit - turns}
+        self._left_over: dict[tuple[int, Fraction], tuple[Fraction, int, int]] = {}
 
     def _random(self, size: int) -> Array:
         return self.rng.integers(1, self.p, size)
@@ -195,11 +191,8 @@ class Draw(Unnamed):
             if unit in self._geometry:
                 self._angles[unit] = self._point_at(self._geometry[unit])
             else:
-                self._angles[unit] = (
-                    self._half_turn()
-                    if unit == (PI, Fraction(1, self.units.D))
-                    else self._circle(1)
-                )
+                whole = unit == (PI, Fraction(1, self.units.D))
+                self._angles[unit] = self._half_turn() if whole else self._circle(1)
         return self._angles[unit]
 
     def _half_turn(self) -> Point:
@@ -237,6 +230,20 @@ class Draw(Unnamed):
             )
             if primitive and self._multiple(root, order // 4)[1][0] == 1:
                 return root
+
+    def _share(self, j: int, n: int | Fraction) -> Point:
+        """The point of n q_j: a whole multiple of q_j/parts, what is left over an angle apart."""
+        whole, rest = divmod(Fraction(n) * self.parts, 1)
+        if not rest:
+            return self._multiple(self._point[j], whole)
+        if (j, rest) not in self._left_over:
+            self._angles[((f"q{j}", 1),), rest] = self._circle(self.samples)
+            for k in SMALL:
+                turns, part = divmod(k * rest, 1)
+                self._left_over.setdefault((j, part), (rest, k, turns))
+        own, k, turns = self._left_over[j, rest]
+        more = self._multiple(self._point[j], whole - turns)
+        return self._turned(self._multiple(self._angles[((f"q{j}", 1),), own], k), more)
 
     def _angle(self, e: Expression) -> Point:
         """(cos, sin) of a constant angle."""
@@ -305,7 +312,7 @@ class Draw(Unnamed):
             return c, s
         point = self._angle(offset)
         for j, n in turn:
-            point = self._turned(point, self._multiple(self._point[j], int(n * self.parts)))
+            point = self._turned(point, self._share(j, n))
         return self._fp(point[0]), self._fp(point[1])
 
     def q(self, j: int) -> Fp:
@@ -321,15 +328,11 @@ class Draw(Unnamed):
         return self._fp(self._channels.setdefault(name, self._random(self.samples)))
 
     def rate(self, u: int, i: int) -> Scalar:
-        """Any value: a general loop does not close over F_p, so this proves identities of the open
-        tree alone.
-        """
+        """Any value: no general loop closes here, this proves identities of the open tree alone."""
         return self._fp(self._rate.setdefault((u, i), self._random(self.samples)))
 
     def _forward(self, row: tuple[tuple[int, Expression], ...]) -> tuple[Fp, int]:
-        """b of the direction class of a row, and whether the row runs along (1) or against (-1)
-        it.
-        """
+        """b of the direction class of a row, and whether the row runs along it (1) or not (-1)."""
         lead = row[0][1]
         orientation = 1 if lead.value(self.robot.constants) > 0 else -1
         inverse = power(self.residues(self.constant(lead)), self.p - 2, self.p)

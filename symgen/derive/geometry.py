@@ -165,10 +165,6 @@ class Geometry:
         """Components in frame j of a vector given in the carrier's frame."""
         return v if is_zero(v) else self.carrier[j].rotation.down(v)
 
-    def is_inside(self, i: int, j: int) -> bool:
-        """Whether joint i turns the carrier of frame j (otherwise it turns about z_j itself)."""
-        return i in self.robot.path(self.carrier[j].m)
-
 
 def summed(turn: Turn) -> Turn:
     """Equal joints of a turn added up; what cancels is left out."""

@@ -310,7 +310,9 @@ class Lagrange:
         if not passive:
             return x, np.asarray(qd), np.asarray(qdd), G
         wanted, regular = x[..., actuated].copy(), np.ones(x.shape[:-1], dtype=bool)
-        first = self._home[actuated] if self._home is not None else wanted
+        if self._home is not None:
+            x[...] = self._home
+        first = x[..., actuated].copy()
         for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
             x[..., actuated] = first + share * (wanted - first)
             x = newton(self._gap, x, passive, steps=NEWTON_STEPS, tolerance=SETTLED)

@@ -24,6 +24,7 @@ from symgen.derive.loops import close
 from symgen.derive.scalar import Algebra, Scalar, dot
 from symgen.description.robot import REVOLUTE, Robot
 
+PACE = 0.2, 0.25  # rad, or of the longest length: steps of actuated and of tied joints
 TURN_STEPS, TURN_CLOSED = 72, 1e-4  # of a full turn of the crank, and residual after each
 
 
@@ -117,6 +118,16 @@ class LoopSystem:
         hence in one assembly mode.
         """
         return float(np.sign(np.linalg.det(self.jacobian_floats(self.start)[:, self.tied])))
+
+    def pace(self) -> float:
+        """A step of the actuated joints in which no tied one moves far, as fast as at the start
+        (PACE); in rad, and in the longest length for slides.
+        """
+        J = self.jacobian_floats(self.start)
+        n, frames = self.tied.start, map(self.robot.frame, self.closure.independent)
+        units = np.array([1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames])
+        G = np.linalg.solve(J[:, n:], J[:, :n]) * units[:n] / units[n:, None]
+        return float(min(PACE[0], PACE[1] / np.abs(G).max()))
 
     def turn(self) -> tuple[int, ...] | None:
         """Whole turns of the tied joints per turn of the actuated one; None where it cannot turn

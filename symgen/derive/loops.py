@@ -129,7 +129,8 @@ def _general(assembly: Assembly, q: Array) -> Closure:
     samples = _samples(assembly, q) or [(assembly.constants, configuration)]
     for loop in assembly.robot.loops:
         row = _angle_sum(assembly, loop, configuration)
-        if row is None or loop.cut not in assembly.unknown or not {*row} <= {*assembly.free}:
+        given = [r for j, (r, _) in assembly.relations.items() if row and j in row]
+        if row is None or loop.cut not in assembly.unknown or any(loop.cut in r for r in given):
             continue
         if (c := _offset(assembly, samples, loop.cut, row)) is not None:
             angle = c.value(assembly.constants)
@@ -196,15 +197,17 @@ def _closure(
     """The relations of passive joints that have one, those of the file, and all others tied."""
     robot = assembly.robot
     tied = tuple(j for j in assembly.unknown if j not in relations)
-    relations = {j: ({j: ONE}, ZERO) for j in (*robot.joints, *tied)} | dict(relations)
+    free = (*robot.joints, *tied)
+    every: dict[int, Relation] = {j: ({j: ONE}, ZERO) for j in free}
+    every |= {**relations, **assembly.relations}
 
-    def closure(relations: Mapping[int, Relation]) -> Closure:
-        row, offset = ({j: r[k] for j, r in relations.items()} for k in (0, 1))
+    def closure() -> Closure:
+        row, offset = ({j: r[k] for j, r in every.items()} for k in (0, 1))
         return Closure(robot, row, offset, tied, start)  # type: ignore[arg-type]
 
-    free = closure(relations)
-    declared = {j: free.relation(*r) for j, r in assembly.relations.items()}
-    return closure(relations | declared)
+    for _ in robot.loops:  # relations of joints that have one themselves
+        every |= {j: closure().relation(*r) for j, r in every.items() if not {*r[0]} <= {*free}}
+    return closure()
 
 
 # --- offsets ---

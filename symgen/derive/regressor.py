@@ -43,7 +43,7 @@ class Axes:
             sigma = robot.frame(i).sigma
             if sigma == FIXED:
                 continue
-            inside = geometry.is_inside(i, j)
+            inside = i in robot.path(m)  # it turns the carrier, or else about z_j itself
             if sigma == REVOLUTE:
                 z = geometry.from_carrier(j, self.z[i, m]) if inside else E3
                 lever = vadd(self.v[i, frame.ant], cross(self.z[i, frame.ant], geometry.P[j]))

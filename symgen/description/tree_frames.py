@@ -194,14 +194,10 @@ def _numbered(row: Sequence[float]) -> tuple[float, ...]:
 def _angle(x: float) -> tuple[float, Expression]:
     k = twelfths(x, SAME)
     return (
-        (round(x, DIGITS), _exact(round(x, DIGITS)))
+        (round(x, DIGITS), Expression.number(repr(round(x, DIGITS))))
         if k is None
         else (k * math.pi / 12, PI * Fraction(k, 12))
     )
-
-
-def _exact(x: float) -> Expression:
-    return Expression.number(Fraction(repr(x)))
 
 
 def _row(

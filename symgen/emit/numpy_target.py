@@ -30,6 +30,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             **context(spec, command, NUMPY, "np.ndarray", blocks),
             "size": BLOCK,
             "turn": loop_system(spec.robot).turn() if spec.tied else None,
+            "pace": f"{loop_system(spec.robot).pace():.2g}" if spec.tied else "",
             "joint": spec.robot.joints[0],
             "tables": [*tables(spec), *_loop_tables(spec, slides)],
             "data": [*literal("LINKS", spec.robot.links), *data(spec)],

@@ -146,10 +146,12 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
         reason = str(error)
     else:
         base = tuple(names[c] for c in pivots)
-        if laws := laws_in_numbers(robot):
+        # laws and angles of which exact arithmetic knows nothing: rank is told in numbers too
+        apart = [e.family for e in robot.elements if any(is_opaque(e, j) for j in e.along)]
+        if apart := [*apart, *close(robot).incommensurable]:
             numeric, relations = float_relations(given, names)
             if len(numeric) < len(base):
-                reason = f"{', '.join(laws)} depend on other columns in numbers alone"
+                reason = f"columns of {', '.join(apart)} depend on others in numbers alone"
                 base = numeric
     if not reason:
         supports = {
@@ -176,13 +178,6 @@ def _reason(missing: Mapping[str, str]) -> str:
         f"coefficients of {name}{f' and {len(missing) - 1} more' if len(missing) > 1 else ''} "
         f"not recognised: {reason}"
     )
-
-
-def laws_in_numbers(robot: Robot) -> list[str]:
-    """Families whose laws exact arithmetic takes for functions of which it knows nothing; rank is
-    told in numbers too.
-    """
-    return [e.family for e in robot.elements if any(is_opaque(e, j) for j in e.along)]
 
 
 regrouping = regroup  # its public name, symgen.regrouping: symgen.regroup is the package

@@ -2,11 +2,14 @@
 of what is reserved.
 """
 
+from dataclasses import replace
+
 import pytest
 from typer.testing import CliRunner
 
 import symgen
 from symgen.cli.main import app
+from symgen.description.expression import Expression
 from symgen.description.naming import LAYOUT
 from symgen.description.tree_robot import read_tree
 from symgen.errors import DescriptionError
@@ -70,13 +73,16 @@ def test_a_key_of_along_is_a_frame(key):
 
 
 def test_joints_that_cannot_follow_have_the_names_of_the_file():
-    robot, _ = read_tree(MIMIC.replace("RATIO", "0.333").encode(), "hand.urdf")
-    with pytest.raises(DescriptionError, match=r"'thumb' \(q2\) turns 0.333.*'finger' \(q1\)") as e:
+    robot, _ = read_tree(MIMIC.replace("RATIO", "1").encode(), "hand.urdf")
+    robot = replace(robot, constraints={2: Expression.symbol("g") * Expression.symbol("q1")})
+    with pytest.raises(DescriptionError, match=r"'thumb' \(q2\) turns g .*'finger' \(q1\)") as e:
         symgen.regrouping(robot)
     assert e.value.file == "hand.urdf" and e.value.path == ("constraints", "q2")
 
 
-def test_a_joint_that_follows_by_zero_times_stands_still():
-    robot, _ = read_tree(MIMIC.replace("RATIO", "0").encode(), "hand.urdf")
+@pytest.mark.parametrize("ratio", ["0", "0.333"])
+def test_a_joint_follows_by_any_number(ratio: str):
+    """By zero times it stands still."""
+    robot, _ = read_tree(MIMIC.replace("RATIO", ratio).encode(), "hand.urdf")
     certificate = symgen.certificate(symgen.regrouping(robot))
     assert certificate.valid, certificate

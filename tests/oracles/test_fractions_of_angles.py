@@ -1,6 +1,6 @@
-"""Hinges that turn a fraction of another one: fingers that follow by -1/2 and -2/3, on axes of
-their own and on parallel ones where the angles meet in one sine. Lagrange multipliers are the
-oracle.
+"""Hinges that turn a fraction of another one, or a decimal: fingers that follow by -1/2 and 0.333,
+on axes of their own and on parallel ones where the angles meet in one sine. Lagrange multipliers
+are the oracle.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from oracles.test_loops_agree import whole
 from oracles.test_random_loops import module_of
 from symgen.certify.modules import certify
 from symgen.cli.main import app
+from symgen.derive.doubts import doubts
 from symgen.description import Robot, parse_robot
 from symgen.emit.generate import generate_module
 from symgen.errors import DescriptionError
@@ -52,6 +53,11 @@ def hand(ratio: str, other: str, alpha: str = "0", tilt: str = "0") -> Robot:
         ("q2/4", "q3/3"),
         ("2*q2/5 - q1/2", "-q2/2"),
         ("-4/21*q2", "4/21*q1"),  # the product of the denominators is beyond those that are read
+        ("0.333*q2", "q1"),
+        ("0.666*q2", "-0.333*q2 + 0.1"),  # the same angle twice
+        ("0.333*q2", "0.333*q3"),
+        ("1.0472*q2 + pi/2", "0.7*q1 - 1.414214*q2"),
+        ("q2/361", "q1/7"),
     ],
 )
 def test_torques_and_rank(ratio: str, other: str, alpha: str, tmp_path: Path) -> None:
@@ -75,16 +81,22 @@ def test_torques_and_rank(ratio: str, other: str, alpha: str, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("form", ["closed", "recursive"])
-def test_models_are_shown(form: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ratio", ["-q2/2", "0.333*q2"])
+def test_models_are_shown(ratio: str, form: str, tmp_path: Path) -> None:
     file = tmp_path / "hand.yaml"
-    file.write_text(HAND.format(ratio="-q2/2", other="-2/3*q1", alpha="0", tilt="0"))
+    file.write_text(HAND.format(ratio=ratio, other="-2/3*q1", alpha="0", tilt="0"))
     command = ["show", str(file), "--model", "inverse_dynamics", "--form", form]
     for more in ("text", "latex", "sympy"):
         result = CliRunner().invoke(app, [*command, "--format", more])
         assert result.exit_code == 0, result.output
 
 
-@pytest.mark.parametrize("ratio", ["0.333*q2", "L*q2", "pi*q2", "q2/361"])
-def test_other_ratios_are_refused_by_name(ratio: str) -> None:
-    with pytest.raises(DescriptionError, match=r"constraints\.q3: q3 turns .* with q2"):
+@pytest.mark.parametrize(("ratio", "number"), [("L*q2", "0.08"), ("pi*q2", "3.14159265359")])
+def test_a_ratio_that_is_no_number_is_refused_with_the_number(ratio: str, number: str) -> None:
+    with pytest.raises(DescriptionError, match=rf"q3: q3 turns .* with q2; .* write {number}"):
         regroup(hand(ratio, "q1"))
+
+
+def test_a_decimal_close_to_a_fraction_is_told() -> None:
+    notes = doubts(hand("0.333*q2", "0.25*q1"))
+    assert [note[:45] for note in notes] == ["q3 turns 0.333 times with q2, not 1/3: anothe"]
