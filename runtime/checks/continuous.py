@@ -12,8 +12,8 @@ the number,
 rows over their sigma. Only what this first step finds worth it is searched: fits of a physical
 robot at values of the number, by golden section.
 
-A spring or counterbalance of a joint is a q + b sin q + c cos q, in the ratio of the best a, b, c
-of the same step.
+A spring or counterbalance of a joint is a q + b sin q + c cos q, of a slide a q + b with a > 0,
+in the ratio of the best a, b, c of the same step.
 
 A zero, a factor and a constant torque of a joint may be wrong always, since an instant, or more and
 more: the effect of the number times a share w(t), so that J serves them all. Beside what is wrong
@@ -49,6 +49,7 @@ from runtime.model.generated import joint_labels, joint_units
 Array = np.ndarray
 
 ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
+TERMS, FORCES = {"rad": [0, 1, 2], "m": [0, 3]}, {"rad": "N m", "m": "N"}  # by the unit of q
 GUESSES = {
     2**0.5: "1.41: effective for peak values",
     3**0.5: "1.73: phase for line values",
@@ -112,7 +113,7 @@ class Step:
 
 
 def quantities(problem: Problem) -> list[Quantity]:
-    """Factors of all joints, zeros and springs of those that turn, the sampling rate, couplings of
+    """Factors and springs of all joints, zeros of those that turn, the sampling rate, couplings of
     neighbours; lengths and angles of the table where it is free.
     """
     plain = unchanged(problem.samples.n)
@@ -136,10 +137,9 @@ def quantities(problem: Problem) -> list[Quantity]:
                 ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
             )
         size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))
-        of = f"a constant torque of joint {joint}"
-        unit = "N m" if units[j] == "rad" else "N"
-        which.append(("offset", of, 2.0, partial(_offset, joint, unit, number == j, size)))
-        if units[j] == "rad" and (ratios := _ratios(problem, j)) is not None:
+        fields = partial(_offset, joint, FORCES[units[j]], number == j, size)
+        which.append(("offset", f"a constant torque of joint {joint}", 2.0, fields))
+        if (ratios := _ratios(problem, j, TERMS[units[j]])) is not None:
             of = f"a spring or counterbalance of joint {joint}"
             which.append(("spring", of, 2.0, partial(_spring, of, number == j, ratios)))
     for i, k in neighbours(units):
@@ -148,10 +148,11 @@ def quantities(problem: Problem) -> list[Quantity]:
             which.append(("coupling", of, 1.2, partial(coupled, joints, i, k, columns)))
     for key, x in ({} if problem.variants is None else problem.variants.CONSTANTS).items():
         if (match := ENTRY.fullmatch(key)) and (x or match[1] == "alpha"):
-            angle = match[1] == "alpha"
-            kind, span, entry = ("angle", 1.2, _angle) if angle else ("length", 1.0, _length)
-            of = f"{match[1]} of frame {match[2]}"
-            which.append((kind, of, span, partial(entry, key, match[1], match[2], x)))
+            kind, span, entry = (
+                ("angle", 1.2, _angle) if match[1] == "alpha" else ("length", 1.0, _length)
+            )
+            fields = partial(entry, key, match[1], match[2], x)
+            which.append((kind, f"{match[1]} of frame {match[2]}", span, fields))
     return [Quantity(*one, plain) for one in which]
 
 
@@ -208,17 +209,19 @@ def _offset(joint: str, unit: str, chosen: Array, size: float, xi: float) -> dic
     }
 
 
-def _ratios(problem: Problem, j: int) -> Array | None:
-    """a, b, c of a spring or counterbalance of a joint beside the model, to first order; None where
-    the samples do not tell them from it.
+def _ratios(problem: Problem, j: int, terms: list[int]) -> Array | None:
+    """Factors of these terms of `springs` for a joint beside the model, shape (4,), first order;
+    None where the samples do not tell them from it.
     """
     D, now, mask = _rows(problem, unchanged(problem.samples.n))
-    size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))  # a, b, c in this unit
-    J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j, :3], problem.F[:, j])
+    size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))  # the factors in this unit
+    J = size * np.einsum("ka,i->aki", springs(problem.samples.q)[:, j, terms], problem.F[:, j])
     found = gauss_newton_step(
         problem, D, J, problem.given, problem.tau - now + D @ problem.given.X, mask
     )
-    return None if found is None else size * np.append(found[0], 0.0)
+    if found is None or (3 in terms and found[0][0] < 0):  # a slide has no counterbalance
+        return None
+    return size * found[0] @ np.eye(4)[terms]
 
 
 def _angle(key: str, name: str, frame: str, value: float, xi: float) -> dict[str, Any]:

@@ -329,12 +329,16 @@ def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
     better = [trial for trial in better if explains_change(trial, problem)]
     if not better:
         return []
-    varying = {t.alternative.subject: t.gain for t in better if np.ndim(t.alternative.share)}
+    simpler = {t.alternative.subject: t.gain for t in better if np.ndim(t.alternative.share)} | {
+        t.alternative.subject.replace("constant torque", "spring or counterbalance"): t.gain
+        for t in reversed(better)
+        if t.alternative.kind == "offset"
+    }
     alike = [
         trial
         for trial in better
         if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain
-        and trial.gain >= varying.get(trial.alternative.subject, 0.0)
+        and trial.gain >= simpler.get(trial.alternative.subject, 0.0)
     ]
     before = problem.unseen(unchanged(problem.samples.n))
     named = [

@@ -602,3 +602,40 @@ def test_a_spring_over_a_small_range_is_named() -> None:
     found = runtime.plausibility(model, record, variants=symgen.variants(robot))
     subjects = [trial.alternative.subject for trial in found.named]
     assert subjects == ["a spring or counterbalance of joint 2"]
+
+
+SLIDE = """
+symgen: 1
+name: slider
+gravity: [0, 0, -g]
+constants: {D2: 0.3, g: 9.81}
+values: {ZZ1: 0.2, M2: 2.0, MX2: 0.1, MY2: 0.04, ZZ2: 0.02, FV1: 0.4, FV2: 3.0, FS1: 0.5, FS2: 2.0}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 1, alpha: -pi/2, d: D2, theta: 0, r: q2}
+elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("slope", "force", "cause"),
+    [(0, 0, ""), (0, 4, "a constant torque of joint 2"), (12, 2, "a spring")],
+)
+def test_a_spring_of_a_slide_is_named(slope, force, cause) -> None:
+    """It was silent, or "the torque of joint 2 is off by 0.66 N"; a constant force is no spring."""
+    robot = parse_robot(SLIDE.encode(), "slider.yaml")
+    model, rng = symgen.model(robot), np.random.default_rng(0)
+    t, w = np.arange(4000) / 200, rng.uniform(0.8, 3, (2, 3))[:, :, None]
+    q, qd, qdd = (
+        np.array([0.6, 0.15]) * x.sum(axis=1).T
+        for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
+    )
+    bodies = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(bodies))
+    tau = tau + 0.02 * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    tau[:, 1] += slope * q[:, 1] + force
+    record = runtime.Record(t, q, tau, name="run")
+    found = runtime.plausibility(model, record, variants=symgen.variants(robot))
+    subjects = [trial.alternative.subject for trial in found.named]
+    assert subjects[0].startswith(cause) if cause else not subjects, subjects
+    assert not (slope == 0 and any("spring" in subject for subject in subjects))
