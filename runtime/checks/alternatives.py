@@ -151,7 +151,7 @@ def alternatives(
     known : sequence of int
         Joints with known torques.
     """
-    make = _Maker(model, sides)
+    make = Maker(model, sides)
     every = [
         *signs(make),
         *exchanges(make),
@@ -168,7 +168,7 @@ def alternatives(
     return every
 
 
-class _Maker:
+class Maker:
     """Alternatives of a robot of n joints: what is not given stays as it is. Maps of columns act on
     the side that the files have.
     """
@@ -199,7 +199,7 @@ class _Maker:
         return {"T": self.tau_of_motors @ E @ np.linalg.inv(self.tau_of_motors)}
 
 
-def signs(make: _Maker) -> Iterator[Alternative]:
+def signs(make: Maker) -> Iterator[Alternative]:
     """Positions, torques, or both of one joint with the other sign; of all joints."""
     for j, joint in enumerate(make.joints):
         S = np.diag(np.where(np.arange(make.n) == j, -1.0, 1.0))
@@ -235,7 +235,7 @@ def signs(make: _Maker) -> Iterator[Alternative]:
         )
 
 
-def exchanges(make: _Maker) -> Iterator[Alternative]:
+def exchanges(make: Maker) -> Iterator[Alternative]:
     """Columns of two joints exchanged, and all of them reversed or moved on by one."""
     orders = []
     for i, k in combinations(range(make.n), 2):
@@ -264,7 +264,7 @@ def exchanges(make: _Maker) -> Iterator[Alternative]:
         )
 
 
-def units(make: _Maker) -> Iterator[Alternative]:
+def units(make: Maker) -> Iterator[Alternative]:
     """Degrees for rad and rad for degrees, mm for m; turns for rad; other torques for N m."""
     turning = np.array([unit == "rad" for unit in make.units])
     for unit in TORQUE_UNITS if turning.all() else ():
@@ -300,7 +300,7 @@ def units(make: _Maker) -> Iterator[Alternative]:
                     )
 
 
-def rates(make: _Maker) -> Iterator[Alternative]:
+def rates(make: Maker) -> Iterator[Alternative]:
     """Another sampling rate, by the factors of LIMIT.RATE_FACTORS."""
     for factor in LIMIT.RATE_FACTORS:
         yield make(
@@ -320,7 +320,7 @@ def times(factor: float) -> str:
     return f"1/{1 / factor:g} of" if plain else f"{factor:.3g} of"
 
 
-def couplings(make: _Maker) -> Iterator[Alternative]:
+def couplings(make: Maker) -> Iterator[Alternative]:
     """The motor of a joint also turns with the one before, in either sense: positions and torques,
     or one of them.
     """
@@ -354,7 +354,7 @@ def coupled(joints: Sequence[str], i: int, k: int, columns: str, share: float) -
     }
 
 
-def zeros(make: _Maker) -> Iterator[Alternative]:
+def zeros(make: Maker) -> Iterator[Alternative]:
     """The zero of a revolute joint turned by 90 or 180 degrees: its theta, or the offset of its
     drive.
     """
@@ -373,7 +373,7 @@ def zeros(make: _Maker) -> Iterator[Alternative]:
             )
 
 
-def known_torques(make: _Maker, joints: Sequence[int]) -> Iterator[Alternative]:
+def known_torques(make: Maker, joints: Sequence[int]) -> Iterator[Alternative]:
     """Known torques of one joint with the other sign, or in the measured ones no more."""
     for j in joints:
         for factor, text, remedy in (
@@ -388,7 +388,7 @@ def known_torques(make: _Maker, joints: Sequence[int]) -> Iterator[Alternative]:
             )
 
 
-def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterator[Alternative]:
+def transmissions(make: Maker, drives: Drives, sides: Sequence[str]) -> Iterator[Alternative]:
     """Gears and torque constants forgotten, used twice, or exchanged between joints."""
     R, constant, n = drives.ratio, np.diag(drives.torque_constant), make.n
     inverse = np.linalg.inv(R)
@@ -485,7 +485,7 @@ def transmissions(make: _Maker, drives: Drives, sides: Sequence[str]) -> Iterato
         )
 
 
-def gravity(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
+def gravity(make: Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
     """Gravity along the other axes of frame 0, in either sense; of its size on earth."""
     free_g = ("free_gx", "free_gy", "free_gz")
     given = np.array([free[key] for key in free_g])
@@ -516,7 +516,7 @@ def gravity(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
                 )
 
 
-def table(make: _Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
+def table(make: Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
     """alpha turned, lengths with the other sign, in mm, exchanged; the other convention of the
     table.
     """

@@ -1,5 +1,5 @@
-"""One number that the study takes as known, fitted beside the model: a factor of a joint, its zero,
-a length, an angle, the size of a spring or counterbalance.
+"""One number that the study takes as known, fitted beside the model: a factor of the torque or the
+position of a joint, its zero, a length, an angle, the size of a spring or counterbalance.
 
 Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of
 barrier and values, J = d(W chi)/d xi the effect of
@@ -23,7 +23,7 @@ always, the share whose first step gains most is searched; it has to gain LIMIT.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -33,6 +33,7 @@ from scipy.optimize import minimize_scalar
 
 from runtime.checks.alternatives import (
     Alternative,
+    Maker,
     coupled,
     neighbours,
     springs,
@@ -65,7 +66,7 @@ class Quantity:
     Attributes
     ----------
     kind : str
-        factor, zero, offset, rate, coupling, length, angle, spring.
+        factor, scale, zero, offset, rate, coupling, length, angle, spring.
     of : str
         What it is, in words.
     span : float
@@ -112,13 +113,14 @@ class Step:
     within: bool = False
 
 
-def quantities(problem: Problem) -> list[Quantity]:
-    """Factors and springs of all joints, zeros of those that turn, the sampling rate, couplings of
-    neighbours; lengths and angles of the table where it is free.
+def quantities(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[Quantity]:
+    """Factors of torques and positions and springs of all joints, zeros of those that turn, the
+    sampling rate, couplings of neighbours; lengths and angles of the table where it is free.
+    sides : those of positions and torques in the files.
     """
     plain = unchanged(problem.samples.n)
     joints, units = list(joint_labels(problem.model)), joint_units(problem.model)
-    number = np.arange(len(joints))
+    number, make = np.arange(len(joints)), Maker(problem.model, sides)
     which: list[tuple[str, str, float, Callable[[float], dict[str, Any]]]] = [
         ("rate", "the sampling rate", 1.0, _rate),
         (
@@ -132,6 +134,8 @@ def quantities(problem: Problem) -> list[Quantity]:
         if len(joints) > 1:
             fields = partial(_factor, problem, number == j, joint)
             which.append(("factor", f"a factor of the torque of joint {joint}", 2.6, fields))
+        fields = partial(_scale, make, j)
+        which.append(("scale", f"the scale of the position of joint {joint}", 1.2, fields))
         if units[j] == "rad":
             which.append(
                 ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
@@ -170,6 +174,16 @@ def _factor(problem: Problem, chosen: Array, joint: str, xi: float) -> dict[str,
         "cause": f"{what} to be multiplied by {factor:.3g}",
         "remedy": f"look at {look} ({_guess(factor)})",
         "T": np.linalg.inv(problem.F) @ scale @ problem.F,
+    }
+
+
+def _scale(make: Maker, j: int, xi: float) -> dict[str, Any]:
+    joint, factor = make.joints[j], float(np.exp(xi))
+    return {
+        "cause": f"the position of joint {joint} is to be multiplied by {factor:.3g}",
+        "remedy": f"look at the counts per turn of the encoder of joint {joint}, at its ratio "
+        "(drives.ratio) and at its unit (record.units.q)",
+        **make.positions(np.diag(np.where(np.arange(make.n) == j, factor, 1.0))),
     }
 
 
@@ -318,9 +332,9 @@ def _rows(problem: Problem, alternative: Alternative) -> tuple[Array, Array, Arr
     return D, D @ problem.given.X + problem.tau - Y, mask
 
 
-def searched(problem: Problem) -> list[Trial]:
+def searched(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
     """The quantities whose first step is worth it, each at its best value."""
-    steps = first_steps(problem, quantities(problem))
+    steps = first_steps(problem, quantities(problem, sides))
     first = sorted(steps, key=lambda one: -one[1].gain)[: LIMIT.NUMBERS_SEARCHED]
     trials = [
         _best(problem, quantity, step)
@@ -346,12 +360,14 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
         grams = problem.grams(quantity.change(xi))
         if grams is None:
             return np.inf
-        scores[xi] = problem.fit(grams, quick_fit).score
+        scores[xi] = problem.fit(grams, quick_fit, problem.given.sigma).score
         return scores[xi]
 
-    near, far = (float(np.clip(x, -quantity.span, quantity.span)) for x in (step.xi, 1.6 * step.xi))
-    for xi in sorted({near * 0.25, near * 0.5, near, far}):
+    near = far = float(np.clip(step.xi, -quantity.span, quantity.span))
+    for xi in (near * 0.25, near * 0.5):
         score(xi)
+    while score(far) <= min(scores.values(), default=-np.inf) and abs(far) < quantity.span:
+        far = float(np.clip(1.6 * far, -quantity.span, quantity.span))
     enough = problem.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
     if min(scores.values(), default=np.inf) > enough:
         return None

@@ -13,6 +13,7 @@ from runtime.checks.check import Answer, Question, State
 from runtime.checks.delay import Delay, LatePositions
 from runtime.checks.trials import Trial, reach
 from runtime.limits import LIMIT
+from runtime.model.generated import elements_of
 
 Array = np.ndarray
 
@@ -47,6 +48,50 @@ def physics(case: Case) -> Answer | None:
         f"A physical robot leaves {given.errors[j]:.1f} % of the torque of joint "
         f"{case.labels[j]}, free parameters {free.errors[j]:.1f} %",
     )
+
+
+@Question(
+    "Were the torques measured?",
+    f"{100 * LIMIT.LEAST_FRICTION:g} % of friction in a joint, and noise",
+    "log torques or currents as they were measured: what a controller computes from its model "
+    "tells of that model, not of the robot",
+)
+def measured(case: Case) -> Answer | None:
+    """Friction in the torque of the joint that has most of it, and noise of the torques at the rate
+    of the record, by fifth differences, both relative; None where the model has no friction, or a
+    law gives the torques.
+    """
+    if case.alone is None or any(record.by_law for record in case.study.record):
+        return None
+    elements, physical = elements_of(case.model), case.alone.physical
+    kinds = [elements.get(name, ("",))[0] for name in physical.standard]
+    chosen = np.isin(kinds, ("viscous", "coulomb"))
+    if not chosen.any():
+        return None
+    torque = case.D @ (physical.K[:, chosen] @ case.alone.given.X[chosen])
+    share = float((_rms(torque) / _rms(case.samples.tau)).max())
+    noise = max(
+        float((np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) / _rms(one.tau)).max())
+        for one in case.records
+    ) / (1.2816 * 252**0.5)  # that of white noise of deviation 1
+    if share < LIMIT.LEAST_FRICTION:
+        text = (
+            f"No joint shows friction (at most {100 * share:.1f} % of its torque), as where a "
+            "controller or a simulation computes torques, or sensors sit behind the gears"
+        )
+    elif noise < LIMIT.LEAST_NOISE:
+        text = (
+            f"They have no noise ({noise:.0e} of their size), as where a controller, a simulation "
+            "or a filter makes them"
+        )
+    else:
+        return Answer("good", f"Friction is up to {100 * share:.0f} % of the torque of a joint")
+    return Answer("doubtful", text)
+
+
+def _rms(x: Array) -> Array:
+    """Root mean square of each column, shape (n,)."""
+    return np.asarray(np.sqrt((x**2).mean(axis=0)))
 
 
 @Question(

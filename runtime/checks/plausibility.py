@@ -30,6 +30,7 @@ from runtime.checks.physics import (
     direction,
     explained,
     late_gain,
+    measured,
     not_asked,
     physics,
     size,
@@ -73,6 +74,7 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     cut_torques,
     change,
     physics,
+    measured,
     size,
     values,
 )
@@ -202,7 +204,7 @@ def plausibility(
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
-        every = [*tried(case.problem, case.sides), *searched(case.problem)]
+        every = [*tried(case.problem, case.sides), *searched(case.problem, case.sides)]
         trials = _ranked(every, case.problem.given.penalty)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.alternative.kind != "rate"]

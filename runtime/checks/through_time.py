@@ -16,6 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -45,6 +46,10 @@ def jumps(case: Case) -> Answer:
     for record in case.records:
         q = median_filtered(record.q, median)
         steps = np.abs(np.diff(q, axis=0))
+        for i, k in combinations(np.flatnonzero(steps.any(axis=0)), 2):
+            if np.array_equal(steps[:, i], steps[:, k]):
+                text = f"Positions of joints {case.labels[i]} and {case.labels[k]} are the same"
+                return Answer("no", text, "one column stands for both: look at record.columns.q")
         usual = _usual(steps)
         around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))
         apart = np.abs(np.diff(q, axis=0) - around)

@@ -137,14 +137,20 @@ class Problem:
         rows = self.rows(alternative)
         return None if rows is None else Grams.of(*rows, self.tau)
 
-    def fit(self, grams: Grams, how: Callable[..., Fit] = physical_fit, **options: int) -> Fit:
-        """The parameters of a physical robot, over the standard parameters; weights begin at those
-        of least squares.
+    def fit(
+        self,
+        grams: Grams,
+        how: Callable[..., Fit] = physical_fit,
+        sigma: Array | None = None,
+        **options: int,
+    ) -> Fit:
+        """The parameters of a physical robot, over the standard parameters; weights begin at sigma,
+        without it at those of least squares.
         """
         standard = grams.of_joints.shape[1] == len(self.physical.standard) + 1
         over = grams if standard else grams.mapped(self.physical.K)
-        sigma = least_squares(grams, self.N).sigma
-        return how(over, self.barrier, self.N, sigma, **options)
+        begin = least_squares(grams, self.N).sigma if sigma is None else sigma
+        return how(over, self.barrier, self.N, begin, **options)
 
     def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
         """An alternative under the conditions of a physical robot. Rows count as much as they do
