@@ -123,9 +123,14 @@ class Simulated:
             q[:, -1] = (q[:, -1] - low) % (2 * pi) + low
             return replace(c, q=q)
 
-        def target(c: Case) -> Case:
+        def target(c: Case, friction: bool) -> Case:
             own = Truth(self.robot, 0, bodies=self.robot.nominal)
-            return replace(c, tau=own.torque(self.move) + self.balance)
+            tau = own.torque(self.move) - (0 if friction else own.friction(self.move.qd))
+            return replace(c, tau=tau + self.balance)
+
+        def longer(c: Case) -> Case:
+            name, length = {"wrist": ("D3", 0.6), "panda": ("RL5", 0.384)}[self.robot.name]
+            return c.text(f"{name}: {length}", f"{name}: {1.1 * length:.6g}")
 
         last = f"joints? .*({n}|{n - 1}|{n - 2})|of joint ({n}|{n - 1}|{n - 2}|4|3|2)"
         return (
@@ -135,7 +140,7 @@ class Simulated:
             Slip(4, "coupling of 10 % of joints 2 and 3", r"coupling of joints 2 and 3", lambda c: coupled(c, True)),
             Slip(5, "torque coupling of 10 % of joints 2 and 3", r"coupling of joints 2 and 3", lambda c: coupled(c, False)),
             Slip(6, "a load added after 5 s", r"Before and after (4\.[5-9]|5\.[0-5]|5 s)", lambda c: replace(c, tau=c.tau + np.where(at(len(c.t))[:, None] >= half, heavy, 0.0))),
-            Slip(7, "torques of the controller's model", r"measured", target),
+            Slip(7, "torques of the controller's model", r"no noise", lambda c: target(c, True)),
             Slip(8, "rate 125 for 94", r"sampling rate is [^;]*0\.7[345]", lambda c: replace(c, rate=125 / 94)),
             Slip(9, "rate 300 for 500", r"sampling rate is [^;]*1\.[67]", lambda c: replace(c, rate=0.6)),
             Slip(10, "angle of the last joint wraps", r"wraps", wrapped),
@@ -149,6 +154,10 @@ class Simulated:
             Slip(18, "centre of the load 0.24 m off", rf"(gravity|inertia) torque of joint|they leave|{last}", lambda c: self.case(self.with_load(0.34), loaded(self.robot.nominal, self.load, 0.1))),
             Slip(19, "frozen encoder of joint 4", r"froze", frozen),
             Slip(20, "torque of joint 3 20 ms late", r"torques? of joints? 3 (is|are) late", lambda c: replace(c, tau=lag(c.tau, late // 2, at(n) == 2))),
+            Slip(21, "the same without friction", r"No joint shows friction", lambda c: target(c, False)),
+            Slip(22, "position of joint 3 times 1.1", r"position of joint 3 is to be multiplied by 0\.9[01]", lambda c: replace(c, q=c.q * np.where(at(n) == 2, 1.1, 1.0))),
+            Slip(23, "position of joint 4 times 0.5", r"position of joint 4 is to be multiplied by (2|1\.9|2\.0)", lambda c: replace(c, q=c.q * np.where(at(n) == 3, 0.5, 1.0))),
+            Slip(24, "a length 10 % too long", r"[dr] of frame [35] is", longer),
         )  # fmt: skip
 
 

@@ -267,14 +267,16 @@ def exchanges(make: Maker) -> Iterator[Alternative]:
 def units(make: Maker) -> Iterator[Alternative]:
     """Degrees for rad and rad for degrees, mm for m; turns for rad; other torques for N m."""
     turning = np.array([unit == "rad" for unit in make.units])
-    for unit in TORQUE_UNITS if turning.all() else ():
-        yield make(
+    yield from (
+        make(
             "unit",
             f"torques: {unit} are read as N*m",
             f"set record.units.tau: {unit}",
             T=torque_unit(unit)[1] * make.one,
             of="a common factor of all torques",
         )
+        for unit in (TORQUE_UNITS if turning.all() else ())
+    )
     for unit, factor, which, of in (
         ("deg", DEGREE, turning, "degrees are read as rad"),
         ("rad", 1 / DEGREE, turning, "rad are read as degrees"),
@@ -302,14 +304,16 @@ def units(make: Maker) -> Iterator[Alternative]:
 
 def rates(make: Maker) -> Iterator[Alternative]:
     """Another sampling rate, by the factors of LIMIT.RATE_FACTORS."""
-    for factor in LIMIT.RATE_FACTORS:
-        yield make(
+    yield from (
+        make(
             "rate",
             f"the sampling rate is {times(factor)} the stated one",
             "correct record.rate, or the unit of the time column (record.units.t)",
             rate=factor,
             of="the sampling rate",
         )
+        for factor in LIMIT.RATE_FACTORS
+    )
 
 
 def times(factor: float) -> str:
@@ -324,10 +328,12 @@ def couplings(make: Maker) -> Iterator[Alternative]:
     """The motor of a joint also turns with the one before, in either sense: positions and torques,
     or one of them.
     """
-    for i, k in neighbours(make.units):
-        for columns in ("positions and torques", "positions", "torques") if i < k else ():
-            for share in (1.0, -1.0):
-                yield make("coupling", **coupled(make.joints, i, k, columns, share))
+    yield from (
+        make("coupling", **coupled(make.joints, i, k, columns, share))
+        for i, k in neighbours(make.units)
+        for columns in (("positions and torques", "positions", "torques") if i < k else ())
+        for share in (1.0, -1.0)
+    )
 
 
 def neighbours(units: Sequence[str]) -> list[tuple[int, int]]:
@@ -358,83 +364,86 @@ def zeros(make: Maker) -> Iterator[Alternative]:
     """The zero of a revolute joint turned by 90 or 180 degrees: its theta, or the offset of its
     drive.
     """
-    for j, joint in enumerate(make.joints):
-        if make.units[j] != "rad":
-            continue
-        for text, angle in TURNS.items():
-            p = np.where(np.arange(make.n) == j, angle, 0.0)
-            yield make(
-                "zero",
-                f"theta of joint {joint} is wrong by {text}",
-                f"look at theta of the frame of joint {joint} and at its zero "
-                f"(drives.offset): {text} are missing",
-                p=p,
-                of=f"the zero of joint {joint}",
-            )
+    yield from (
+        make(
+            "zero",
+            f"theta of joint {joint} is wrong by {text}",
+            f"look at theta of the frame of joint {joint} and at its zero (drives.offset): {text} "
+            "are missing",
+            p=np.where(np.arange(make.n) == j, angle, 0.0),
+            of=f"the zero of joint {joint}",
+        )
+        for j, joint in enumerate(make.joints)
+        if make.units[j] == "rad"
+        for text, angle in TURNS.items()
+    )
 
 
 def known_torques(make: Maker, joints: Sequence[int]) -> Iterator[Alternative]:
     """Known torques of one joint with the other sign, or in the measured ones no more."""
-    for j in joints:
+    yield from (
+        make(
+            "known",
+            f"the known torque of joint {make.joints[j]} {text}",
+            f"{remedy} the known torque of joint {make.joints[j]} (record.columns.tau_known)",
+            known_factor=np.where(np.arange(make.n) == j, factor, 1.0),
+        )
+        for j in joints
         for factor, text, remedy in (
             (-1.0, "has the wrong sign", "turn the sign of"),
             (0.0, "is not in the measured one", "do not subtract"),
-        ):
-            yield make(
-                "known",
-                f"the known torque of joint {make.joints[j]} {text}",
-                f"{remedy} the known torque of joint {make.joints[j]} (record.columns.tau_known)",
-                known_factor=np.where(np.arange(make.n) == j, factor, 1.0),
-            )
+        )
+    )
 
 
 def transmissions(make: Maker, drives: Drives, sides: Sequence[str]) -> Iterator[Alternative]:
     """Gears and torque constants forgotten, used twice, or exchanged between joints."""
-    R, constant, n = drives.ratio, np.diag(drives.torque_constant), make.n
+    R, shift, constant, n = drives.ratio, drives.offset, np.diag(drives.torque_constant), make.n
     inverse = np.linalg.inv(R)
-    shift = drives.offset
     both = {"P": inverse, "p": shift, "T": R.T}, {"P": R, "p": -R @ shift, "T": inverse.T}
     motors, joints = "set record.side: motor", "set record.side: joint"
     if not np.allclose(R, np.eye(n)):
-        for cause, remedy, maps in (
-            (
+        yield from (
+            make("side", cause, remedy, **maps)
+            for cause, remedy, maps in (
                 (
-                    "torques of the motors are taken as torques of the joints: the gear ratio is "
-                    "missing"
+                    (
+                        "torques of the motors are taken as torques of the joints: the gear ratio "
+                        "is missing"
+                    ),
+                    "set record.torque_side: motor",
+                    {"T": R.T},
                 ),
-                "set record.torque_side: motor",
-                {"T": R.T},
-            ),
-            (
                 (
-                    "torques of the joints are taken as torques of the motors: the gear ratio is "
-                    "applied twice"
+                    (
+                        "torques of the joints are taken as torques of the motors: the gear ratio "
+                        "is applied twice"
+                    ),
+                    "set record.torque_side: joint",
+                    {"T": inverse.T},
                 ),
-                "set record.torque_side: joint",
-                {"T": inverse.T},
-            ),
-            (
-                "positions of the motors are taken as positions of the joints",
-                motors,
-                {"P": inverse, "p": shift},
-            ),
-            (
-                "positions of the joints are taken as positions of the motors",
-                f"{joints}, torque_side: motor",
-                {"P": R, "p": -R @ shift},
-            ),
-            (
-                "positions and torques of the motors are taken as those of the joints",
-                motors,
-                both[0],
-            ),
-            (
-                "positions and torques of the joints are taken as those of the motors",
-                joints,
-                both[1],
-            ),
-        ):
-            yield make("side", cause, remedy, **maps)
+                (
+                    "positions of the motors are taken as positions of the joints",
+                    motors,
+                    {"P": inverse, "p": shift},
+                ),
+                (
+                    "positions of the joints are taken as positions of the motors",
+                    f"{joints}, torque_side: motor",
+                    {"P": R, "p": -R @ shift},
+                ),
+                (
+                    "positions and torques of the motors are taken as those of the joints",
+                    motors,
+                    both[0],
+                ),
+                (
+                    "positions and torques of the joints are taken as those of the motors",
+                    joints,
+                    both[1],
+                ),
+            )
+        )
     if not np.allclose(constant, np.eye(n)):
         remedy = "look at record.units.tau: A of currents, N*m of torques"
         T = R.T @ np.linalg.inv(constant) @ inverse.T
@@ -451,24 +460,26 @@ def transmissions(make: Maker, drives: Drives, sides: Sequence[str]) -> Iterator
             T=np.linalg.inv(T),
         )
     if shift.any():
-        for cause, remedy, p in (
-            (
-                "the offsets of the drives are used twice or with the wrong sign",
-                "look at the sign of drives.offset",
-                -2 * shift,
-            ),
-            (
-                "the offsets of the drives are missing",
-                "set record.side: motor, or add drives.offset to the positions",
-                shift,
-            ),
-            (
-                "the offsets of the drives are added to positions that have them",
-                "leave drives.offset out",
-                -shift,
-            ),
-        ):
-            yield make("zero", cause, remedy, p=p)
+        yield from (
+            make("zero", cause, remedy, p=p)
+            for cause, remedy, p in (
+                (
+                    "the offsets of the drives are used twice or with the wrong sign",
+                    "look at the sign of drives.offset",
+                    -2 * shift,
+                ),
+                (
+                    "the offsets of the drives are missing",
+                    "set record.side: motor, or add drives.offset to the positions",
+                    shift,
+                ),
+                (
+                    "the offsets of the drives are added to positions that have them",
+                    "leave drives.offset out",
+                    -shift,
+                ),
+            )
+        )
     own = np.diag(R).copy()
     for i, k in combinations(range(n), 2):
         if "motor" not in sides or np.isclose(abs(own[i]), abs(own[k])):
@@ -501,17 +512,15 @@ def gravity(make: Maker, free: Mapping[str, float]) -> Iterator[Alternative]:
         for sign in (1.0, -1.0):
             g = np.where(np.arange(3) == k, sign * size, 0.0)
             if size and not np.allclose(g, given):
-                entry = f"{'+' if sign > 0 else '-'}{axis}0"
                 text = (
                     "gravity has the wrong sign: it points along "
                     if np.allclose(g, -given)
                     else "gravity points along "
                 )
-                listed = ", ".join(f"{x:.4g}" for x in g)
                 yield make(
                     "gravity",
-                    text + entry,
-                    f"set gravity: [{listed}], or turn frame 0",
+                    f"{text}{'+' if sign > 0 else '-'}{axis}0",
+                    f"set gravity: [{', '.join(f'{x:.4g}' for x in g)}], or turn frame 0",
                     constants=dict(zip(free_g, map(float, g), strict=True)),
                 )
 

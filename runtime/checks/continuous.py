@@ -131,18 +131,18 @@ def quantities(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> l
         ),
     ]
     for j, joint in enumerate(joints):
+        size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))
+        offset = partial(_offset, joint, FORCES[units[j]], number == j, size)
+        which += [
+            ("scale", f"the scale of the position of joint {joint}", 1.2, partial(_scale, make, j)),
+            ("offset", f"a constant torque of joint {joint}", 2.0, offset),
+        ]
         if len(joints) > 1:
             fields = partial(_factor, problem, number == j, joint)
             which.append(("factor", f"a factor of the torque of joint {joint}", 2.6, fields))
-        fields = partial(_scale, make, j)
-        which.append(("scale", f"the scale of the position of joint {joint}", 1.2, fields))
         if units[j] == "rad":
-            which.append(
-                ("zero", f"the zero of joint {joint}", 1.2, partial(_zero, number == j, joint))
-            )
-        size = float(np.sqrt((problem.samples.tau[:, j] ** 2).mean()))
-        fields = partial(_offset, joint, FORCES[units[j]], number == j, size)
-        which.append(("offset", f"a constant torque of joint {joint}", 2.0, fields))
+            fields = partial(_zero, number == j, joint)
+            which.append(("zero", f"the zero of joint {joint}", 1.2, fields))
         if (ratios := _ratios(problem, j, TERMS[units[j]])) is not None:
             of = f"a spring or counterbalance of joint {joint}"
             which.append(("spring", of, 2.0, partial(_spring, of, number == j, ratios)))
@@ -372,12 +372,10 @@ def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
     if min(scores.values(), default=np.inf) > enough:
         return None
     best = min(scores, key=scores.__getitem__)
-    width = 0.5 * abs(best)
-    bounds = max(best - width, -quantity.span), min(best + width, quantity.span)
+    bounds = np.clip(best + 0.5 * abs(best) * np.array([-1, 1]), -quantity.span, quantity.span)
     minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
     xi = min(scores, key=scores.__getitem__)
-    least = LIMIT.SMALLEST_CHANGE[quantity.kind] * (0.5 if quantity.since else 1.0)
-    if abs(xi) < least:
+    if abs(xi) < LIMIT.SMALLEST_CHANGE[quantity.kind] * (0.5 if quantity.since else 1.0):
         return None
     grams = problem.grams(quantity.change(xi))
     assert grams is not None

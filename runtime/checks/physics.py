@@ -58,40 +58,31 @@ def physics(case: Case) -> Answer | None:
 )
 def measured(case: Case) -> Answer | None:
     """Friction in the torque of the joint that has most of it, and noise of the torques at the rate
-    of the record, by fifth differences, both relative; None where the model has no friction, or a
-    law gives the torques.
+    of the record, by fifth differences, both relative; None where a law gives the torques.
     """
     if case.alone is None or any(record.by_law for record in case.study.record):
         return None
-    elements, physical = elements_of(case.model), case.alone.physical
-    kinds = [elements.get(name, ("",))[0] for name in physical.standard]
+    elements, K = elements_of(case.model), case.alone.physical.K
+    kinds = [elements.get(name, ("",))[0] for name in case.alone.physical.standard]
     chosen = np.isin(kinds, ("viscous", "coulomb"))
-    if not chosen.any():
-        return None
-    torque = case.D @ (physical.K[:, chosen] @ case.alone.given.X[chosen])
-    share = float((_rms(torque) / _rms(case.samples.tau)).max())
-    noise = max(
-        float((np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) / _rms(one.tau)).max())
-        for one in case.records
-    ) / (1.2816 * 252**0.5)  # that of white noise of deviation 1
-    if share < LIMIT.LEAST_FRICTION:
-        text = (
+    friction = np.linalg.norm(case.D @ (K[:, chosen] @ case.alone.given.X[chosen]), axis=0)
+    share = float((friction / np.linalg.norm(case.samples.tau, axis=0)).max())
+    if chosen.any() and share < LIMIT.LEAST_FRICTION:
+        return Answer(
+            "doubtful",
             f"No joint shows friction (at most {100 * share:.1f} % of its torque), as where a "
-            "controller or a simulation computes torques, or sensors sit behind the gears"
+            "controller or a simulation computes torques, or sensors sit behind the gears",
         )
-    elif noise < LIMIT.LEAST_NOISE:
-        text = (
+    fifth = [np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) for one in case.records]
+    size = [np.sqrt((one.tau**2).mean(axis=0)) for one in case.records]
+    noise = float(np.max(np.array(fifth) / size)) / (1.28 * 252**0.5)  # 1 of white noise of size 1
+    if 0 < noise < LIMIT.LEAST_NOISE:  # 0 of a drive that knows few levels
+        return Answer(
+            "doubtful",
             f"They have no noise ({noise:.0e} of their size), as where a controller, a simulation "
-            "or a filter makes them"
+            "or a filter makes them",
         )
-    else:
-        return Answer("good", f"Friction is up to {100 * share:.0f} % of the torque of a joint")
-    return Answer("doubtful", text)
-
-
-def _rms(x: Array) -> Array:
-    """Root mean square of each column, shape (n,)."""
-    return np.asarray(np.sqrt((x**2).mean(axis=0)))
+    return Answer("good", f"Friction is up to {100 * share:.0f} % of the torque of a joint")
 
 
 @Question(

@@ -46,9 +46,11 @@ def jumps(case: Case) -> Answer:
     for record in case.records:
         q = median_filtered(record.q, median)
         steps = np.abs(np.diff(q, axis=0))
-        for i, k in combinations(np.flatnonzero(steps.any(axis=0)), 2):
-            if np.array_equal(steps[:, i], steps[:, k]):
-                text = f"Positions of joints {case.labels[i]} and {case.labels[k]} are the same"
+        for two in combinations(np.flatnonzero(steps.any(axis=0)), 2):
+            if not np.ptp(steps[:, two], axis=1).any():
+                text = "Positions of joints {} and {} are the same".format(
+                    *(case.labels[j] for j in two)
+                )
                 return Answer("no", text, "one column stands for both: look at record.columns.q")
         usual = _usual(steps)
         around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))

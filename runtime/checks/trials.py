@@ -149,8 +149,8 @@ class Problem:
         """
         standard = grams.of_joints.shape[1] == len(self.physical.standard) + 1
         over = grams if standard else grams.mapped(self.physical.K)
-        begin = least_squares(grams, self.N).sigma if sigma is None else sigma
-        return how(over, self.barrier, self.N, begin, **options)
+        sigma = least_squares(grams, self.N).sigma if sigma is None else sigma
+        return how(over, self.barrier, self.N, sigma, **options)
 
     def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
         """An alternative under the conditions of a physical robot. Rows count as much as they do
