@@ -353,28 +353,34 @@ def searched(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> lis
 
 
 def _best(problem: Problem, quantity: Quantity, step: Step) -> Trial | None:
-    """The best value by a coarse grid and golden section."""
+    """The best value by a coarse grid, weights those of the study, then golden section, weights
+    those of each value by itself: far from the best these may be worse than none.
+    """
     scores: dict[float, float] = {}
 
-    def score(xi: float) -> float:
+    def score(xi: float, sigma: Array | None = None) -> float:
         grams = problem.grams(quantity.change(xi))
         if grams is None:
             return np.inf
-        scores[xi] = problem.fit(grams, quick_fit, problem.given.sigma).score
+        scores[xi] = problem.fit(grams, quick_fit, sigma).score
         return scores[xi]
 
     near = far = float(np.clip(step.xi, -quantity.span, quantity.span))
     for xi in (near * 0.25, near * 0.5):
-        score(xi)
-    while score(far) <= min(scores.values(), default=-np.inf) and abs(far) < quantity.span:
+        score(xi, problem.given.sigma)
+    while (
+        score(far, problem.given.sigma) <= min(scores.values(), default=-np.inf)
+        and abs(far) < quantity.span
+    ):
         far = float(np.clip(1.6 * far, -quantity.span, quantity.span))
     enough = problem.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
     if min(scores.values(), default=np.inf) > enough:
         return None
     best = min(scores, key=scores.__getitem__)
     bounds = np.clip(best + 0.5 * abs(best) * np.array([-1, 1]), -quantity.span, quantity.span)
-    minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 7})
-    xi = min(scores, key=scores.__getitem__)
+    scores.clear()
+    minimize_scalar(score, bounds=bounds, method="bounded", options={"maxiter": 9})
+    xi = min(scores, key=scores.__getitem__, default=best)
     if abs(xi) < LIMIT.SMALLEST_CHANGE[quantity.kind] * (0.5 if quantity.since else 1.0):
         return None
     grams = problem.grams(quantity.change(xi))

@@ -47,7 +47,7 @@ from runtime.checks.sizes import (
     torques,
 )
 from runtime.checks.through_time import change, cut_torques, jumps
-from runtime.checks.trials import Trial, decisive, tried
+from runtime.checks.trials import Problem, Trial, decisive, tried
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
@@ -205,7 +205,7 @@ def plausibility(
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
         every = [*tried(case.problem, case.sides), *searched(case.problem, case.sides)]
-        trials = _ranked(every, case.problem.given.penalty)
+        trials = _ranked(every, case.problem)
         if case.robot_values is not None and case.robot_values.heavy:
             trials = [t for t in trials if t.alternative.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
@@ -266,19 +266,24 @@ def _case(
     return Case(model, own, straight, study, samples, D, variants)
 
 
-def _ranked(trials: Sequence[Trial], penalty: float) -> list[Trial]:
+def _ranked(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
     """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
     gives the parameters more room, and so has a coupling, a constant torque, and a spring unless it
-    brings them nearer to the values of the robot file; what changes with time has to gain
-    LIMIT.VARYING_GAIN more. penalty : distance of the study from those, nats.
+    brings them nearer to the values of the robot file; what changes with time, and a spring beside
+    the known torque of its joint, has to gain LIMIT.VARYING_GAIN more.
     """
+    known = problem.samples.tau_known.any(axis=0)
 
     def price(trial: Trial) -> float:
-        nearer = trial.fit is not None and penalty - trial.fit.penalty > LIMIT.DECISIVE
-        kind = trial.alternative.kind
-        if np.ndim(trial.alternative.share):
+        kind, spring = trial.alternative.kind, trial.alternative.spring
+        if np.ndim(trial.alternative.share) or (known * np.transpose(spring)).any():
             return float(LIMIT.VARYING_GAIN)
-        dear = kind in ("rate", "coupling", "offset") or (kind == "spring" and not nearer)
+        nearer = (
+            kind == "spring"
+            and trial.fit is not None
+            and problem.given.penalty - trial.fit.penalty > LIMIT.DECISIVE
+        )
+        dear = kind in ("rate", "coupling", "offset", "spring") and not nearer
         return float(LIMIT.RATE_GAIN) * dear
 
     return sorted(

@@ -288,6 +288,17 @@ def test_right_studies_of_random_robots_are_left_alone(seed: int) -> None:
     assert not found.named, found.to_text()
 
 
+@pytest.mark.parametrize("study", sampled([("A", True), ("A", False), ("B", True)], 1))
+def test_right_studies_of_a_large_arm_are_told_no_cause(
+    kr300_folder: Path, study: tuple[str, bool]
+) -> None:
+    """A spring beside its counterbalance gained 49 nats by the values of the file, a zero that is
+    8.9 degrees off 21.
+    """
+    letter, values = study
+    assert slips.kr300(kr300_folder, letter, values=values).judged().named == ()
+
+
 @campaign
 @pytest.mark.parametrize("number", [1, 6, 8, 13, 18, 24])
 def test_slips_of_the_kr300_are_named(kr300_folder: Path, number: int) -> None:
