@@ -61,6 +61,8 @@ class TextCheck:
         Functions that this robot gives no sense to.
     not_run : str
         Why nothing ran; empty where it did.
+    raised : mapping
+        What functions of a module raised in place of a result.
     """
 
     target: str
@@ -69,6 +71,7 @@ class TextCheck:
     constants: str = ""
     left_out: tuple[str, ...] = ()
     not_run: str = ""
+    raised: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def wrong(self) -> list[str]:
@@ -87,7 +90,15 @@ class TextCheck:
         wrong = [name for name in tables if name in self.wrong]
         told = f"tables of {file} against the robot file: {', '.join(wrong or tables)}"
         return [
-            (error < TOLERANCE, f"{name} of {file} against CasADi: {error:.1e} of the largest")
+            (
+                error < TOLERANCE,
+                f"{name} of {file} "
+                + (
+                    f"ends in an error: {self.raised[name]}"
+                    if name in self.raised
+                    else f"against CasADi: {error:.1e} of the largest"
+                ),
+            )
             for name, error in self.errors.items()
             if name not in tables
         ] + [(not wrong, told)] * bool(tables)
@@ -120,11 +131,13 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     with TemporaryDirectory(prefix="symgen-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / file
         path.write_text(text, encoding="utf-8", newline="\n")
+        raised: dict[str, str] = {}
         if target == "c":
             errors = c_errors(path, text, str(compiler), witness)
         else:
-            errors = module_errors(path, target, witness)
-    return TextCheck(target, key, errors, witness.drawn, tuple(sorted(witness.left_out)))
+            errors, raised = module_errors(path, target, witness)
+    left_out = tuple(sorted(witness.left_out))
+    return TextCheck(target, key, errors, witness.drawn, left_out, raised=raised)
 
 
 # --- headers ---
@@ -142,24 +155,28 @@ def headed(text: str, check: TextCheck, formulas: str) -> str:
 # --- modules ---
 
 
-def module_errors(path: Path, target: str, witness: Witness) -> dict[str, float]:
-    """Errors of the functions and tables of a Python module."""
+def module_errors(
+    path: Path, target: str, witness: Witness
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Errors of the functions and tables of a Python module, and what they raised."""
     try:
         module = imported(path)
-    except Exception:  # a text may fail in any way
-        return {"import": float("inf")}
+    except Exception as error:  # a text may fail in any way
+        return {"import": float("inf")}, {"import": repr(error)}
     checks, call = dict(witness.checks), _casadi if target == "casadi" else _called
     if target == "casadi":  # all three, by position
         del checks["observation_matrix"]
         checks |= {
             n: c[:2] for n, c in checks.items() if n == "passive_joints"
         } | witness.derivatives
-    errors = {name: largest(module, name, checks[name], call, witness) for name in checks}
+    ran = {name: largest(module, name, checks[name], call, witness) for name in checks}
+    errors = {name: error for name, (error, _) in ran.items()}
     own = [
         n for n, value in vars(module).items() if callable(value) and not isinstance(value, type)
     ]
     unchecked = {n for n in own if not n.startswith("_")} - {*errors, *HELPERS, *witness.left_out}
-    return errors | dict.fromkeys(unchecked, float("inf")) | table_errors(module, witness)
+    errors |= dict.fromkeys(unchecked, float("inf")) | table_errors(module, witness)
+    return errors, {name: text for name, (_, text) in ran.items() if text}
 
 
 def largest(
@@ -168,15 +185,16 @@ def largest(
     checks: list[Check],
     call: Callable[..., Array],
     witness: Witness,
-) -> float:
-    """Largest error of a function in all its checks."""
+) -> tuple[float, str]:
+    """Largest error of a function in all its checks, and what it raised."""
     try:
-        return max(
+        errors = [
             difference(c.compared(call(module, name, c, witness.keywords)), c.expected, c.scale)
             for c in checks
-        )
-    except Exception:  # a text may fail in any way
-        return float("inf")
+        ]
+    except Exception as error:  # a text may fail in any way
+        return float("inf"), str(error) or repr(error)
+    return max(errors), ""
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:

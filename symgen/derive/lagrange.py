@@ -57,6 +57,7 @@ SETTLED, FOLLOWED = 1e-15, 8  # defect where iterations end; places on the way f
 # of the smallest singular value of the closure at `start`, over its largest: less is near a dead
 # point
 REGULAR = 0.05
+ASTRAY = 0.1  # rad or m beside the tangent after a step: on another branch
 DRAWS = 20  # attempts to find states in which the loops close
 SX = Any  # casadi.SX
 
@@ -314,12 +315,18 @@ class Lagrange:
             x[...] = self._home
         first = x[..., actuated].copy()
         for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
-            x[..., actuated] = first + share * (wanted - first)
+            J = self._floats("loop_jacobian", x)
+            step = first + share * (wanted - first) - x[..., actuated]
+            along = -np.linalg.pinv(J[..., passive]) @ J[..., actuated] @ step[..., None]
+            x[..., actuated] += step
+            x[..., passive] += along[..., 0]
+            ahead = x.copy()
             x = newton(self._gap, x, passive, steps=NEWTON_STEPS, tolerance=SETTLED)
             if self._home is not None:
                 regular &= self._regularity(x, passive) > REGULAR * self._regularity(
                     self._home, passive
                 )
+                regular &= np.abs(x - ahead).max(axis=-1) < ASTRAY
         J = self._floats("loop_jacobian", x)
         inverse = np.linalg.pinv(J[..., passive])
         G[..., passive, :] = -inverse @ J[..., actuated]

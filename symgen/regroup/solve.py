@@ -38,7 +38,8 @@ from symgen.regroup.residues import drawn, sample, states_for
 
 MAX_UNKNOWNS = 500
 MAX_PRIMES = 24  # of 31 bits each: numerators and denominators of some 110 digits
-MAX_WORK = 4e8  # multiplications of one recognition, some seconds
+# multiplications: of one recognition, some seconds; of each coefficient beyond it
+MAX_WORK, FEW_WORK = 4e8, 1e7
 FREEDOMS = (
     ("numbers", "pi"),
     ("numbers",),
@@ -264,7 +265,7 @@ class Recognition:
         return next((n for n in POWERS if ratios == [pow(c, n, p) for c in SCALES]), 0)
 
     def _recognise(self, name: str, k: int, depends: Dependence) -> Expression | None:
-        matters = depends.free
+        matters, before = depends.free, self.work
         above, below = (
             tuple(_atom(v) for v, n in depends.powers.items() for _ in range(sign * n))
             for sign in (1, -1)
@@ -287,8 +288,11 @@ class Recognition:
             if len(P) + len(Q) + 4 > MAX_UNKNOWNS or (numerator and len(P) == 1):
                 continue
             self.work += (len(P) + len(Q)) ** 3
-            if self.work > MAX_WORK:
-                self.reasons[name] = "the search for a fraction of moderate degree took too long"
+            if self.work > MAX_WORK and self.work - before > FEW_WORK:
+                self.reasons[name] = (
+                    "the search for a fraction took too long; fewer symbols in the frame table "
+                    "shorten it"
+                )
                 return None
             vector = self.pools[0].vector(name, k, P, Q)
             if self.pools[0].beta[name] is None:
@@ -304,7 +308,7 @@ class Recognition:
                 )
                 return _fraction(entries, P, Q)
         self.reasons[name] = (
-            f"no fraction of degree up to {DEGREES[-1]} in "
+            f"no fraction of at most {MAX_UNKNOWNS} terms and degree {DEGREES[-1][0]} in "
             f"{_texts((*matters, *depends.powers)) or 'rational numbers'}"
         )
         return None

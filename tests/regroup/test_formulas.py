@@ -8,7 +8,8 @@ import pytest
 
 from symgen.description import Robot, load_robot
 from symgen.description.grammar import parse
-from symgen.regroup.regrouping import Regrouping, regroup
+from symgen.regroup import solve
+from symgen.regroup.regrouping import Regrouping, _regrouped, regroup
 
 # Chapter, eq. (27), all fifteen, as printed (d3 = D3); typed from the chapter, not from symgen.
 EQ27 = {
@@ -95,3 +96,13 @@ def test_seed_does_not_change_the_result() -> None:
     assert [b.formula for b in regroup(robot).base] == [
         b.formula for b in regroup(robot, seed=77).base
     ]
+
+
+def test_a_search_that_took_long_leaves_time_for_simple_coefficients(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Once the work of a robot was spent, every coefficient after it became a number."""
+    robot = load_robot("puma560")
+    expected = regroup(robot)
+    monkeypatch.setattr(solve, "MAX_WORK", 0)
+    assert _regrouped.__wrapped__(robot, 1) == expected

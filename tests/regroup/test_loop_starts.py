@@ -111,3 +111,29 @@ def test_what_closes_does_not_hang_on_the_states_beside_it() -> None:
     when drawn did not when looked at again, and a traceback ended the certificate.
     """
     assert certify(regroup(robot(THREE_LEGS))).valid
+
+
+RHOMBUS = """constants: {L1: 0.4, L3: 0.4, g: 9.81}
+frames:
+  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
+  2: {ant: 1, sigma: 0, mu: 0, alpha: 0, d: L1, theta: q2, r: 0}
+  3: {ant: 0, sigma: 0, mu: 0, alpha: 0, d: L1, theta: q3, r: 0}
+  4: {ant: 2, sigma: 0, mu: 0, alpha: 0, d: L3, theta: q4, r: 0}
+  5: {ant: 3, sigma: 2, alpha: 0, d: L3, theta: 0, r: 0}
+loops: [{cut: 4, twin: 5}]
+elements: {Ia: {kind: inertia, along: all}}
+"""
+
+
+def test_what_a_function_raises_is_told() -> None:
+    """Equal sides under two names fold flat: the regressor was off by "inf of the largest"."""
+    text = str(certify(regroup(robot(RHOMBUS))))
+    assert "inf of" not in text and "special: the rank is 3 there" in text
+    assert "regressor of strange.py ends in an error: the mechanism does not close" in text
+
+
+@pytest.mark.campaign
+def test_states_beyond_a_dead_point_are_no_witness() -> None:
+    """The oracle's Newton stepped over one: its states were those of another branch."""
+    larger = THREE_LEGS.replace("0.377", "0.4").replace("0.146", "0.15").replace("0.548", "0.6")
+    assert certify(regroup(robot(larger))).valid
