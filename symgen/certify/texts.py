@@ -131,11 +131,11 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     with TemporaryDirectory(prefix="symgen-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / file
         path.write_text(text, encoding="utf-8", newline="\n")
-        raised: dict[str, str] = {}
-        if target == "c":
-            errors = c_errors(path, text, str(compiler), witness)
-        else:
-            errors, raised = module_errors(path, target, witness)
+        errors, raised = (
+            (c_errors(path, text, str(compiler), witness), {})
+            if target == "c"
+            else module_errors(path, target, witness)
+        )
     left_out = tuple(sorted(witness.left_out))
     return TextCheck(target, key, errors, witness.drawn, left_out, raised=raised)
 

@@ -313,20 +313,18 @@ class Lagrange:
         wanted, regular = x[..., actuated].copy(), np.ones(x.shape[:-1], dtype=bool)
         if self._home is not None:
             x[...] = self._home
-        first = x[..., actuated].copy()
-        for share in np.arange(1, FOLLOWED + 1) / FOLLOWED if self._home is not None else (1.0,):
+        for left in range(1 if self._home is None else FOLLOWED, 0, -1):
             J = self._floats("loop_jacobian", x)
-            step = first + share * (wanted - first) - x[..., actuated]
+            step = (wanted - x[..., actuated]) / left
             along = -np.linalg.pinv(J[..., passive]) @ J[..., actuated] @ step[..., None]
             x[..., actuated] += step
             x[..., passive] += along[..., 0]
             ahead = x.copy()
             x = newton(self._gap, x, passive, steps=NEWTON_STEPS, tolerance=SETTLED)
             if self._home is not None:
-                regular &= self._regularity(x, passive) > REGULAR * self._regularity(
-                    self._home, passive
+                regular &= (np.abs(x - ahead).max(axis=-1) < ASTRAY) & (
+                    self._regularity(x, passive) > REGULAR * self._regularity(self._home, passive)
                 )
-                regular &= np.abs(x - ahead).max(axis=-1) < ASTRAY
         J = self._floats("loop_jacobian", x)
         inverse = np.linalg.pinv(J[..., passive])
         G[..., passive, :] = -inverse @ J[..., actuated]

@@ -289,10 +289,7 @@ class Recognition:
                 continue
             self.work += (len(P) + len(Q)) ** 3
             if self.work > MAX_WORK and self.work - before > FEW_WORK:
-                self.reasons[name] = (
-                    "the search for a fraction took too long; fewer symbols in the frame table "
-                    "shorten it"
-                )
+                self.reasons[name] = "the search took long; fewer symbols in the table shorten it"
                 return None
             vector = self.pools[0].vector(name, k, P, Q)
             if self.pools[0].beta[name] is None:
@@ -303,9 +300,8 @@ class Recognition:
                 if entries is None:
                     self.reasons[name] = "a coefficient is not rational in what may vary"
                     return None
-                self.reasons[name] = (
-                    "a denominator vanishes at the fixed angles"  # unless it does not
-                )
+                # unless it does not
+                self.reasons[name] = "a denominator vanishes at the fixed angles"
                 return _fraction(entries, P, Q)
         self.reasons[name] = (
             f"no fraction of at most {MAX_UNKNOWNS} terms and degree {DEGREES[-1][0]} in "
