@@ -6,21 +6,21 @@
     change at Delta
             mean of the least squares, over that of the record on the same rows, less 1
 
-The low-pass is linear: positions moved by the errors of the encoders are an ordinary run.
 The reader of counts leaves out rows in which dry friction has no certain direction. What that alone
-does to the estimate is no error of the encoder and is
-not in the change; `runtime.resolution.cestac`, which compares with all rows of the record, has
-both.
+does to the estimate is no error of the encoder and is not in the change;
+`runtime.resolution.cestac`, which compares with all rows of the record, has both.
 
 The mean over the random phase of law phase is a quadrature. Its nodes are equidistant, shuffled
 from encoder to encoder, so that the harmonics of the sawtooth cancel that are linear in the
-estimate; what is left is the bias. One reading of all encoders serves every choice S.
+estimate; what is left is the bias. Further nodes are as many again, in the middle between those
+before. One reading of all encoders serves every choice S, and the first phase read tells the errors
+of the counts and the knots of the motion for the others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -33,14 +33,14 @@ from runtime.records.missing import require_positions
 from runtime.resolution.advice import Sampled, sampled
 from runtime.resolution.perturbed import PreparedRecord, Task, prepared_record
 from runtime.resolution.rounding import Mode, counted, rounded, stream
-from runtime.resolution.run import moved_estimate
+from runtime.resolution.run import workspace
 from runtime.rows.observation import Observation, stack
 from runtime.rows.prepared import Prepared, observation_from_states
 from runtime.rows.selection import Selection, certain_rows
 from runtime.settings.study import Study
-from runtime.signals.counts.reading import read_counts
-from runtime.signals.filters import SpeedErrors, States
-from runtime.signals.states import encoder_drives, encoder_position, encoder_root, joint_states
+from runtime.signals.counts.reading import Starts, read_counts
+from runtime.signals.filters import SpeedErrors, States, filtered_states
+from runtime.signals.states import encoder_drives, encoder_position, encoder_root
 
 Array = np.ndarray
 
@@ -64,12 +64,15 @@ class Encoders:
         Of the joints, as measured.
     at_encoders : States
         The same at the encoders.
+    starts : mapping
+        By step and encoders, what the first phase told of the counts of the others.
     """
 
     record: PreparedRecord
     x: Array
     states: States
     at_encoders: States
+    starts: dict[tuple[float, ...], Starts] = field(default_factory=dict)
 
 
 class CoarseEncoders:
@@ -99,7 +102,8 @@ class CoarseEncoders:
         for own in records:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, drives)
-            states = replace(part.states or own.by(study).filtered, errors=None)
+            read = part.states or filtered_states(part.q, part.rate, part.selection.signals)
+            states = replace(read, errors=None)
             q = encoder_position(states.q, side)
             at_encoders = States(q, states.qd @ into, states.qdd @ into)
             x = encoder_position(own.record.q, side)
@@ -114,13 +118,10 @@ class CoarseEncoders:
             drives,
             dict(constants),
         )
-        self.reference = (
-            moved_estimate(self.task, [np.zeros_like(part.x) for part in self.parts])
-            if reader == "lowpass"
-            else self._solved(
-                [self._observed(part, part.states, part.record.selection) for part in self.parts]
-            )
-        )
+        self.exact = [
+            self._observed(part, part.states, part.record.selection) for part in self.parts
+        ]
+        self.reference = self._solved(self.exact)
 
     @property
     def coarsest(self) -> Array:
@@ -145,7 +146,7 @@ class CoarseEncoders:
         moving = [i for i, most in enumerate(self.coarsest) if np.isfinite(most)]
         if self.finest * (1 - 1e-9) <= delta <= self.coarsest.min():
             try:
-                return np.asarray(self.change(self.nodes(delta, moving), moving)[0])
+                return np.asarray(mean_change(self.ratios(self.nodes(delta, moving), moving))[0])
             except np.linalg.LinAlgError:  # a step that this reader does not resolve
                 pass
         return np.full(len(self.reference), np.nan)
@@ -172,25 +173,22 @@ class CoarseEncoders:
                 most[k] = max(most[k], float((weight @ passed).max()) / band)
         return most
 
-    def nodes(
-        self, delta: float, moving: Sequence[int], count: int | None = None
-    ) -> list[list[Array]]:
-        """Errors of every record at the nodes of the quadrature, the encoders `moving` coarse.
-        count : of nodes; default: PHASES.
+    def nodes(self, delta: float, moving: Sequence[int], read: int = 0) -> list[list[Array]]:
+        """Errors of every record at the first PHASES nodes of the quadrature, or at as many as have
+        been `read`, in the middle between those; the encoders `moving` coarse.
         """
-        count, seed, n = count or PHASES[self.reader], self.task.settings.seed, len(self.root)
-        order = np.array([stream(seed, QUADRATURE + i).permutation(count) for i in range(n)])
-        phases = delta * (order.T + stream(seed, QUADRATURE).random(n)) / count
-        return [self._counts(delta, own, moving, (QUADRATURE, k)) for k, own in enumerate(phases)]
+        few, seed, n = PHASES[self.reader], self.task.settings.seed, len(self.root)
+        count, first = read or few, stream(seed, QUADRATURE).random(n)
+        order = [stream(seed, QUADRATURE + i + n * read).permutation(count) for i in range(n)]
+        shift = (first * read / few + 0.5) % 1 if read else first
+        phases = delta * (np.transpose(order) + shift) / count
+        return [
+            self._counts(delta, own, moving, (QUADRATURE, read + k)) for k, own in enumerate(phases)
+        ]
 
-    def change(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
-        """Mean change of the estimate with these encoders coarse, and the deviation of that mean,
-        shape (2, b), %.
-        """
-        ratios = np.array([self._ratio(errors, encoders) for errors in nodes])
-        return 100 * np.array(
-            [ratios.mean(axis=0) - 1, ratios.std(axis=0, ddof=1) / np.sqrt(len(ratios))]
-        )
+    def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
+        """X with these encoders coarse over X without, at every node, shape (count, b)."""
+        return np.array([self._ratio(errors, encoders) for errors in nodes])
 
     def sampled(self, encoders: Sequence[int], delta: float, runs: int | None = None) -> Sampled:
         """CESTAC with these encoders coarse, eqs. (17), (18), (21). runs : default: as many as the
@@ -207,11 +205,13 @@ class CoarseEncoders:
         """Errors of every record by a law that rounds every sample; the streams of an encoder do
         not depend on which others are coarse.
         """
-        settings, errors = self.task.settings, [np.zeros_like(part.x) for part in self.parts]
+        settings, chosen, errors = self.task.settings, list(encoders), []
         for k, part in enumerate(self.parts):
-            for i in encoders:
-                x, rng = part.x[:, i], stream(settings.seed, k, run, i)
-                errors[k][:, i] = rounded(x, delta, settings.rounding, rng) - x
+            columns = [
+                rounded(part.x[:, i], delta, settings.rounding, stream(settings.seed, k, run, i))
+                for i in chosen
+            ]
+            errors.append(self._read(part, np.column_stack(columns), chosen, delta))
         return errors
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
@@ -222,10 +222,8 @@ class CoarseEncoders:
     def _counts(
         self, delta: float, phases: Array, encoders: Sequence[int], key: tuple[int, ...]
     ) -> list[Array]:
-        """Errors of every record whose encoders have steps of these phases, at the encoders: of
-        the positions, shape (N, n); of the reader of counts as read, shape (4, N, n), those of q,
-        qd, qdd and the deviation of qd. Zero where exact. key : of the stream of uneven lines,
-        which are those of the encoder in every record.
+        """Errors of every record whose encoders have steps of these phases. key : of the stream of
+        uneven lines, which are those of the encoder in every record.
         """
         settings, chosen, errors = self.task.settings, list(encoders), []
         for part in self.parts:
@@ -233,44 +231,46 @@ class CoarseEncoders:
             columns = [
                 counted(part.x[:, i], delta, phases[i], settings.uneven, rng) for i in chosen
             ]
-            y, rate, exact = np.column_stack(columns), part.record.rate, part.at_encoders
-            error = np.zeros((4, *part.x.shape))
-            if self.reader == "lowpass":
-                error[0][:, chosen] = y - part.x[:, chosen]
-                errors.append(error[0])
-                continue
-            motion, signals = read_counts(y, rate, delta).motion, part.record.selection.signals
-            read = joint_states(*motion, rate, signals, None)
-            assert read.errors is not None
-            error[0][:, chosen] = read.q - exact.q[:, chosen]
-            error[1][:, chosen] = read.qd - exact.qd[:, chosen]
-            error[2][:, chosen] = read.qdd - exact.qdd[:, chosen]
-            error[3][:, chosen] = read.errors.deviation
-            errors.append(error)
+            errors.append(self._read(part, np.column_stack(columns), chosen, delta))
+        return errors
+
+    def _read(self, part: Encoders, y: Array, encoders: list[int], delta: float) -> Array:
+        """Errors of q, qd, qdd as read from positions y, shape (N, number of `encoders`), and the
+        deviation of qd, at the encoders, shape (4, N, n). Zero where exact.
+        """
+        errors, rate = np.zeros((4, *part.x.shape)), part.record.rate
+        if self.reader == "counts":
+            key = (delta, *encoders)
+            reading = read_counts(y, rate, delta, starts=part.starts.get(key))
+            part.starts.setdefault(key, reading.starts)
+            y, errors[3][:, encoders] = reading.motion
+        read, exact = filtered_states(y, rate, part.record.selection.signals), part.at_encoders
+        for error, own, x in zip(
+            errors, (read.q, read.qd, read.qdd), (exact.q, exact.qd, exact.qdd), strict=False
+        ):
+            error[:, encoders] = own - x[:, encoders]
         return errors
 
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
         """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
-        if self.reader == "lowpass":
-            moved = [(error * chosen) @ self.root.T for error in errors]
-            return np.asarray(moved_estimate(self.task, moved) / self.reference)
-        coarse, exact, task = [], [], self.task
-        for part, error in zip(self.parts, errors, strict=True):
-            q, qd, qdd = (error[:3] * chosen) @ self.root.T
+        coarse, exact, every = [], [], True
+        for part, error, measured in zip(self.parts, errors, self.exact, strict=True):
+            q, qd, qdd = error[:3] @ (self.root.T * chosen[:, None])
             own, selection = part.states, part.record.selection
             states = States(own.q + q, own.qd + qd, own.qdd + qdd)
             known = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
             rows = known[selection.samples][selection.kept]
-            certain = certain_rows(task.model, rows, task.constants)
-            selection = replace(selection, mask=selection.mask & certain)
-            exact.append(self._observed(part, own, selection))
-            coarse.append(self._observed(part, states, selection))
-        return np.asarray(self._solved(coarse) / self._solved(exact))
+            certain = certain_rows(self.task.model, rows, self.task.constants)[selection.mask]
+            exact.append(measured.where(certain))
+            coarse.append(self._observed(part, states, selection).where(certain))
+            every &= bool(certain.all())
+        right = self.reference if every else self._solved(exact)
+        return np.asarray(self._solved(coarse) / right)
 
     def _observed(self, part: Encoders, states: States, selection: Selection) -> Observation:
         return observation_from_states(
-            self.task.model,
+            workspace(self.task)[0],
             states,
             part.record.torque,
             selection,
@@ -282,3 +282,11 @@ class CoarseEncoders:
     def _solved(self, rows: Sequence[Observation]) -> Array:
         whole = rows[0] if len(rows) == 1 else stack(rows)
         return linear_system(whole, self.task.estimate).solve().X
+
+
+def mean_change(ratios: Array) -> Array:
+    """Mean change of the estimate, of its ratios at nodes, shape (count, b), and the deviation of
+    that mean, as if the nodes were independent, shape (2, b), %.
+    """
+    deviation = ratios.std(axis=0, ddof=1) / np.sqrt(len(ratios))
+    return np.asarray(100 * np.array([ratios.mean(axis=0) - 1, deviation]))

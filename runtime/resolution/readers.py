@@ -3,13 +3,13 @@ estimate along steps of law phase, by both readers (`runtime.resolution.coarse_e
 
 White noise does not describe a sawtooth that is locked to the motion, still less what a reader of
 counts leaves of it, so no first-order law is used: the curve is a quadrature over the phase.
-Limits are where it crosses 1 % and 5 %; at the steps on either side the mean is taken over as many
-nodes as tell it to LIMIT.CURVE_SHARPNESS of the limit. Runs of random phase confirm the limits.
+Limits are where it crosses 1 % and 5 %; at the steps on either side the nodes are doubled until the
+means tell the limit to LIMIT.CURVE_SHARPNESS. Runs of random phase confirm the limits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise, product
 
@@ -26,7 +26,7 @@ from runtime.resolution.advice import (
     limits_of,
     step_text,
 )
-from runtime.resolution.coarse_encoders import PHASES, CoarseEncoders, Reader
+from runtime.resolution.coarse_encoders import CoarseEncoders, Reader, mean_change
 from runtime.resolution.result import deciding_names
 
 Array = np.ndarray
@@ -86,33 +86,33 @@ def curves(
     finest, coarsest = real.finest, real.coarsest
     start = min(max(start, finest), float(coarsest.min()))
 
-    def evaluate(k: float) -> dict[str, float]:
-        delta = start * LIMIT.READER_RATIO**k
-        coarse = [i for i, most in enumerate(coarsest) if delta <= most < np.inf]
-        asked = {
-            label: own
-            for label, own in selections.items()
-            if set(own) <= {*coarse, *np.flatnonzero(np.isinf(coarsest))}
-        }
-        if not asked or delta < finest * (1 - 1e-9) or not coarse:
-            return {}
-        try:
-            nodes = real.nodes(delta, coarse)
-        except np.linalg.LinAlgError:  # steps that this reader does not resolve
-            return {}
-        for label, own in asked.items():
-            if k not in known[label]:
-                known[label][k] = real.change(nodes, own)
-        return {
-            label: float(np.abs(known[label][k][0, decisive]).max(initial=0.0)) for label in asked
-        }
+    def changes(label: str) -> dict[float, Array]:
+        return {k: mean_change(ratios) for k, ratios in sorted(known[label].items())}
 
+    def worst(label: str, k: float) -> float:
+        return float(np.abs(mean_change(known[label][k])[0, decisive]).max(initial=0.0))
+
+    def read(k: float, labels: Iterable[str], nodes: int = 0) -> list[str]:
+        """Nodes at a step, the first or as many as there are; the labels that the step suits."""
+        delta = start * LIMIT.READER_RATIO**k
+        labels = [label for label in labels if (delta <= coarsest[[*selections[label]]]).all()]
+        moving = {i for label in labels for i in selections[label] if np.isfinite(coarsest[i])}
+        if delta < finest * (1 - 1e-9) or not moving:
+            return []
+        try:
+            errors = real.nodes(delta, sorted(moving), nodes)
+        except np.linalg.LinAlgError:  # steps that this reader does not resolve
+            return []
+        for label in labels:
+            ratios = real.ratios(errors, selections[label])
+            known[label][k] = np.concatenate([known[label][k], ratios]) if nodes else ratios
+        return labels
+
+    k: float
     for step, most, limit in ((-1, LIMIT.READER_DOWN, LIMITS[0]), (1, LIMIT.READER_UP, LIMITS[-1])):
         for k in range(0 if step < 0 else 1, most):
-            worst = evaluate(step * k)
-            if not worst or (
-                max(worst.values()) < limit if step < 0 else min(worst.values()) > limit
-            ):
+            e = [worst(label, step * k) for label in read(step * k, selections)]
+            if not e or (max(e) < limit if step < 0 else min(e) > limit):
                 break
     tried = sorted({k for own in known.values() for k in own})
     for a, b in pairwise(tried) if real.reader == "lowpass" else ():
@@ -120,80 +120,60 @@ def curves(
         share = real.locking(start * LIMIT.READER_RATIO**between)
         if share[1:-1].max() > LIMIT.LOCKED_POWER * max(share[0], share[-1]):
             for k in between[1:-1].tolist():
-                evaluate(k)
-    moving = {
-        label: [i for i in own if np.isfinite(coarsest[i])] for label, own in selections.items()
-    }
-    sharp = set[tuple[str, float]]()
-    while vague := vague_steps(real.reader, known, decisive, sharp):
-        for at, wanted in vague.items():
-            read = sorted({i for label in wanted for i in moving[label]})
-            nodes = real.nodes(start * LIMIT.READER_RATIO**at, read, max(wanted.values()))
-            for label, own in moving.items():
-                if at in known[label] and {*own} <= {*read}:
-                    known[label][at] = real.change(nodes, own)
-                    sharp.add((label, at))
-        for label, changes in known.items():  # a walk that ended where it is now below the limit
-            last = max(changes)
-            while (
-                last in vague
-                and np.abs(changes[last][0, decisive]).max() < LIMITS[-1]
-                and label in evaluate(last + 1)
-            ):
-                last = max(changes)
-    order = {label: sorted(own) for label, own in known.items()}
-    b = len(real.reference)
+                read(k, selections)
+    exhausted = set[tuple[str, float]]()  # steps at which no more nodes can be read
+    while True:
+        vague: dict[tuple[float, int], dict[str, None]] = {}
+        for label, limit in product(selections, LIMITS):
+            for k in vague_steps(changes(label), decisive, limit):
+                nodes = len(known[label][k])
+                if nodes < LIMIT.PHASES_TAKEN and (label, k) not in exhausted:
+                    vague.setdefault((k, nodes), {})[label] = None
+        if not vague:
+            break
+        for (k, nodes), labels in vague.items():
+            done = read(k, labels, nodes)
+            exhausted.update((label, k) for label in labels if label not in done)
+            for label, last in dict.fromkeys(done, k).items():  # a walk that ended below the limit
+                while (
+                    last == max(known[label])
+                    and worst(label, last) < LIMITS[-1]
+                    and read(last + 1, [label])
+                ):
+                    last += 1
+    by_label, b = {label: changes(label) for label in selections}, len(real.reference)
     return {
         label: (
-            start * LIMIT.READER_RATIO ** np.array(ks, dtype=float),
-            np.array([known[label][k] for k in ks]).reshape(len(ks), 2, b),
+            start * LIMIT.READER_RATIO ** np.array(list(own), dtype=float),
+            np.array(list(own.values())).reshape(len(own), 2, b),
         )
-        for label, ks in order.items()
+        for label, own in by_label.items()
     }
 
 
 def vague_steps(
-    reader: Reader,
-    known: Mapping[str, Mapping[float, Array]],
-    decisive: Sequence[int],
-    sharp: set[tuple[str, float]],
-) -> dict[float, dict[str, int]]:
-    """Steps beside a limit whose nodes tell the change of a choice of encoders too badly, by step
-    and label how many nodes would do; those in `sharp` have had theirs.
+    changes: Mapping[float, Array], decisive: Sequence[int], limit: float
+) -> list[float]:
+    """Of the two steps between which the first parameter crosses a limit, those whose deviation
+    moves the crossing by more than LIMIT.CURVE_SHARPNESS of it, by straight lines on logarithmic
+    axes; of the finest step, if it is above, one that is as uncertain.
+
+    changes : change and its deviation, shape (2, b), %, by exponent of the step, ascending.
     """
-    vague: dict[float, dict[str, int]] = {}
-    for label, limit in product(known, LIMITS):
-        for at, count in beside(reader, known[label], decisive, limit).items():
-            if (label, at) not in sharp:
-                own = vague.setdefault(at, {})
-                own[label] = max(count, own.get(label, 0))
-    return vague
-
-
-def beside(
-    reader: Reader, known: Mapping[float, Array], decisive: Sequence[int], limit: float
-) -> dict[float, int]:
-    """Of the two steps between which the first parameter crosses a limit, those whose nodes do not
-    tell its change to LIMIT.CURVE_SHARPNESS of it, and how many would.
-
-    known : change and its deviation, shape (2, b), %, by step.
-    """
-    steps = sorted(known)
-    over = [
-        j for j, k in enumerate(steps) if np.abs(known[k][0, decisive]).max(initial=0.0) >= limit
-    ]
+    steps, e = list(changes), [np.abs(change[0]) for change in changes.values()]
+    over = [j for j, own in enumerate(e) if own[decisive].max(initial=0.0) >= limit]
     if not over:
-        return {}
-    first = decisive[int(np.argmax(np.abs(known[steps[over[0]]][0, decisive])))]
-    share = {
-        k: known[k][1, first] / (LIMIT.CURVE_SHARPNESS * limit)
-        for k in steps[max(over[0] - 1, 0) : over[0] + 1]
-    }
-    return {
-        k: min(int(np.ceil(PHASES[reader] * x**2)), LIMIT.PHASES_TAKEN)
-        for k, x in share.items()
-        if x > 1
-    }
+        return []
+    pair = range(max(over[0] - 1, 0), over[0] + 1)
+    first = decisive[int(np.argmax(e[over[0]][decisive]))]
+    deviation = np.array([changes[steps[j]][1, first] for j in pair])
+    change = np.maximum([e[j][first] for j in pair], deviation)
+    moved = deviation / change * np.log(LIMIT.READER_RATIO)
+    if len(pair) > 1:  # d log(Delta)/d log(change), linear between the two
+        height = np.log(change / limit)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved *= np.abs(height[::-1]) / np.ptp(height) ** 2 * (steps[pair[1]] - steps[pair[0]])
+    return [steps[j] for j, x in zip(pair, moved, strict=True) if x > LIMIT.CURVE_SHARPNESS]
 
 
 def uncertain(

@@ -21,7 +21,7 @@ from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel
 from runtime.model.narrowing import narrowed
 from runtime.resolution.c.workspace import CompiledWorkspace
-from runtime.resolution.perturbed import Task, perturbed, system_of, with_deviation
+from runtime.resolution.perturbed import Task, perturbed, with_deviation
 from runtime.resolution.runs import Level, Run, Runs
 from runtime.rows.observation import Observation
 
@@ -48,18 +48,6 @@ def one_run(task: Task, key: tuple[int, int]) -> Run:
     X = _estimated(task, observation, level)
     norm = float(np.linalg.norm(observation.Y - observation.W @ X))
     return Run(*key, tuple(X.tolist()), norm)
-
-
-def moved_estimate(task: Task, errors: Sequence[Array]) -> Array:
-    """X, shape (b,), of linear least squares with the positions of every record moved by `errors`,
-    shape (N, n) each, torques as measured.
-    """
-    columns, in_c = workspace(task)
-    if in_c is not None:
-        return in_c.moved_fit(errors).X
-    positions = [record.q + error for record, error in zip(task.records, errors, strict=True)]
-    torques = [record.torque for record in task.records]
-    return _estimated(task, system_of(columns, task, positions, torques), Level(0.0))
 
 
 def _estimated(task: Task, observation: Observation, level: Level) -> Array:

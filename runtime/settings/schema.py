@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, fields
+from functools import cache
 from numbers import Integral
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
@@ -180,6 +181,12 @@ class Settings(metaclass=SettingsType):
         return value
 
 
+@cache
+def _adapter(cls: Any) -> TypeAdapter[Any]:
+    """What checks mappings against a class of settings."""
+    return TypeAdapter(cls)
+
+
 def structure(cls: type[T], value: Any, path: Path = ()) -> T:
     """The settings of a mapping.
 
@@ -198,7 +205,7 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
         For unknown keys, other types and values out of range, with the path of the key.
     """
     try:
-        return TypeAdapter(cls).validate_python(value)
+        return _adapter(cls).validate_python(value)  # type: ignore[arg-type, no-any-return]
     except ValidationError as e:
         raise settings_error(e, value, path) from None
 

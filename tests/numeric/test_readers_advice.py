@@ -13,7 +13,7 @@ from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
-from runtime.resolution.coarse_encoders import CoarseEncoders
+from runtime.resolution.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.resolution.readers import curves
 from runtime.rows.prepared import prepared
 from runtime.settings.study import CestacSettings, Rows, Study
@@ -47,7 +47,7 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     )
     alone = real.sampled((1,), STEP, 40)
     assert np.all(
-        np.abs(real.change(real.nodes(STEP, (0, 1)), (1,))[0] - alone.change)
+        np.abs(mean_change(real.ratios(real.nodes(STEP, (0, 1)), (1,)))[0] - alone.change)
         < 3 * alone.half_width / 2 + 0.2 * np.abs(alone.change) + 0.3
     )
 
@@ -151,25 +151,38 @@ class Scattered:
 
     reader, reference, finest, coarsest = "counts", np.ones(1), 0.1, np.array([1e3, np.inf])
 
-    def nodes(self, delta, moving, count=4):
+    def nodes(self, delta, moving, read=0):
         assert moving == [0]
-        return delta, count
+        return delta, read
 
-    def change(self, nodes, encoders):
-        delta, count = nodes
-        return np.array([[-delta - 1.6 / np.sqrt(count)], [1.6 / np.sqrt(count)]])
+    def ratios(self, nodes, encoders):
+        """The first 4 nodes, or as many as were read: so that all have this mean and deviation."""
+        delta, read = nodes
+        count = read or 4
+        total = np.sqrt(2 * read or 4)
+        mean = 1.6 * (total - np.sqrt(read)) / count
+        return 1 - (delta + mean + 1.6 * np.resize([[-1.0], [1.0]], (count, 1))) / 100
 
 
 def test_more_phases_at_the_steps_beside_a_limit():
     delta, change = curves(Scattered(), {"all": (0, 1)}, 1.0, [0])["all"]
     e, deviation = np.abs(change[:, 0, 0]), dict(zip(delta, change[:, 1, 0], strict=True))
-    assert (
-        deviation[1.5] == deviation[2.25] == 0.8
-        and max(deviation[delta[delta < 1].max()], deviation[1.0]) < 0.3
-    )
+    assert np.allclose([deviation[1.5], deviation[2.25]], 1.6 / np.sqrt(3))  # 4 nodes
+    assert deviation[delta[delta < 1].max()] < 0.3  # 32 of them, which is where 1 % is
     assert (
         0.6 < crossing(delta, e, 1.0) < 1 and 4.4 < crossing(delta, e, 5.0) < 5
     )  # 0.2 and 4.2 by the few
+
+
+def test_further_nodes_lie_in_the_middle_between_those_before():
+    real = CoarseEncoders(
+        planar, [prepared(planar, PART, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
+    )
+    real._counts = lambda delta, phases, moving, key: phases
+    few = PHASES["lowpass"]
+    phases = np.concatenate([real.nodes(2.0, (0, 1), read) for read in (0, few, 2 * few)])
+    apart = np.diff(np.sort(phases, axis=0), axis=0)
+    assert len(phases) == 4 * few and np.allclose(apart, 2.0 / len(phases))
 
 
 def test_a_record_that_is_coarse_itself_sets_the_finest_step():

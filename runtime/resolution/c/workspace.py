@@ -9,7 +9,6 @@ perturbed positions go in and decimated signals come out; room is reused from ru
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -81,17 +80,6 @@ class CompiledWorkspace:
             position, torque = stream_keys(draw, k)
             y = self._signals(record, self._states(record, measured, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
-        return solve(self.entries.factor(rows))
-
-    def moved_fit(self, errors: Sequence[Array]) -> Solution:
-        """The same with the positions of every record moved by `errors`, shape (N, n) each, torques
-        as measured.
-        """
-        rows = []
-        for (record, _, room), error in zip(self.records, errors, strict=True):
-            moved = self._positions(record, record.q + error, room)
-            states = kernels.FilteredStates(moved, record.rate, record.selection.signals, room)
-            rows.append((self._signals(record, states, room), record.torque, record.selection.mask))
         return solve(self.entries.factor(rows))
 
     def _positions(self, record: PreparedRecord, q: Array, room: kernels.Room) -> kernels.Positions:

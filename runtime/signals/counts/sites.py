@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -73,6 +73,19 @@ GAP = 10.0
 SPACING = 0.3
 
 
+class Start(NamedTuple):
+    """From where a motion is sought that was read before, at another phase of its encoder.
+
+    errors : of the counts.
+    m : samples from knot to knot.
+    density : of the jerk, its largest, steps^2/s^5.
+    """
+
+    errors: Errors
+    m: int
+    density: float
+
+
 @dataclass(frozen=True, eq=False)
 class Smoothed:
     """Posterior of one encoder, in steps, about `origin`.
@@ -90,6 +103,11 @@ class Smoothed:
         """Mean density of the jerk, steps^2/s^5."""
         return float(self.read.density.mean())
 
+    @property
+    def start(self) -> Start:
+        """From where the same motion is sought at another phase."""
+        return Start(self.read.errors, self.basis.m, float(self.read.density.max()))
+
     def state(self, order: int) -> tuple[Array, Array]:
         """Mean and deviation of the position, or of its derivative of that order, shape (N,)
         each.
@@ -105,11 +123,14 @@ class Smoothed:
         return np.asarray(drawn[: self.basis.N] + self.origin)
 
 
-def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed:
+def smoothed(
+    counts: Array, Ts: float, *, lines: Lines = "detected", start: Start | None = None
+) -> Smoothed:
     """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
 
     lines : whether errors of the lines are "detected", and bounds widened, or "estimated"; or their
     deviation in steps, less than which is not taken.
+    start : what the same motion told at another phase; default: all is sought.
 
     InputError where no motion goes with the counts.
     """
@@ -123,14 +144,16 @@ def smoothed(counts: Array, Ts: float, *, lines: Lines = "detected") -> Smoothed
     sizes: tuple[float, ...] = COUNT_ERRORS
     if not isinstance(lines, str):
         sizes = (max(lines, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > lines))
+    if start is not None and start.errors.count not in sizes:
+        start = None
     jumps = given.leaps()
     for leap in jumps:
         given = given.without(*leap)
-    boxes, read = given.read(sizes)
+    boxes, read = given.read(sizes, start)
     while len(jumps) < JUMPS and (jump := given.jump(boxes, read)):
         jumps.append(jump)
         given = given.without(*jump)
-        boxes, read = given.read(sizes)
+        boxes, read = given.read(sizes, start)
     said = [
         f"counts jump by {by} at {at * Ts:.4g} s, as if some were lost; taken out"
         for at, by in jumps
@@ -156,13 +179,14 @@ class Counts:
     rest: Array
     Ts: float
 
-    def read(self, sizes: Sequence[float]) -> tuple[Boxes, Posterior]:
+    def read(self, sizes: Sequence[float], start: Start | None = None) -> tuple[Boxes, Posterior]:
         """The motion between the bounds, with the errors of most evidence, or wider ones with which
-        it agrees with every count. Errors of a long record are those of its liveliest part, or
-        wider ones that make the whole more likely.
+        it agrees with every count. Errors of a long record are those of its liveliest part, those
+        of a motion read before are known, or they are wider ones that make the whole more likely.
         """
-        if len(self.y) > 4 * LIVELIEST:
-            boxes, read = self.first(self.liveliest().searched(sizes)[1].errors)
+        if start is not None or len(self.y) > 4 * LIVELIEST:
+            errors = start.errors if start else self.liveliest().searched(sizes)[1].errors
+            boxes, read = self.first(errors, start)
             if read.settled:
                 read = of_most_evidence(boxes, sizes, read, moves=[(1, 0)])
             if boxes.agrees(read):
@@ -207,17 +231,20 @@ class Counts:
             read = even if even.evidence > read.evidence - UNEVEN else read
         return boxes, read
 
-    def first(self, errors: Errors) -> tuple[Boxes, Posterior]:
+    def first(self, errors: Errors, start: Start | None = None) -> tuple[Boxes, Posterior]:
         """Bounds of counts with these errors, and the motion between them.
 
         Knots are as far apart as the motion allows that passes near the changes.
+        start : of a motion read before, whose knots these are.
         """
         N, least = len(self.y), max(1, round(KNOTS / self.Ts))
-        basis = Basis(N, least, self.Ts)
+        above = (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY
+        m, first = (start.m, start.density) if start else (least, above)
+        basis = Basis(N, m, self.Ts)
         tau, nu = self.from_changes(errors)
-        c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
+        c, density = _passed(basis, tau, nu, first)
         h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
-        if (m := max(1, round(h / self.Ts))) > least:
+        if start is None and (m := max(1, round(h / self.Ts))) > least:
             basis = Basis(N, m, self.Ts)
             c, density = _passed(basis, tau, nu, float(density.max()))
         sites = self.sites(density.mean())
