@@ -78,12 +78,12 @@ class Start(NamedTuple):
 
     errors : of the counts.
     m : samples from knot to knot.
-    density : of the jerk, its largest, steps^2/s^5.
+    density : of the jerk, steps^2/s^5, shape (M,).
     """
 
     errors: Errors
     m: int
-    density: float
+    density: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Smoothed:
     @property
     def start(self) -> Start:
         """From where the same motion is sought at another phase."""
-        return Start(self.read.errors, self.basis.m, float(self.read.density.max()))
+        return Start(self.read.errors, self.basis.m, self.read.density)
 
     def state(self, order: int) -> tuple[Array, Array]:
         """Mean and deviation of the position, or of its derivative of that order, shape (N,)
@@ -235,18 +235,20 @@ class Counts:
         """Bounds of counts with these errors, and the motion between them.
 
         Knots are as far apart as the motion allows that passes near the changes.
-        start : of a motion read before, whose knots these are.
+        start : of a motion read before, with whose knots and density of the jerk it begins.
         """
         N, least = len(self.y), max(1, round(KNOTS / self.Ts))
-        above = (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY
-        m, first = (start.m, start.density) if start else (least, above)
-        basis = Basis(N, m, self.Ts)
+        basis = Basis(N, start.m if start else least, self.Ts)
         tau, nu = self.from_changes(errors)
-        c, density = _passed(basis, tau, nu, first)
-        h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
-        if start is None and (m := max(1, round(h / self.Ts))) > least:
-            basis = Basis(N, m, self.Ts)
-            c, density = _passed(basis, tau, nu, float(density.max()))
+        if start:
+            density = start.density
+            c, _ = _through(basis, basis.filled(tau), basis.filled(nu), density, np.zeros(basis.P))
+        else:
+            c, density = _passed(basis, tau, nu, (np.ptp(self.y) + 1) ** 2 * FIRST_DENSITY)
+            h = np.clip(RESOLVED * density.max() ** -0.2, KNOTS, FARTHEST)
+            if (m := max(1, round(h / self.Ts))) > least:
+                basis = Basis(N, m, self.Ts)
+                c, density = _passed(basis, tau, nu, float(density.max()))
         sites = self.sites(density.mean())
         bounds = self.y[sites] - 0.5, self.y[sites] + 0.5
         y, rest = basis.filled(self.y), basis.filled(self.rest)
@@ -376,8 +378,16 @@ def _passed(basis: Basis, tau: Array, nu: Array, density: float) -> tuple[Array,
             break
     of_windows = np.repeat(density, basis.M)
     for _ in range(2):
-        factor = Factor.of(samples + basis.of_prior(of_windows))
-        for _ in range(2):
-            c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), of_windows, c))
+        c, factor = _through(basis, tau, nu, of_windows, c)
         of_windows = jerk_density(basis, c, factor.inverse(), of_windows)
     return c, of_windows
+
+
+def _through(basis: Basis, tau: Array, nu: Array, density: Array, c: Array) -> tuple[Array, Factor]:
+    """The spline through Gaussian sites, shape (m M,) each, corrected once, and the factor of its
+    precision; c : one near it.
+    """
+    factor = Factor.of(basis.precision(tau, density))
+    for _ in range(2):
+        c = c + factor.solve(basis.gradient(nu - tau * basis.at_samples(c), density, c))
+    return c, factor
