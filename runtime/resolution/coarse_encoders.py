@@ -261,10 +261,10 @@ class CoarseEncoders:
             states = States(own.q + q, own.qd + qd, own.qdd + qdd)
             known = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
             rows = known[selection.samples][selection.kept]
-            certain = certain_rows(self.task.model, rows, self.task.constants)[selection.mask]
-            exact.append(measured.where(certain))
-            coarse.append(self._observed(part, states, selection).where(certain))
-            every &= bool(certain.all())
+            certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
+            exact.append(measured.where(certain[selection.mask]))
+            coarse.append(self._observed(part, states, replace(selection, mask=certain)))
+            every &= np.array_equal(certain, selection.mask)
         right = self.reference if every else self._solved(exact)
         return np.asarray(self._solved(coarse) / right)
 

@@ -369,6 +369,29 @@ def test_uneven_lines_are_detected_and_estimated():
     assert not read_counts(counted(q, step), RATE, step).findings
 
 
+@pytest.mark.parametrize("lines", ["detected", "estimated", 0.2])
+@pytest.mark.parametrize("per_turn", [2000, 200])
+def test_another_phase_is_read_from_what_the_first_told(per_turn, lines):
+    """The same motion within a twentieth of its deviations, whatever is known of the lines; counts
+    that contradict what is given are read anew.
+    """
+    q, _, _ = moved()
+    step = 2 * np.pi / per_turn
+    starts = read_counts(counted(q, step), RATE, step, lines=lines).starts
+    assert [*starts] == [(0, 0), (0, 1)]
+    other = counted(q, step, seed=4)
+    reading = read_counts(other, RATE, step, lines=lines, starts=starts)
+    alone = read_counts(other, RATE, step, lines=lines)
+    for x, right, s in ((reading.q, alone.q, alone.s_q), (reading.qd, alone.qd, alone.s_qd)):
+        assert np.sqrt(np.mean(((x - right) / s) ** 2)) < 0.05
+    np.testing.assert_allclose(reading.s_qd.mean(axis=0), alone.s_qd.mean(axis=0), rtol=0.05)
+    uneven = other + step * np.random.default_rng(5).integers(-1, 2, other.shape)
+    if lines == "detected":
+        found = read_counts(uneven, RATE, step, starts=starts)
+        right = read_counts(uneven, RATE, step)
+        np.testing.assert_array_equal(found.q, right.q)
+
+
 @pytest.fixture(scope="module")
 def planar():
     return symgen.model("planar_2r")
