@@ -106,10 +106,10 @@ BUDGET = {
     },
     "runtime": {
         "": 964,
-        "settings": 1011,
+        "settings": 1013,
         "model": 966,
         "records": 2413,
-        "signals": 1642,
+        "signals": 1661,
         "rows": 1484,
         "estimators": 1585,
         "loop": 1660,

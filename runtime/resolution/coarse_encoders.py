@@ -254,19 +254,20 @@ class CoarseEncoders:
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
         """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
-        coarse, exact, every = [], [], True
-        for part, error, measured in zip(self.parts, errors, self.exact, strict=True):
+        coarse, left = [], []  # and the rows left in
+        for part, error in zip(self.parts, errors, strict=True):
             q, qd, qdd = error[:3] @ (self.root.T * chosen[:, None])
             own, selection = part.states, part.record.selection
             states = States(own.q + q, own.qd + qd, own.qdd + qdd)
             known = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
             rows = known[selection.samples][selection.kept]
             certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
-            exact.append(measured.where(certain[selection.mask]))
+            left.append(certain[selection.mask])
             coarse.append(self._observed(part, states, replace(selection, mask=certain)))
-            every &= np.array_equal(certain, selection.mask)
-        right = self.reference if every else self._solved(exact)
-        return np.asarray(self._solved(coarse) / right)
+        if all(rows.all() for rows in left):
+            return np.asarray(self._solved(coarse) / self.reference)
+        exact = [own.where(rows) for own, rows in zip(self.exact, left, strict=True)]
+        return np.asarray(self._solved(coarse) / self._solved(exact))
 
     def _observed(self, part: Encoders, states: States, selection: Selection) -> Observation:
         return observation_from_states(

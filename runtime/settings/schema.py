@@ -181,10 +181,7 @@ class Settings(metaclass=SettingsType):
         return value
 
 
-@cache
-def _adapter(cls: Any) -> TypeAdapter[Any]:
-    """What checks mappings against a class of settings."""
-    return TypeAdapter(cls)
+_adapter = cache(TypeAdapter)  # what checks mappings against a class of settings
 
 
 def structure(cls: type[T], value: Any, path: Path = ()) -> T:

@@ -47,7 +47,7 @@ def cestac(
 
     With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs
     contradict the prediction. Encoders are read as positions and as counts; with --reader by that
-    one alone, lowpass in a seventh of the time.
+    one alone, lowpass in a quarter of the time.
 
     A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same
     command goes on.

@@ -26,11 +26,11 @@ from runtime.signals.counts.lattice import (
     to_and_fro,
     unwrapped_counts,
 )
-from runtime.signals.counts.sites import Lines, Smoothed, Start, smoothed
+from runtime.signals.counts.sites import Lines, SearchStart, Smoothed, smoothed
 
 Array = np.ndarray
-Starts = Mapping[tuple[int, int], Start]
-"""By the first sample of a stretch, and the encoder, from 0."""
+# By the first sample of a stretch, and the encoder, from 0.
+Starts = Mapping[tuple[int, int], SearchStart]
 
 STRETCH, MARGIN = 65536, 4096
 # Error of a line where the motion shakes, steps: a change of the count then says as much as the
@@ -97,7 +97,7 @@ class Reading:
     def starts(self) -> Starts:
         """From where the same motion is sought at other phases of its encoders."""
         return {
-            (part.begin, j): each.start
+            (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
             for part in self.parts
             for j, each in zip(part.moving.tolist(), part.smoothed, strict=True)
         }
@@ -225,7 +225,7 @@ def read_stretch(
     rate: float,
     lines: Lines,
     rest: Array,
-    starts: Mapping[int, Start] | None = None,
+    starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
     """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
     steps, and where the state is unknown, (N, n) each.
@@ -260,7 +260,7 @@ def _moved(
     states: Sequence[Array],
     rate: float,
     lines: Lines,
-    starts: Mapping[int, Start],
+    starts: Mapping[int, SearchStart],
 ) -> Part:
     """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the
     states.

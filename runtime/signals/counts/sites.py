@@ -73,7 +73,7 @@ GAP = 10.0
 SPACING = 0.3
 
 
-class Start(NamedTuple):
+class SearchStart(NamedTuple):
     """From where a motion is sought that was read before, at another phase of its encoder.
 
     errors : of the counts.
@@ -103,11 +103,6 @@ class Smoothed:
         """Mean density of the jerk, steps^2/s^5."""
         return float(self.read.density.mean())
 
-    @property
-    def start(self) -> Start:
-        """From where the same motion is sought at another phase."""
-        return Start(self.read.errors, self.basis.m, self.read.density)
-
     def state(self, order: int) -> tuple[Array, Array]:
         """Mean and deviation of the position, or of its derivative of that order, shape (N,)
         each.
@@ -124,7 +119,7 @@ class Smoothed:
 
 
 def smoothed(
-    counts: Array, Ts: float, *, lines: Lines = "detected", start: Start | None = None
+    counts: Array, Ts: float, *, lines: Lines = "detected", start: SearchStart | None = None
 ) -> Smoothed:
     """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
 
@@ -144,8 +139,6 @@ def smoothed(
     sizes: tuple[float, ...] = COUNT_ERRORS
     if not isinstance(lines, str):
         sizes = (max(lines, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > lines))
-    if start is not None and start.errors.count not in sizes:
-        start = None
     jumps = given.leaps()
     for leap in jumps:
         given = given.without(*leap)
@@ -179,12 +172,15 @@ class Counts:
     rest: Array
     Ts: float
 
-    def read(self, sizes: Sequence[float], start: Start | None = None) -> tuple[Boxes, Posterior]:
+    def read(
+        self, sizes: Sequence[float], start: SearchStart | None = None
+    ) -> tuple[Boxes, Posterior]:
         """The motion between the bounds, with the errors of most evidence, or wider ones with which
         it agrees with every count. Errors of a long record are those of its liveliest part, those
         of a motion read before are known, or they are wider ones that make the whole more likely.
         """
-        if start is not None or len(self.y) > 4 * LIVELIEST:
+        start = start if start and start.errors.count in sizes else None
+        if start or len(self.y) > 4 * LIVELIEST:
             errors = start.errors if start else self.liveliest().searched(sizes)[1].errors
             boxes, read = self.first(errors, start)
             if read.settled:
@@ -231,7 +227,7 @@ class Counts:
             read = even if even.evidence > read.evidence - UNEVEN else read
         return boxes, read
 
-    def first(self, errors: Errors, start: Start | None = None) -> tuple[Boxes, Posterior]:
+    def first(self, errors: Errors, start: SearchStart | None = None) -> tuple[Boxes, Posterior]:
         """Bounds of counts with these errors, and the motion between them.
 
         Knots are as far apart as the motion allows that passes near the changes.
