@@ -27,16 +27,18 @@ import numpy as np
 
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
+from runtime.model.compiled import CompiledSignals
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.missing import require_positions
 from runtime.resolution.advice import Sampled, sampled
+from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.perturbed import PreparedRecord, Task, prepared_record
 from runtime.resolution.rounding import Mode, counted, rounded, stream
 from runtime.resolution.run import workspace
-from runtime.rows.observation import Observation, stack
+from runtime.rows.observation import stack
 from runtime.rows.prepared import Prepared, observation_from_states
-from runtime.rows.selection import Selection, certain_rows
+from runtime.rows.selection import certain_rows
 from runtime.settings.study import Study
 from runtime.signals.counts.reading import Starts, read_counts
 from runtime.signals.filters import SpeedErrors, States, filtered_states
@@ -118,9 +120,13 @@ class CoarseEncoders:
             drives,
             dict(constants),
         )
-        self.exact = [
-            self._observed(part, part.states, part.record.selection) for part in self.parts
-        ]
+        plain = self.task.estimate.method == "ols" and not self.task.estimate.options
+        self.in_c = (
+            CompiledWorkspace(self.task, model)
+            if plain and isinstance(model, CompiledSignals)
+            else None
+        )
+        self.exact = [(part.states, part.record.selection.mask) for part in self.parts]
         self.reference = self._solved(self.exact)
 
     @property
@@ -254,7 +260,7 @@ class CoarseEncoders:
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
         """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
-        coarse, left = [], []  # and the rows left in
+        coarse, exact = [], []
         for part, error in zip(self.parts, errors, strict=True):
             q, qd, qdd = error[:3] @ (self.root.T * chosen[:, None])
             own, selection = part.states, part.record.selection
@@ -262,25 +268,29 @@ class CoarseEncoders:
             known = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
             rows = known[selection.samples][selection.kept]
             certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
-            left.append(certain[selection.mask])
-            coarse.append(self._observed(part, states, replace(selection, mask=certain)))
-        if all(rows.all() for rows in left):
-            return np.asarray(self._solved(coarse) / self.reference)
-        exact = [own.where(rows) for own, rows in zip(self.exact, left, strict=True)]
-        return np.asarray(self._solved(coarse) / self._solved(exact))
+            coarse.append((states, certain))
+            exact.append((own, certain))
+        if not any(mask.any() for _, mask in exact):
+            raise np.linalg.LinAlgError("no direction of dry friction is certain")
+        same = all(np.array_equal(x[1], y[1]) for x, y in zip(self.exact, exact, strict=True))
+        return np.asarray(self._solved(coarse) / (self.reference if same else self._solved(exact)))
 
-    def _observed(self, part: Encoders, states: States, selection: Selection) -> Observation:
-        return observation_from_states(
-            workspace(self.task)[0],
-            states,
-            part.record.torque,
-            selection,
-            files=part.record.files,
-            columns=self.task.names,
-            constants=self.task.constants,
-        )
-
-    def _solved(self, rows: Sequence[Observation]) -> Array:
+    def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
+        """X of the states of every record in these rows, bool, shape (n, K), of theirs."""
+        if self.in_c is not None:
+            return self.in_c.fit_of(parts).X
+        rows = [
+            observation_from_states(
+                workspace(self.task)[0],
+                states,
+                record.torque,
+                replace(record.selection, mask=mask),
+                files=record.files,
+                columns=self.task.names,
+                constants=self.task.constants,
+            )
+            for (states, mask), record in zip(parts, self.task.records, strict=True)
+        ]
         whole = rows[0] if len(rows) == 1 else stack(rows)
         return linear_system(whole, self.task.estimate).solve().X
 

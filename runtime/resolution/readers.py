@@ -101,11 +101,11 @@ def curves(
             return []
         try:
             errors = real.nodes(delta, sorted(moving), nodes)
+            ratios = {label: real.ratios(errors, selections[label]) for label in labels}
         except np.linalg.LinAlgError:  # steps that this reader does not resolve
             return []
-        for label in labels:
-            ratios = real.ratios(errors, selections[label])
-            known[label][k] = np.concatenate([known[label][k], ratios]) if nodes else ratios
+        for label, own in ratios.items():
+            known[label][k] = np.concatenate([known[label][k], own]) if nodes else own
         return labels
 
     k: float

@@ -54,6 +54,7 @@ def cestac(
     """
     with session.results_in(output) as results:
         import runtime
+        from runtime.limits import LIMIT
         from runtime.records.reading import read_records
         from runtime.resolution.checkpoint import Checkpoint
         from runtime.resolution.coarse_encoders import READERS
@@ -80,6 +81,8 @@ def cestac(
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = read_records(study.record, model, missing=study.signals.admits_missing)
+        if advise and sum(map(len, records)) >= LIMIT.LONG_RECORD:
+            model = session.model_of_runs(model, robot, exact=exact)
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:

@@ -36,6 +36,7 @@ from runtime.rows.factor import Factor, JointFactor
 from runtime.settings.study import Decimate, Lowpass
 from runtime.settings.study import Signals as SignalSettings
 from runtime.signals.filters import (
+    States,
     butterworth,
     decimation_plan,
     median_filtered,
@@ -199,10 +200,14 @@ class Positions:
     def __init__(self, q: Array, window: int, room: Room) -> None:
         self.N, self.n = q.shape
         self.lanes = room.array("given", -(-self.n // LANES), self.N, LANES)
-        self.lanes[-1] = 0
-        median = median_filtered(q, window)
-        for j, group in zip(range(0, self.n, LANES), self.lanes, strict=True):
-            group[:, : self.n - j] = median[:, j : j + LANES]
+        side_by_side(median_filtered(q, window), self.lanes)
+
+
+def side_by_side(x: Array, lanes: Array) -> None:
+    """Columns of x, shape (N, n), into groups of LANES, shape (groups, N, LANES)."""
+    lanes[-1] = 0
+    for j, group in zip(range(0, x.shape[1], LANES), lanes, strict=True):
+        group[:, : x.shape[1] - j] = x[:, j : j + LANES]
 
 
 class FilteredStates:
@@ -265,6 +270,19 @@ class FilteredStates:
             ctypes.c_int64(m),
         )
         return states
+
+
+class GivenStates(FilteredStates):
+    """q, qd, qdd as they are, shape (N, n) each, as C keeps them, in `room`."""
+
+    def __init__(self, states: States, room: Room) -> None:
+        self.N, self.n = states.q.shape
+        self.lanes = room.array("lanes", 3, -(-self.n // LANES), self.N, LANES)
+        for x, lanes in zip((states.q, states.qd, states.qdd), self.lanes, strict=True):
+            side_by_side(x, lanes)
+        none = LowpassStructure(0, 0, None, None)
+        pointers = None, None, *map(address, self.lanes)
+        self.structure = StatesStructure(self.N, self.n, 0, 0, 0.0, 0.0, none, none, *pointers)
 
 
 class SignalEntries:

@@ -9,6 +9,7 @@ perturbed positions go in and decimated signals come out; room is reused from ru
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from runtime.resolution.perturbed import (
 )
 from runtime.resolution.rounding import packed_bits, stream
 from runtime.resolution.runs import Level
+from runtime.signals.filters import States
 
 Array = np.ndarray
 
@@ -80,6 +82,16 @@ class CompiledWorkspace:
             position, torque = stream_keys(draw, k)
             y = self._signals(record, self._states(record, measured, level, position, room), room)
             rows.append((y, torque_rows(self.task, record, level, torque), record.selection.mask))
+        return solve(self.entries.factor(rows))
+
+    def fit_of(self, parts: Sequence[tuple[States, Array]]) -> Solution:
+        """The same of the states of every record, shape (N, n) each, in these rows, bool, shape
+        (n, K), torques as measured.
+        """
+        rows = []
+        for (record, _, room), (states, mask) in zip(self.records, parts, strict=True):
+            y = self._signals(record, kernels.GivenStates(states, room), room)
+            rows.append((y, record.torque, mask))
         return solve(self.entries.factor(rows))
 
     def _positions(self, record: PreparedRecord, q: Array, room: kernels.Room) -> kernels.Positions:
