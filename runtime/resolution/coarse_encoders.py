@@ -35,7 +35,7 @@ from runtime.resolution.advice import Sampled, sampled
 from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.perturbed import PreparedRecord, Task, prepared_record
 from runtime.resolution.rounding import Mode, counted, rounded, stream
-from runtime.resolution.run import workspace
+from runtime.resolution.run import plain, workspace
 from runtime.rows.observation import stack
 from runtime.rows.prepared import Prepared, observation_from_states
 from runtime.rows.selection import certain_rows
@@ -120,10 +120,9 @@ class CoarseEncoders:
             drives,
             dict(constants),
         )
-        plain = self.task.estimate.method == "ols" and not self.task.estimate.options
         self.in_c = (
             CompiledWorkspace(self.task, model)
-            if plain and isinstance(model, CompiledSignals)
+            if isinstance(model, CompiledSignals) and plain(self.task)
             else None
         )
         self.exact = [(part.states, part.record.selection.mask) for part in self.parts]
@@ -186,10 +185,10 @@ class CoarseEncoders:
         few, seed, n = PHASES[self.reader], self.task.settings.seed, len(self.root)
         count, first = read or few, stream(seed, QUADRATURE).random(n)
         order = [stream(seed, QUADRATURE + i + n * read).permutation(count) for i in range(n)]
-        shift = (first * read / few + 0.5) % 1 if read else first
-        phases = delta * (np.transpose(order) + shift) / count
+        phases = (np.transpose(order) + ((first * read / few + 0.5) % 1 if read else first)) / count
         return [
-            self._counts(delta, own, moving, (QUADRATURE, read + k)) for k, own in enumerate(phases)
+            self._counts(delta, delta * own, moving, (QUADRATURE, read + k))
+            for k, own in enumerate(phases)
         ]
 
     def ratios(self, nodes: Sequence[Sequence[Array]], encoders: Sequence[int]) -> Array:
@@ -211,14 +210,12 @@ class CoarseEncoders:
         """Errors of every record by a law that rounds every sample; the streams of an encoder do
         not depend on which others are coarse.
         """
-        settings, chosen, errors = self.task.settings, list(encoders), []
-        for k, part in enumerate(self.parts):
-            columns = [
-                rounded(part.x[:, i], delta, settings.rounding, stream(settings.seed, k, run, i))
-                for i in chosen
-            ]
-            errors.append(self._read(part, np.column_stack(columns), chosen, delta))
-        return errors
+        seed, law = self.task.settings.seed, self.task.settings.rounding
+        drawn = [
+            [rounded(part.x[:, i], delta, law, stream(seed, k, run, i)) for i in encoders]
+            for k, part in enumerate(self.parts)
+        ]
+        return self._read(drawn, encoders, delta)
 
     def _counted_at_random(self, delta: float, encoders: Sequence[int], run: int) -> list[Array]:
         """Errors of every record by law phase."""
@@ -231,31 +228,35 @@ class CoarseEncoders:
         """Errors of every record whose encoders have steps of these phases. key : of the stream of
         uneven lines, which are those of the encoder in every record.
         """
-        settings, chosen, errors = self.task.settings, list(encoders), []
-        for part in self.parts:
-            rng = stream(settings.seed, *key)
-            columns = [
-                counted(part.x[:, i], delta, phases[i], settings.uneven, rng) for i in chosen
-            ]
-            errors.append(self._read(part, np.column_stack(columns), chosen, delta))
-        return errors
+        seed, uneven = self.task.settings.seed, self.task.settings.uneven
+        drawn = [
+            [counted(part.x[:, i], delta, phases[i], uneven, rng) for i in encoders]
+            for part, rng in ((part, stream(seed, *key)) for part in self.parts)
+        ]
+        return self._read(drawn, encoders, delta)
 
-    def _read(self, part: Encoders, y: Array, encoders: list[int], delta: float) -> Array:
-        """Errors of q, qd, qdd as read from positions y, shape (N, number of `encoders`), and the
-        deviation of qd, at the encoders, shape (4, N, n). Zero where exact.
+    def _read(
+        self, drawn: Sequence[Sequence[Array]], encoders: Sequence[int], delta: float
+    ) -> list[Array]:
+        """Errors of q, qd, qdd as read from `drawn` positions, shape (N,) of each of the encoders
+        in every record, and the deviation of qd, at the encoders, shape (4, N, n). Zero where
+        exact.
         """
-        errors, rate = np.zeros((4, *part.x.shape)), part.record.rate
-        if self.reader == "counts":
-            key = (delta, *encoders)
-            reading = read_counts(y, rate, delta, starts=part.starts.get(key))
-            part.starts.setdefault(key, reading.starts)
-            y, errors[3][:, encoders] = reading.motion
-        read, exact = filtered_states(y, rate, part.record.selection.signals), part.at_encoders
-        for error, own, x in zip(
-            errors, (read.q, read.qd, read.qdd), (exact.q, exact.qd, exact.qdd), strict=False
-        ):
-            error[:, encoders] = own - x[:, encoders]
-        return errors
+        of_records, key, chosen = [], (delta, *encoders), list(encoders)
+        for part, columns in zip(self.parts, drawn, strict=True):
+            y, errors = np.column_stack(columns), np.zeros((4, *part.x.shape))
+            if self.reader == "counts":
+                reading = read_counts(y, part.record.rate, delta, starts=part.starts.get(key))
+                part.starts.setdefault(key, reading.starts)
+                y, errors[3][:, chosen] = reading.motion
+            read = filtered_states(y, part.record.rate, part.record.selection.signals)
+            errors[:3][..., chosen] = [
+                read.q - part.at_encoders.q[:, chosen],
+                read.qd - part.at_encoders.qd[:, chosen],
+                read.qdd - part.at_encoders.qdd[:, chosen],
+            ]
+            of_records.append(errors)
+        return of_records
 
     def _ratio(self, errors: Sequence[Array], encoders: Sequence[int]) -> Array:
         """X with the errors of some encoders over X without, on the same rows, shape (b,)."""
@@ -265,15 +266,15 @@ class CoarseEncoders:
             q, qd, qdd = error[:3] @ (self.root.T * chosen[:, None])
             own, selection = part.states, part.record.selection
             states = States(own.q + q, own.qd + qd, own.qdd + qdd)
-            known = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
-            rows = known[selection.samples][selection.kept]
+            speeds = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
+            rows = speeds[selection.samples][selection.kept]
             certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
             coarse.append((states, certain))
             exact.append((own, certain))
         if not any(mask.any() for _, mask in exact):
             raise np.linalg.LinAlgError("no direction of dry friction is certain")
-        same = all(np.array_equal(x[1], y[1]) for x, y in zip(self.exact, exact, strict=True))
-        return np.asarray(self._solved(coarse) / (self.reference if same else self._solved(exact)))
+        every = all(np.array_equal(x[1], y[1]) for x, y in zip(self.exact, exact, strict=True))
+        return np.asarray(self._solved(coarse) / (self.reference if every else self._solved(exact)))
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
         """X of the states of every record in these rows, bool, shape (n, K), of theirs."""

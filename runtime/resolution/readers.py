@@ -108,10 +108,9 @@ def curves(
             known[label][k] = np.concatenate([known[label][k], own]) if nodes else own
         return labels
 
-    k: float
     for step, most, limit in ((-1, LIMIT.READER_DOWN, LIMITS[0]), (1, LIMIT.READER_UP, LIMITS[-1])):
-        for k in range(0 if step < 0 else 1, most):
-            e = [worst(label, step * k) for label in read(step * k, selections)]
+        for i in range(0 if step < 0 else 1, most):
+            e = [worst(label, step * i) for label in read(step * i, selections)]
             if not e or (max(e) < limit if step < 0 else min(e) > limit):
                 break
     tried = sorted({k for own in known.values() for k in own})

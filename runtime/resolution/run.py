@@ -74,16 +74,22 @@ def workspace(task: Task) -> tuple[GeneratedModel, CompiledWorkspace | None]:
     if getattr(_of_thread, "task", None) is not task:
         model = task.model
         lowpass = all(record.selection.signals.reader == "lowpass" for record in task.records)
-        plain = task.estimate.method == "ols" and not task.estimate.options and task.loop is None
-        room = None
-        if lowpass and plain and isinstance(model, CompiledSignals):
-            room = CompiledWorkspace(task, model)
+        room = (
+            CompiledWorkspace(task, model)
+            if isinstance(model, CompiledSignals) and lowpass and plain(task)
+            else None
+        )
         numbers = [model.BASE_PARAMETERS.index(name) for name in task.names]
         entries = {(k, j) for k in numbers for j in np.flatnonzero(model.STRUCTURE[k]).tolist()}
         _of_thread.work = narrowed(model, entries), room
         _of_thread.task = task
     work: tuple[GeneratedModel, CompiledWorkspace | None] = _of_thread.work
     return work
+
+
+def plain(task: Task) -> bool:
+    """Whether its estimates are ordinary least squares, as the workspace in C makes them."""
+    return task.estimate.method == "ols" and not task.estimate.options and task.loop is None
 
 
 def forget() -> None:

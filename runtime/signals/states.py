@@ -74,9 +74,9 @@ def observed_states(
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(q, drives, missing)
     if counts is not None:
-        return joint_states(*counts.read(position), rate, signals, drives)
+        return _joint_states(*counts.read(position), rate, signals, drives)
     reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
-    states = joint_states(*reading.motion, rate, signals, drives)
+    states = _joint_states(*reading.motion, rate, signals, drives)
     return replace(states, findings=sentences(reading.findings, name))
 
 
@@ -108,7 +108,7 @@ def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:
     return tuple(f"{name}: {text}." for text in findings)
 
 
-def joint_states(
+def _joint_states(
     x: Array, deviation: Array, rate: float, signals: Signals, drives: Drives | None
 ) -> States:
     """States of positions x read at the encoders, shape (N, n), joint side, through the filters of

@@ -47,14 +47,13 @@ def cestac(
 
     With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs
     contradict the prediction. Encoders are read as positions and as counts; with --reader by that
-    one alone, lowpass in a quarter of the time.
+    one alone, lowpass in a sixth of the time.
 
     A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same
     command goes on.
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.limits import LIMIT
         from runtime.records.reading import read_records
         from runtime.resolution.checkpoint import Checkpoint
         from runtime.resolution.coarse_encoders import READERS
@@ -81,8 +80,11 @@ def cestac(
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = read_records(study.record, model, missing=study.signals.admits_missing)
-        if advise and sum(map(len, records)) >= LIMIT.LONG_RECORD:
-            model = session.model_of_runs(model, robot, exact=exact)
+        model = (
+            session.model_of_runs(model, robot, exact=exact)
+            if advise and sum(map(len, records)) >= runtime.limits.LIMIT.LONG_RECORD
+            else model
+        )
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:
@@ -111,6 +113,7 @@ def cestac(
             runtime.report(result, results, study=study)
         if checkpoint is not None and isinstance(result, runtime.Cestac) and result.lists_runs:
             checkpoint.remove()
-        text = result.to_json() if json else f"{result.to_table()}\n\n{said}"
-        session.show(text, results, json=json)
+        session.show(
+            result.to_json() if json else f"{result.to_table()}\n\n{said}", results, json=json
+        )
     session.end(good=good)

@@ -280,9 +280,8 @@ class GivenStates(FilteredStates):
         self.lanes = room.array("lanes", 3, -(-self.n // LANES), self.N, LANES)
         for x, lanes in zip((states.q, states.qd, states.qdd), self.lanes, strict=True):
             side_by_side(x, lanes)
-        none = LowpassStructure(0, 0, None, None)
-        pointers = None, None, *map(address, self.lanes)
-        self.structure = StatesStructure(self.N, self.n, 0, 0, 0.0, 0.0, none, none, *pointers)
+        q, qd, qdd = map(address, self.lanes)
+        self.structure = StatesStructure(self.N, self.n, q=q, qd=qd, qdd=qdd)  # without padding
 
 
 class SignalEntries:

@@ -181,8 +181,9 @@ class Counts:
         """
         start = start if start and start.errors.count in sizes else None
         if start or len(self.y) > 4 * LIVELIEST:
-            errors = start.errors if start else self.liveliest().searched(sizes)[1].errors
-            boxes, read = self.first(errors, start)
+            boxes, read = self.first(
+                start.errors if start else self.liveliest().searched(sizes)[1].errors, start
+            )
             if read.settled:
                 read = of_most_evidence(boxes, sizes, read, moves=[(1, 0)])
             if boxes.agrees(read):
