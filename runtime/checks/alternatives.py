@@ -56,8 +56,8 @@ class Alternative:
         Factor on the sampling rate.
     known_factor : float or ndarray, shape (n,)
         Factor s on the known torques.
-    spring : ndarray, shape (n, 4), or 0
-        a, b, c, d of a torque that each joint has by its position, or always.
+    unmodelled : ndarray, shape (n, 5), or 0
+        Factors of `unmodelled_torques` for each joint, N m or N.
     share : ndarray, shape (K,), or 1
         w at every sample.
     constants : mapping of str to float
@@ -74,7 +74,7 @@ class Alternative:
     T: Array
     rate: float = 1.0
     known_factor: Array | float = 1.0
-    spring: Array | float = 0.0
+    unmodelled: Array | float = 0.0
     share: Array | float = 1.0
     constants: Mapping[str, float] = field(default_factory=dict)
     of: str = ""
@@ -107,9 +107,9 @@ class Alternative:
 
     def subtracted(self, samples: Samples) -> Array:
         """Torques known beside the model, shape (K, n)."""
-        by_position = (self.spring * springs(samples.q)).sum(axis=2)
-        by_position = by_position * np.reshape(self.share, (-1, 1))
-        return np.asarray(self.known_factor * samples.tau_known + by_position)
+        unmodelled = (self.unmodelled * unmodelled_torques(samples)).sum(axis=2)
+        unmodelled = unmodelled * np.reshape(self.share, (-1, 1))
+        return np.asarray(self.known_factor * samples.tau_known + unmodelled)
 
     @property
     def on_data(self) -> bool:
@@ -117,11 +117,14 @@ class Alternative:
         return not self.constants
 
 
-def springs(q: Array) -> Array:
-    """q, sin q and cos q of every joint: what springs and counterbalances do, and 1, shape
-    (K, n, 4).
+def unmodelled_torques(samples: Samples) -> Array:
+    """What the model may lack, shape (K, n, 5): q, sin q and cos q of every joint, as springs and
+    counterbalances, 1, and sign(qd) exp(-(qd/v)^2), dry friction at low speed, v the share
+    LIMIT.SLOW of the largest speed.
     """
-    return np.stack([q, np.sin(q), np.cos(q), np.ones_like(q)], axis=2)
+    q, qd = samples.q, samples.qd
+    slow = np.exp(-((qd / np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)) ** 2))
+    return np.stack([q, np.sin(q), np.cos(q), np.ones_like(q), np.sign(qd) * slow], axis=2)
 
 
 def unchanged(n: int, **changed: Any) -> Alternative:

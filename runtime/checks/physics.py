@@ -273,7 +273,9 @@ def direction(case: Case, named: Sequence[Trial]) -> Answer | None:
     f"no single change explains it decisively better ({LIMIT.DECISIVE:g} nats)",
 )
 def better(case: Case, named: Sequence[Trial]) -> Answer:
-    """The alternatives that explain the record decisively better."""
+    """The alternatives that explain the record decisively better; friction that the model lacks is
+    no slip, whatever else explains a part of it.
+    """
     if not named:
         return Answer(
             "good",
@@ -283,8 +285,11 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     before, after = case.problem.given.errors, named[0].fit.errors
     j = int(np.argmax(before / np.maximum(after, 0.3)))
     cause, *others = (t.alternative.cause for t in named)
-    text = f"No: {cause}" + (f" (or: {'; '.join(others)})" if others else "")
+    friction = named[0].alternative.kind == "friction"
+    text = f"{'Friction alone' if friction else 'No'}: {cause}" + (
+        f" (or: {'; '.join(others)})" if others else ""
+    )
     text += _from_to(f"the error of joint {case.labels[j]} goes", before[j], after[j]) or (
         "; the errors stay, the parameters come nearer to the values of the robot file"
     )
-    return Answer("no", text, named[0].alternative.remedy)
+    return Answer("good" if friction else "no", text, named[0].alternative.remedy)

@@ -213,7 +213,8 @@ def plausibility(
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
     named = [t for t in decisive(trials, case.problem) if explained(case, t) > late_gain(case)]
-    if named and (moved := answers[change]) is not None:  # what a wrong study does to both parts
+    wrong = [t for t in named if named[0].alternative.kind != "friction"]
+    if wrong and (moved := answers[change]) is not None:  # what a wrong study does to both parts
         checks[checks.index(moved)] = replace(moved, state="open")
     asked = EXPLAINED if trials else EXPLAINED[:-1]
     checks += [found for check in asked if (found := check(case, named)) is not None]
@@ -221,7 +222,7 @@ def plausibility(
     return Plausibility(
         tuple(checks),
         tuple(t for t in trials if t.fit is not None)[:10],
-        tuple(named),
+        tuple(wrong),
         tuple(hidden),
         case.late,
         case.gravity,
@@ -275,8 +276,8 @@ def _ranked(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
     known = problem.samples.tau_known.any(axis=0)
 
     def price(trial: Trial) -> float:
-        kind, spring = trial.alternative.kind, trial.alternative.spring
-        if np.ndim(trial.alternative.share) or (known * np.transpose(spring)).any():
+        kind, unmodelled = trial.alternative.kind, trial.alternative.unmodelled
+        if np.ndim(trial.alternative.share) or (known * np.transpose(unmodelled)).any():
             return float(LIMIT.VARYING_GAIN)
         nearer = (
             kind == "spring"
