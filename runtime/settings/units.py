@@ -35,6 +35,12 @@ TABLE: dict[str, Unit] = {
     "N*m": ("torque", 1.0),
     "Nm": ("torque", 1.0),  # pint reads a number metre
     "mNm": ("torque", 1e-3),
+    "kN*m": ("torque", 1e3),
+    "N*mm": ("torque", 1e-3),
+    "N*cm": ("torque", 1e-2),
+    "kgf*cm": ("torque", 0.0980665),
+    "lbf*inch": ("torque", 0.1129848290276167),
+    "ozf*inch": ("torque", 0.0070615518142260435),
     "N": ("force", 1.0),
     "A": ("current", 1.0),
     "V": ("voltage", 1.0),
