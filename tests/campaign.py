@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+some = pytest.mark.some
+"""`@some(count)`: so many cases of a parametrized test, drawn with a fixed seed, run by default."""
 FULL = os.environ.get("SYMGEN_FULL") == "1"
 campaign = pytest.mark.campaign
 

@@ -7,6 +7,7 @@ skipped, or fails where they are required.
 
 import gc
 import os
+import random
 from hashlib import sha256
 
 os.environ.setdefault(
@@ -16,6 +17,7 @@ os.environ.setdefault(
 from pathlib import Path
 
 import pytest
+from campaign import campaign
 from hypothesis import settings
 
 from runtime.errors import DataUnavailableError
@@ -67,6 +69,20 @@ def tx40_data():
     """Paths of the TX40 files by name; `fetch` finds them too."""
     with pytest.MonkeyPatch.context() as patch:
         yield _provide("tx40", patch)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of tests marked `some(count)` the other cases are a campaign."""
+    cases = {}
+    for item in items:
+        if item.get_closest_marker("some") and not item.get_closest_marker("campaign"):
+            cases.setdefault((item.path, item.originalname), []).append(item)
+    for listed in cases.values():
+        (count,) = listed[0].get_closest_marker("some").args
+        rest = len(listed) - count
+        for item in random.Random(0).sample(sorted(listed, key=lambda i: i.nodeid), max(rest, 0)):
+            item.add_marker(campaign)
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 
 from oracles.random_robots import describe_mix, random_robot
 from oracles.same_draw import same_draw
@@ -22,6 +22,7 @@ RANDOM = range(250)
 
 
 @pytest.mark.parametrize("name", packaged_robots())
+@some(6)
 def test_packaged_robots_are_certified(name: str) -> None:
     certificate = certify_formulas(regroup(load_robot(name)))
     assert certificate.valid, certificate.failures

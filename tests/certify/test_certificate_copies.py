@@ -6,6 +6,7 @@ import copy
 import pickle
 
 import pytest
+from campaign import some
 
 from symgen.certify.modules import certify
 from symgen.description import load_robot
@@ -17,6 +18,7 @@ COPIES = (copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x)))  # 
 
 @pytest.mark.parametrize("copied", COPIES)
 @pytest.mark.parametrize("name", ["tx40", "sr400", "four_bar"])
+@some(3)
 def test_what_is_derived_is_what_its_copy_is(name: str, copied) -> None:
     robot = load_robot(name)
     regrouping = regroup(robot)

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 from typer.testing import CliRunner
 
 from symgen.cli.main import app
@@ -47,6 +47,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@some(2)
 def test_a_claim_is_verified(name: str, folder: Path) -> None:
     claim = json.loads(claimed(name, folder))
     code, text = verdict(claim, folder)
@@ -116,6 +117,7 @@ FALSE = (
 
 @pytest.mark.parametrize("falsify", FALSE)
 @pytest.mark.parametrize("name", sampled(ROBOTS, 0, always=("tx40",)))
+@some(3)
 def test_a_false_claim_is_refused(name: str, falsify, folder: Path) -> None:
     claim = copy.deepcopy(json.loads(claimed(name, folder)))
     told = falsify(claim, random.Random(f"{name} {falsify.__name__}"))

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from typer.testing import CliRunner
 
 import symgen
@@ -76,6 +77,7 @@ def wrong(text: str, function: str) -> str:
 
 
 @pytest.mark.parametrize("name", packaged_robots())
+@some(4)
 def test_modules_of_packaged_robots_are_evaluated(name: str) -> None:
     certificate = certify(regroup(load_robot(name)))
     assert certificate.valid, str(certificate)

@@ -7,7 +7,7 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
@@ -75,6 +75,7 @@ def recorded(folder, kind):
 
 
 @pytest.mark.parametrize("kind", sampled(list(KINDS), 4))
+@some(2)
 def test_what_is_printed_has_at_most_25_lines(kind, tmp_path):
     robot, study, more = KINDS[kind]
     yaml = YAML()

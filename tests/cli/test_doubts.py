@@ -3,6 +3,7 @@ prints.
 """
 
 import pytest
+from campaign import some
 from typer.testing import CliRunner
 
 from symgen.cli.main import app
@@ -137,6 +138,7 @@ def test_decimals_for_round_angles_are_told(tmp_path, angle, meant):
         ),
     ],
 )
+@some(1)
 def test_a_loop_that_does_not_close_is_told_with_its_file(tmp_path, old, new, words):
     assert TWO_BARS.count(old) == 1
     (tmp_path / "bars.yaml").write_text(

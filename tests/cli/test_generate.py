@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from campaign import campaign
+from campaign import campaign, some
 from typer.testing import CliRunner
 
 from runtime.result_files import write_all
@@ -23,6 +23,7 @@ def run(*arguments):
 
 
 @pytest.mark.parametrize("name", packaged_robots())
+@some(4)
 def test_checked_in_modules_are_current(name):
     """Golden text: the bytes of generated/."""
     result = run(name, "--check", "-o", GENERATED)
@@ -80,6 +81,7 @@ MJCF = """<mujoco model="arm"><worldbody><body name="link"><joint name="hinge" a
 
 
 @pytest.mark.parametrize("file", ["arm.YAML", "arm.Yml", "arm.xml", "arm.MJCF"])
+@some(2)
 def test_no_folder_of_this_machine_in_emitted_files(tmp_path, file):
     """Suffixes in capitals and MJCF: the command of the header once held the whole path."""
     (tmp_path / file).write_text(

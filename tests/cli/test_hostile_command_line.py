@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 from typer.testing import CliRunner
 
 from fuzz.seeds import csv_file, model_files
@@ -121,6 +121,7 @@ def spelled(name):
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "empty", "binary", "loop", "missing"])
+@some(3)
 def test_what_is_no_robot(kind):
     for ending in ROBOT_ENDINGS:
         for verb in (("show",), ("generate", "-o", "out"), ("check",)):
@@ -135,6 +136,7 @@ def test_what_is_no_robot(kind):
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "empty", "binary", "loop", "missing"])
+@some(3)
 def test_what_is_no_record(kind):
     for ending in RECORD_ENDINGS:
         refused("identify", "model.py", kind + ending, "-o", "out", named=kind + ending)
@@ -148,6 +150,7 @@ def test_what_is_no_record(kind):
 
 
 @pytest.mark.parametrize("name", STRANGE, ids=ascii)
+@some(5)
 def test_names(name):
     """A name may hold what a terminal obeys: it is spelled out, on one line."""
     named = (
@@ -230,6 +233,7 @@ ELSEWHERE = (
     sampled(sorted(p for p in CORPUS.glob("*/*") if p.parent.name not in ELSEWHERE), 12),
     ids=lambda path: f"{path.parent.name}/{path.name}",
 )
+@some(5)
 def test_corpus(path, tmp_path):
     """What once failed when it was read, by the verb that reads it; some of it is sound and only
     strange.

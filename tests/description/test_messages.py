@@ -5,6 +5,7 @@ of what is reserved.
 from dataclasses import replace
 
 import pytest
+from campaign import some
 from typer.testing import CliRunner
 
 import symgen
@@ -42,6 +43,7 @@ MIMIC = """\
 
 
 @pytest.mark.parametrize("name", ["A", "B", "D", "N", "C2", "S2", "W", "V", "U312", "E", "H", "DV"])
+@some(4)
 def test_letters_of_the_models_are_constants_like_others(tmp_path, name):
     file = tmp_path / "al.yaml"
     file.write_text(TEXT.replace("NAME", name).replace("ALONG", "all"))

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from campaign import campaign
+from campaign import campaign, some
 from ruamel.yaml import YAML
 from typer.main import get_command
 
@@ -144,6 +144,7 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path, request: pytest.Fixtur
     [pytest.param(p, marks=campaign) if p.stem in LONG else p for p in EXAMPLES],
     ids=lambda p: p.stem,
 )
+@some(3)
 def test_examples_run(
     example: Path,
     tmp_path: Path,

@@ -14,7 +14,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
@@ -127,6 +127,7 @@ def compare(library: ctypes.CDLL, module: ModuleType, samples: tuple[int, ...]) 
 
 @needs_compiler
 @pytest.mark.parametrize("name", sampled(ROBOTS, 4, always=("emps_asymmetric", "haptic", "tx40")))
+@some(4)
 def test_agrees_with_numpy(name: str, tmp_path: Path) -> None:
     """To 1e-12 of each column's maximum: the sums are the same, sines and cosines may differ by
     some units in the last place.

@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 
 import symgen
 from symgen.derive.derivation import derive
@@ -57,6 +57,7 @@ def test_everything_else_reads_the_same_derivation(derivations: list[str]) -> No
 @pytest.mark.parametrize(
     "name", sampled(packaged_robots(), 3, always=("tx40", "four_bar", "sr400"))
 )
+@some(2)
 def test_a_derivation_is_pickled_and_copied(name: str) -> None:
     robot = load_robot(name)
     regrouping, text = regroup(robot), generate_files(robot)

@@ -18,7 +18,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 import pytest
-from campaign import campaign
+from campaign import campaign, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -214,6 +214,7 @@ FIELDS = ("title", "source", "file")
 
 @pytest.mark.parametrize("every", [6, pytest.param(1, marks=campaign)])
 @pytest.mark.parametrize("field", FIELDS)
+@some(1)
 def test_texts_stay_texts(field, every, plain, expected, tmp_path):
     """Every text in every field; by default every second of those that are not refused is read
     back, in one of the three fields.

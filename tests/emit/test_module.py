@@ -10,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from campaign import some
 
 from symgen.derive.lagrange import Lagrange
 from symgen.description import Robot, load_robot, parse_robot
@@ -180,6 +181,7 @@ loops: [{{cut: 4, twin: 5, start: {{q1: 1, q2: -0.5518, q3: 1.2956, q4: 0.8475}}
 
 
 @pytest.mark.parametrize("constant", ["G", "R", "k", "step", "residual", "J", "N", "t"])
+@some(3)
 def test_a_constant_may_be_named_as_a_local_of_the_loops(constant: str) -> None:
     q = np.linspace(0.8, 1.2, 5)[:, None]
     named = [

@@ -16,7 +16,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 
 from runtime import load_model
 from runtime.model.compiled import compiled_model
@@ -157,6 +157,7 @@ SAMPLE = [
 
 
 @pytest.mark.parametrize("word", SAMPLE)
+@some(5)
 def test_a_word_as_a_constant_is_kept_or_refused(word: str, tmp_path: Path) -> None:
     try:
         robot = pendulum(L=word)
@@ -170,6 +171,7 @@ def test_a_word_as_a_constant_is_kept_or_refused(word: str, tmp_path: Path) -> N
     "family",
     sampled([*"SrWU", "CA", *families()[::287]], 3, always=("S", "CA", "U"), more=100),
 )
+@some(3)
 def test_a_family_is_kept_or_refused(family: str, tmp_path: Path) -> None:
     try:
         robot = pendulum(C=family)

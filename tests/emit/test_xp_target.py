@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 
 from symgen.certify.importing import below
 from symgen.cli.generate import emitted
@@ -92,6 +92,7 @@ def agree(name: str, xp: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@some(5)
 def test_agrees_under_numpy_and_under_the_strict_standard(name):
     agree(name, np)
     agree(name, package("array_api_strict"))

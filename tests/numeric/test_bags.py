@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from bag_files import KINDS, joint_states, write_bag
-from campaign import campaign
+from campaign import campaign, some
 
 from runtime import read_record
 from runtime.errors import InputError
@@ -40,6 +40,7 @@ def bag(tmp_path, kind="mcap", topics=None, **others):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@some(4)
 def test_every_storage_gives_the_same_bits(tmp_path, kind):
     path = bag(tmp_path, kind)
     record = read_record(settings(path))
@@ -120,6 +121,7 @@ def test_joints_change_places(tmp_path):
         (lambda s, q, tau: (s, JOINTS, q * np.nan, (), tau), "nan (2 such values in all)"),
     ],
 )
+@some(2)
 def test_what_a_message_lacks_is_named(tmp_path, spoil, said):
     messages = joint_states(STAMPS, JOINTS, Q, TAU)
     messages[6] = spoil(STAMPS[6].item(), Q[6], TAU[6])

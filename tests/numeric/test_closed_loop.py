@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign import campaign
+from campaign import campaign, some
 
 from runtime import InputError, Record, identify, load_model
 from runtime.errors import SettingsError
@@ -106,6 +106,7 @@ def away(truth, names, share=0.15):
 
 
 @pytest.mark.parametrize("method", ["ols", "wls", "irls", "tls", "iv", "didim"])
+@some(3)
 def test_noise_free_record_gives_the_truth(arm, clean, method):
     """DIDIM to 1e-4, its stop. The others see the torque of a tick, held until the next, beside the
     acceleration about it: half a tick apart.
@@ -166,6 +167,7 @@ def test_output_error_of_a_noise_free_record_is_nothing(emps, axes, output):
         ("didim", True, (95.085, 190.78, 21.802, -3.443)),
     ],
 )
+@some(3)
 def test_emps_record(emps, axes, method, masked, expected):
     """Found by an independent simulation without delay, all rows, and with rows slower than 0.01
     m/s and 20 samples around them out.

@@ -17,7 +17,7 @@ import zipfile
 import numpy as np
 import pytest
 from bag_files import KINDS, joint_states, write_bag
-from campaign import campaign
+from campaign import campaign, some
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import get_types_from_msg
@@ -140,6 +140,7 @@ def mcap_with(chunk, compression, size, tail=b""):
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 @pytest.mark.parametrize("size", [BOMB, 1000])
+@some(2)
 def test_mcap_chunk_bomb(tmp_path, compression, size):
     """Whether the chunk tells its size or lies."""
     (tmp_path / "a.mcap").write_bytes(mcap_with(packed(compression), compression, size))
@@ -323,6 +324,7 @@ LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("\x00", "not YAML"),
     ],
 )
+@some(4)
 def test_descriptions_of_bags(tmp_path, text, said):
     path = write_bag("sqlite3", tmp_path / "run", MESSAGES)
     (path / "metadata.yaml").write_text(text)

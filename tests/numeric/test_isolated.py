@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import polars
 import pytest
+from campaign import some
 
 from runtime.errors import InputError
 from runtime.records.formats import isolated
@@ -99,6 +100,7 @@ def test_a_column_that_is_missing_leaves_it_alive(table):
         (signal.SIGXCPU, "processor time"),
     ],
 )
+@some(1)
 def test_a_library_that_ends_its_process(table, number, said):
     table.idle.popen.send_signal(number)
     table.idle.popen.wait()

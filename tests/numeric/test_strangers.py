@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 from scipy.signal import butter, sosfiltfilt
 from typer.testing import CliRunner
 
@@ -621,6 +621,7 @@ elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
     ("slope", "force", "cause"),
     [(0, 0, ""), (0, 4, "a constant torque of joint 2"), (12, 2, "a spring")],
 )
+@some(2)
 def test_a_spring_of_a_slide_is_named(slope, force, cause) -> None:
     """It was silent, or "the torque of joint 2 is off by 0.66 N"; a constant force is no spring."""
     robot = parse_robot(SLIDE.encode(), "slider.yaml")

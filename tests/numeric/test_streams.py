@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import planar_2r_model as planar
 import pytest
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 
 import symgen
 from runtime import load_model, observe, read_record
@@ -95,6 +95,7 @@ def settings(given, **others):
 @pytest.mark.parametrize(
     "kind", ["csv", "csv gz", "npz", "npz compressed", "npz matrices", "npy", "parquet"]
 )
+@some(8)
 def test_formats_by_blocks(tmp_path, samples, kind, block):
     given = settings(write(kind, tmp_path, samples), side="motor", units={"tau": "A"})
     whole = read_record(given, robot(DRIVES), folder=tmp_path)
@@ -307,6 +308,7 @@ def same(found, expected, resolution=0.0):
 @pytest.mark.parametrize(
     ("block", "piece"), [(777, 2**20), (5000, 9000), (16384, 2**20), (45000, 2**20)]
 )
+@some(2)
 def test_identification_of_the_tx40_by_blocks(tx40, block, piece):
     model, study, record = tx40
     whole = observe(model, record, study)
@@ -376,6 +378,7 @@ def test_identification_of_the_tx40_by_blocks(tx40, block, piece):
     "estimator",
     [{}, {"method": "wls", "options": {"block": 0.2}}, {"method": "wls", "weights": "iterated"}],
 )
+@some(3)
 def test_settings_by_blocks(tx40, changed, estimator):
     model, study, record = tx40
     study = study_from_mapping({"estimate": estimator, **changed})

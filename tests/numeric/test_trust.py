@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from typer.testing import CliRunner
 
 import symgen
@@ -78,6 +79,7 @@ def test_a_module_of_python_needs_no_file():
 
 
 @pytest.mark.parametrize("verb", ["identify", "cestac", "compare", "report", "simulate", "excite"])
+@some(2)
 def test_verbs_ask_for_trust(verb, generated):
     """In one sentence; --trust lets the module run, and the record is looked at next."""
     appended(generated / "planar_2r.py", "MORE = 1")

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pint
 import pytest
+from campaign import some
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,6 +23,7 @@ OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
 
 
 @pytest.mark.parametrize("name", [name for name in TABLE if name not in OURS])
+@some(4)
 def test_table_is_that_of_pint(name):
     kind, factor = TABLE[name]
     assert (

@@ -14,7 +14,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters, random_robot, random_state
@@ -90,6 +90,7 @@ class Pinocchio:
 
 @pytest.mark.parametrize("oracle", [Lagrange, Pinocchio], ids=["lagrange", "pinocchio"])
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+@some(30)
 def test_module_against_oracle(robot: Robot, oracle, tmp_path: Path) -> None:
     module, model = emitted(robot, tmp_path), oracle(robot)
     chi, (q, qd, qdd) = random_parameters(robot, seed=3), random_state(robot, 6, seed=4)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 
 from oracles.test_random_loops import module_of, torques_agree
 from symgen.certify.modules import certify
@@ -54,6 +55,7 @@ def geared(ratio: str) -> Robot:
 
 
 @pytest.mark.parametrize("ratio", ["2", "-1", "0.5", "0.333"])
+@some(2)
 def test_hinges_of_a_loop_that_gears_tie(ratio: str, tmp_path: Path) -> None:
     """Angles add up through the gears: a planar loop, exact, for all lengths."""
     robot = geared(ratio)

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from campaign import some
 
 from oracles.loop_robots import LIFT
 from oracles.multipliers import Multipliers
@@ -36,6 +37,7 @@ def emitted(robot: Robot, folder: Path) -> ModuleType:
 
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", KIND])
+@some(1)
 def test_constants_by_keyword(name: str, tmp_path: Path) -> None:
     """Lengths changed by 10 %, up or down."""
     robot, rng = robot_of(name), np.random.default_rng(8)
@@ -89,6 +91,7 @@ SCISSORS = ISOSCELES.replace(
 
 
 @pytest.mark.parametrize("text", [ISOSCELES, LIFT, SCISSORS])
+@some(1)
 def test_planar_loops_of_strangers_are_exact_at_all_lengths(text: str, tmp_path: Path) -> None:
     """Torques of a module at lengths by keyword are those of the base parameters of a file with
     them, which Lagrange multipliers give.

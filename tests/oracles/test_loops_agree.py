@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 
 from oracles.multipliers import Multipliers
 from oracles.random_parallelograms import SEEDS, random_parallelogram
@@ -131,6 +131,7 @@ def regular_states(
 
 
 @pytest.mark.parametrize("name", SAMPLE)
+@some(6)
 def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     robot, module = robot_of(name), emitted(name)
     model = Lagrange(robot)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 import pytest
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 from typer.testing import CliRunner
 
 from oracles.pinocchio_model import PinocchioModel, element_columns
@@ -44,6 +44,7 @@ def close(found: Array, expected: Array, scale: float) -> None:
 
 
 @pytest.mark.parametrize("robot", [*PACKAGED[:4], *ROBOTS], ids=lambda r: r.name)
+@some(4)
 def test_dynamics_on_request(robot: Robot, tmp_path) -> None:
     (file, text), *_ = generate_files(robot, options=OPTIONS).items()
     (tmp_path / file).write_text(text, encoding="utf-8")

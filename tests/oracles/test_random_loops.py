@@ -12,7 +12,7 @@ from types import MappingProxyType, ModuleType
 
 import numpy as np
 import pytest
-from campaign import FULL, campaign, sampled
+from campaign import FULL, campaign, sampled, some
 
 from oracles.multipliers import Multipliers
 from oracles.random_loops import KINDS, random_loop
@@ -95,6 +95,7 @@ def check(kind: str, seed: int, folder: Path) -> None:
     "kind",
     sampled(KINDS, 5, always=("kite across the ground", "antiparallelogram", "slotted lever")),
 )
+@some(4)
 def test_exact_and_quick(kind: str, tmp_path: Path) -> None:
     """Constants for every other kind, numbers for the rest."""
     check(kind, KINDS.index(kind) % 2, tmp_path)

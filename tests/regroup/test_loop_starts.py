@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import some
 
 from oracles.loop_robots import JACKS
 from symgen.certify.modules import certify
@@ -58,6 +59,7 @@ def test_law_of_cosines() -> None:
         (EXCAVATOR, "", {1: 1.213225 - 0.5, 3: 0.5, 6: 1.5252, 8: 0.9}),
     ],
 )
+@some(3)
 def test_nearest_mode(body: str, start: str, expected: dict[int, float]) -> None:
     """The other mode, mirrored, closes too."""
     found = close(robot(body, start)).start

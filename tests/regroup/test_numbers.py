@@ -11,7 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from campaign import FULL, campaign, sampled
+from campaign import FULL, campaign, sampled, some
 
 from oracles.numeric_robots import describe_numbers, numeric_robot
 from symgen import Robot, SymgenError, load_robot, parse_robot, regrouping
@@ -163,6 +163,7 @@ ROBOTS = {
 
 
 @pytest.mark.parametrize("what", sampled(ROBOTS, 10))
+@some(5)
 def test_certified_with_its_emitted_module(what: str) -> None:
     certificate = certify(regrouping(ROBOTS[what]))
     assert certificate.valid, certificate
@@ -310,6 +311,7 @@ def test_many_random_robots_with_numbers(start: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [1257, 2035, 1554, 2099, 2374])
+@some(2)
 def test_coefficients_of_many_numbers_and_angles_are_recognised(seed: int) -> None:
     """Gears as factors; angles whose cosines are polynomials of each other."""
     assert regrouping(numeric_robot(seed)).method == EXACT

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from campaign import sampled
+from campaign import sampled, some
 from report.strict_html import Strict
 from typer.testing import CliRunner
 
@@ -59,6 +59,7 @@ def data(html):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@some(2)
 def test_page_is_well_formed_and_asks_nobody(pages, name):
     html = pages(name)[1]
     page = Strict(html)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import WEAK_CONTRAST
-from campaign import sampled
+from campaign import sampled, some
 
 from runtime.model.generated import load_model
 from symgen.description import load_robot
@@ -40,6 +40,7 @@ def files(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@some(2)
 def test_nothing_complains_and_nothing_scrolls_sideways(browser, files, name):
     for width in (1280, 390):
         browser.open(files(name), width)
