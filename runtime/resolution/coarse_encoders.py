@@ -239,21 +239,21 @@ class CoarseEncoders:
         self, drawn: Sequence[Sequence[Array]], encoders: Sequence[int], delta: float
     ) -> list[Array]:
         """Errors of q, qd, qdd as read from `drawn` positions, shape (N,) of each of the encoders
-        in every record, and the deviation of qd, at the encoders, shape (4, N, n). Zero where
+        in every record, and the deviation of qd, at the encoders, shape (4, n, N). Zero where
         exact.
         """
         of_records, key, chosen = [], (delta, *encoders), list(encoders)
         for part, columns in zip(self.parts, drawn, strict=True):
-            y, errors = np.column_stack(columns), np.zeros((4, *part.x.shape))
+            y, errors = np.column_stack(columns), np.zeros((4, *part.x.T.shape))
             if self.reader == "counts":
                 reading = read_counts(y, part.record.rate, delta, starts=part.starts.get(key))
                 part.starts.setdefault(key, reading.starts)
-                y, errors[3][:, chosen] = reading.motion
+                y, errors[3].T[:, chosen] = reading.motion
             read = filtered_states(y, part.record.rate, part.record.selection.signals)
-            errors[:3][..., chosen] = [
-                read.q - part.at_encoders.q[:, chosen],
-                read.qd - part.at_encoders.qd[:, chosen],
-                read.qdd - part.at_encoders.qdd[:, chosen],
+            errors[:3, chosen] = [
+                read.q.T - part.at_encoders.q.T[chosen],
+                read.qd.T - part.at_encoders.qd.T[chosen],
+                read.qdd.T - part.at_encoders.qdd.T[chosen],
             ]
             of_records.append(errors)
         return of_records
@@ -263,10 +263,10 @@ class CoarseEncoders:
         chosen = np.isin(np.arange(len(self.root)), list(encoders))
         coarse, exact = [], []
         for part, error in zip(self.parts, errors, strict=True):
-            q, qd, qdd = error[:3] @ (self.root.T * chosen[:, None])
+            q, qd, qdd = (self.root * chosen) @ error[:3]
             own, selection = part.states, part.record.selection
-            states = States(own.q + q, own.qd + qd, own.qdd + qdd)
-            speeds = replace(states, errors=SpeedErrors(error[3] * chosen, self.root))
+            states = States(own.q + q.T, own.qd + qd.T, own.qdd + qdd.T)
+            speeds = replace(states, errors=SpeedErrors(error[3].T * chosen, self.root))
             rows = speeds[selection.samples][selection.kept]
             certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
             coarse.append((states, certain))
