@@ -260,11 +260,14 @@ def certify_formulas(
             else hair_off(robot, _too_small(witness.W[:, base]))
         )
     sizes = sorted(
-        x for f in robot.frames for e in (f.b, f.d, f.r0) if (x := abs(e.value(robot.constants)))
+        (x, f"{x:.2g} m ({e}, frame {robot.labels.get(f.j, f.j)})")
+        for f in robot.frames
+        for e in (f.b, f.d, f.r0)
+        if (x := abs(e.value(robot.constants)))
     )
-    if sizes and rank > exact_rank == len(regrouping) and sizes[-1] > FAR_APART * sizes[0]:
+    if sizes and rank > exact_rank == len(regrouping) and sizes[-1][0] > FAR_APART * sizes[0][0]:
         failures.append(
-            f"lengths between {sizes[0]:.3g} and {sizes[-1]:.3g} m lie too far apart for checks in "
+            f"lengths between {sizes[0][1]} and {sizes[-1][1]} lie too far apart for checks in "
             "double precision; give them in one order of size"
         )
     chi = np.random.default_rng(6).standard_normal(len(robot.parameters)) * ~is_assumed(robot)
@@ -275,7 +278,7 @@ def certify_formulas(
         failures.append(
             f"the formula of {name} gives {size:.0e} where standard parameters are of size 1: "
             "double precision keeps no digit of that sum. Lengths as small as "
-            f"{sizes[0]:.2g} m divide in it; write 0 where nothing is meant"
+            f"{sizes[0][1]} divide in it; write 0 where nothing is meant"
         )
     if failures or rank != exact_rank:
         require_simple_roots(robot)
