@@ -93,11 +93,11 @@ BUDGET = {
     "symgen": {
         "": 65,
         "description": 3228,
-        "derive": 3054,
-        "regroup": 985,
+        "derive": 3032,
+        "regroup": 989,
         "emit": 1065,
         "symbols": 1305,
-        "certify": 1105,
+        "certify": 1106,
         "report": 295,
         "update": 757,
         "demo": 226,
@@ -120,7 +120,7 @@ BUDGET = {
         "reporting": 964,
     },
 }
-TOTAL = {"symgen": 13_788, "runtime": 20_271}  # the sums of BUDGET may not exceed these
+TOTAL = {"symgen": 13_771, "runtime": 20_271}  # the sums of BUDGET may not exceed these
 TARGET = {"symgen": 10_000, "runtime": 14_000}  # what TOTAL is to come down to
 
 # Words that say how a thing came about, not what it is: no module, class or public attribute is

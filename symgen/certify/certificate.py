@@ -38,7 +38,7 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
-from symgen.derive.angles import LARGEST_MULTIPLE, rows_of, units_of
+from symgen.derive.angles import rows_of, units_of
 from symgen.derive.closure import parts
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
@@ -137,9 +137,9 @@ class Certificate:
         """How far the formulas are proved."""
         if not self.primes:
             return "checked in floats"
-        return (
-            f"exact modulo {' and '.join(map(str, self.primes))}, a false one passes with "
-            f"probability below {self.error_probability:.0e}"
+        sure = f", a false one passes with probability below {self.error_probability:.0e}"
+        return f"exact modulo {' and '.join(map(str, self.primes))}" + sure * (
+            self.error_probability < 1
         )
 
     @property
@@ -294,7 +294,7 @@ def certify_formulas(
         numeric_gap=gap,
         torque_error=error,
         rank_in_floats=len(ranks) < draws,
-        error_probability=bound**draws if primes else 1.0,
+        error_probability=min(1.0, bound**draws) if primes else 1.0,
     )
 
 
@@ -361,11 +361,7 @@ def degree(regrouping: Regrouping) -> int:
 
     def frame(f: Frame) -> int:
         turn = (
-            2
-            * sum(
-                int(abs(n)) + (n.denominator > 1) * (2 * LARGEST_MULTIPLE + 1)
-                for n in (Fraction(n) * parts(robot) for _, n in closure.turn(f.j)[0])
-            )
+            2 * int(sum(abs(Fraction(n)) * parts(robot) for _, n in closure.turn(f.j)[0]))
             + angle(closure.offset[f.j])
             if f.sigma == REVOLUTE
             else 1

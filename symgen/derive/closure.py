@@ -17,15 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
-from math import lcm
+from math import lcm, prod
 
 from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError
 
-FINEST = 360  # parts of an angle at most: 12, 15 and 8 are among its divisors
 ActiveRow = tuple[tuple[int, Expression], ...]
 Relation = tuple[Mapping[int, Expression], Expression]  # row and constant
 
@@ -82,19 +80,6 @@ class Closure:
             turn.append((i, int(c) if c.denominator == 1 else c))
         return tuple(turn), self.offset[j]
 
-    @property
-    def incommensurable(self) -> list[str]:
-        """Hinges that turn by no whole multiple of q_i/D, D of `parts`, as texts: exact arithmetic
-        takes what is left over for an angle of its own.
-        """
-        D = 1 if self.tied else parts(self.robot)
-        return [
-            f"q{j} = {self.formula(j)}"
-            for j in self.robot.passive
-            if self.robot.frame(j).sigma == REVOLUTE
-            and any(D % Fraction(n).denominator for _, n in self.turn(j)[0])
-        ]
-
     def relation(self, row: Mapping[int, Expression], c: Expression = ZERO) -> Relation:
         """s = row q + c in the independent joints: its row, and its constant."""
         total: dict[int, Expression] = {}
@@ -123,25 +108,21 @@ class Closure:
 
 
 def parts(robot: Robot) -> int:
-    """D, at most FINEST, so that passive angles are whole multiples of q_i/D: the least common
-    denominator of the declared relations between angles, or their product where one relation is
-    put into another, or a loop may do so. Denominators beyond it are left out, the largest first.
+    """D, so that every passive angle is a whole multiple of q_i/D: the least common denominator of
+    the declared relations between angles, or their product where one relation is put into another,
+    or a loop may do so.
     """
     joints, relations = {f"q{j}" for j in robot.moving}, robot.constraints
+    chained = robot.loops or {f"q{j}" for j in relations} & {
+        a for e in relations.values() for a in e.atoms
+    }
     denominators = [
         c.denominator
         for j, e in relations.items()
         for m, c in e.terms.items()
-        if robot.frame(j).sigma == REVOLUTE and joints & {a for a, _ in m}
+        if (chained or robot.frame(j).sigma == REVOLUTE) and joints & {a for a, _ in m}
     ]
-    chained = robot.loops or {f"q{j}" for j in relations} & {
-        a for e in relations.values() for a in e.atoms
-    }
-    D = 1
-    for d in sorted(denominators):
-        common = D * d if chained else lcm(D, d)
-        D = common if common <= FINEST else D
-    return D
+    return prod(denominators) if chained else lcm(*denominators)
 
 
 def open_tree(robot: Robot) -> Closure:

@@ -40,7 +40,6 @@ import numpy as np
 from symgen.derive.angles import (
     LARGEST_RADICAND,
     PI,
-    SMALL,
     Unit,
     Variable,
     is_prime,
@@ -149,10 +148,8 @@ class Draw(Unnamed):
         self._q = {j: self._random(samples) for j in robot.moving}
         self._qd = {j: self._random(samples) for j in robot.moving}
         self._qdd = {j: self._random(samples) for j in robot.moving}
-        self.parts = parts(robot)
+        self.parts = dict.fromkeys(robot.moving, parts(robot))
         self._point = {j: self._circle(samples) for j in robot.moving}  # of q_j/parts
-        # {(joint, part of q_j/parts): (unit, k, turns) with part = k unit - turns}
-        self._left_over: dict[tuple[int, Fraction], tuple[Fraction, int, int]] = {}
 
     def _random(self, size: int) -> Array:
         return self.rng.integers(1, self.p, size)
@@ -231,20 +228,6 @@ class Draw(Unnamed):
             if primitive and self._multiple(root, order // 4)[1][0] == 1:
                 return root
 
-    def _share(self, j: int, n: int | Fraction) -> Point:
-        """The point of n q_j: a whole multiple of q_j/parts, what is left over an angle apart."""
-        whole, rest = divmod(Fraction(n) * self.parts, 1)
-        if not rest:
-            return self._multiple(self._point[j], whole)
-        if (j, rest) not in self._left_over:
-            self._angles[((f"q{j}", 1),), rest] = self._circle(self.samples)
-            for k in SMALL:
-                turns, part = divmod(k * rest, 1)
-                self._left_over.setdefault((j, part), (rest, k, turns))
-        own, k, turns = self._left_over[j, rest]
-        more = self._multiple(self._point[j], whole - turns)
-        return self._turned(self._multiple(self._angles[((f"q{j}", 1),), own], k), more)
-
     def _angle(self, e: Expression) -> Point:
         """(cos, sin) of a constant angle."""
         turns, rest = quarter_turns(e)
@@ -312,7 +295,9 @@ class Draw(Unnamed):
             return c, s
         point = self._angle(offset)
         for j, n in turn:
-            point = self._turned(point, self._share(j, n))
+            if (whole := n * self.parts[j]).denominator > 1:
+                raise ArithmeticError(f"a hinge turns {n} times with q{j}, which loops alone tie")
+            point = self._turned(point, self._multiple(self._point[j], int(whole)))
         return self._fp(point[0]), self._fp(point[1])
 
     def q(self, j: int) -> Fp:

@@ -12,6 +12,7 @@ reconstruction. What is recognised is then checked at the numbers themselves (`c
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 from symgen.derive.angles import atoms_of
@@ -23,10 +24,13 @@ LARGEST_WHOLE = 12  # whole numbers up to here are counts (2, 4) rather than len
 
 
 def numbered(robot: Robot) -> Robot:
-    """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number`
-    atoms.
+    """`robot` with the numbers of its lengths, gravity, ratios and element rows as `Number` atoms;
+    ratios as they are where one relation is put into another, whose angles need them.
     """
-    return mapped(robot, kept)
+    followed = {a for e in robot.constraints.values() for a in e.atoms}
+    chained = any(f"q{j}" in followed for j in robot.constraints)
+    result = mapped(robot, kept)
+    return replace(result, constraints=robot.constraints) if chained else result
 
 
 def kept(e: Expression) -> Expression:

@@ -146,12 +146,12 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
         reason = str(error)
     else:
         base = tuple(names[c] for c in pivots)
-        # laws and angles of which exact arithmetic knows nothing: rank is told in numbers too
-        apart = [e.family for e in robot.elements if any(is_opaque(e, j) for j in e.along)]
-        if apart := [*apart, *close(robot).incommensurable]:
+        # of which exact arithmetic knows nothing: rank is told in numbers too
+        laws = [e.family for e in robot.elements if any(is_opaque(e, j) for j in e.along)]
+        if laws:
             numeric, relations = float_relations(given, names)
             if len(numeric) < len(base):
-                reason = f"columns of {', '.join(apart)} depend on others in numbers alone"
+                reason = f"{', '.join(laws)} depend on other columns in numbers alone"
                 base = numeric
     if not reason:
         supports = {

@@ -5,6 +5,7 @@ are the oracle.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,14 @@ from campaign import some
 from typer.testing import CliRunner
 
 from oracles.multipliers import Multipliers
-from oracles.random_robots import random_parameters
+from oracles.random_robots import random_parameters, random_robot
 from oracles.test_loops_agree import whole
 from oracles.test_random_loops import module_of
 from symgen.certify.modules import certify
 from symgen.cli.main import app
 from symgen.derive.doubts import doubts
 from symgen.description import Robot, parse_robot
+from symgen.description.grammar import parse
 from symgen.emit.generate import generate_module
 from symgen.errors import DescriptionError
 from symgen.regroup.regrouping import EXACT, regroup
@@ -102,3 +104,19 @@ def test_a_ratio_that_is_no_number_is_refused_with_the_number(ratio: str, number
 def test_a_decimal_close_to_a_fraction_is_told() -> None:
     notes = doubts(hand("0.333*q2", "0.25*q1"))
     assert [note[:45] for note in notes] == ["q3 turns 0.333 times with q2, not 1/3: anothe"]
+
+
+@pytest.mark.parametrize("seed", [1028, 1035, 1062, 1098])
+def test_relations_put_into_one_another(seed: int) -> None:
+    """Angles about parallel axes add up, whatever their ratios; ratios through slides too."""
+    robot = random_robot(seed)
+    moving = robot.moving
+    ratios = ["-1.4142*q{}", "0.1*q{} - 0.666*q{} + 0.3", "57.3*q{} + 2/7*q{}"]
+    passive = moving[2::2]
+    relations = {
+        j: parse(ratios[k % 3].format(moving[max(j - 2, 0)], moving[0]), [f"q{i}" for i in moving])
+        for k, j in enumerate(passive)
+    }
+    frames = tuple(replace(f, mu=0) if f.j in passive else f for f in robot.frames)
+    certificate = certify(regroup(replace(robot, frames=frames, constraints=relations)))
+    assert certificate.valid, str(certificate)
