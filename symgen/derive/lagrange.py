@@ -485,13 +485,15 @@ class Sample:
 
 
 def _leverage(robot: Robot, constants: Mapping[str, float]) -> Array:
-    """Largest coefficient of each actuated joint among the rows of elements that several joints
-    share, at least 1; shape (n,).
+    """Largest coefficient of each actuated joint among the rows of elements that several of these
+    share, 1 where there is none; shape (n,).
     """
-    shared = [row for e in robot.elements for row in e.along.values() if len(row) > 1]
+    closure = close(robot)
+    rows = [dict(closure.in_independent(r)) for e in robot.elements for r in e.along.values()]
+    shared = [row for row in rows if len(row) > 1]
     return np.array(
         [
-            max([1.0, *(abs(row[j].value(constants)) for row in shared if j in row)])
+            max([abs(row[j].value(constants)) for row in shared if j in row], default=1.0)
             for j in robot.joints
         ]
     )

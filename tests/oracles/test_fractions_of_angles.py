@@ -21,6 +21,7 @@ from symgen.certify.modules import certify
 from symgen.cli.main import app
 from symgen.derive.doubts import doubts
 from symgen.description import Robot, parse_robot
+from symgen.description.expression import ONE
 from symgen.description.grammar import parse
 from symgen.emit.generate import generate_module
 from symgen.errors import DescriptionError
@@ -104,6 +105,14 @@ def test_a_ratio_that_is_no_number_is_refused_with_the_number(ratio: str, number
 def test_a_decimal_close_to_a_fraction_is_told() -> None:
     notes = doubts(hand("0.333*q2", "0.25*q1"))
     assert [note[:45] for note in notes] == ["q3 turns 0.333 times with q2, not 1/3: anothe"]
+
+
+def test_frictions_of_a_joint_that_two_tie_are_told_apart() -> None:
+    """sign(qd1/2 + qd2/361) is that of qd1 at random, unless qd2 is drawn larger."""
+    tied = hand("q1/2 + q2/361", "2*q3")
+    friction = replace(tied.elements[1], kind="coulomb", along={j: {j: ONE} for j in (1, 2, 3, 4)})
+    certificate = certify(regroup(replace(tied, elements=(friction,))))
+    assert certificate.valid, str(certificate)
 
 
 @pytest.mark.parametrize("seed", [1028, 1035, 1062, 1098])
