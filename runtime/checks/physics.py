@@ -74,7 +74,7 @@ def measured(case: Case) -> Answer | None:
             "controller or a simulation computes torques, or sensors sit behind the gears",
         )
     fifth = [np.quantile(np.abs(np.diff(one.tau, 5, axis=0)), 0.8, axis=0) for one in case.records]
-    size = [np.sqrt((one.tau**2).mean(axis=0)) for one in case.records]
+    size = [np.sqrt((one.tau**2).mean(axis=0)).clip(1e-300) for one in case.records]
     noise = float(np.max(np.array(fifth) / size)) / (1.28 * 252**0.5)  # 1 of white noise of size 1
     if 0 < noise < LIMIT.LEAST_NOISE:  # 0 of a drive that knows few levels
         return Answer(

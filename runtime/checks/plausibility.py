@@ -269,23 +269,22 @@ def _case(
 
 def _ranked(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
     """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
-    gives the parameters more room, and so has a coupling, a constant torque, and a spring unless it
-    brings them nearer to the values of the robot file; what changes with time, and a spring beside
-    the known torque of its joint, has to gain LIMIT.VARYING_GAIN more.
+    gives the parameters more room, and so has a coupling, the scale of a position, a constant
+    torque, and a spring unless it brings them nearer to the values of the robot file: that does not
+    count beside the known torque of its joint. What changes with time has to gain
+    LIMIT.VARYING_GAIN more.
     """
     known = problem.samples.tau_known.any(axis=0)
 
     def price(trial: Trial) -> float:
         kind, unmodelled = trial.alternative.kind, trial.alternative.unmodelled
-        if np.ndim(trial.alternative.share) or (known * np.transpose(unmodelled)).any():
+        nearer = 0.0 if trial.fit is None else problem.given.penalty - trial.fit.penalty
+        if np.ndim(trial.alternative.share):
             return float(LIMIT.VARYING_GAIN)
-        nearer = (
-            kind == "spring"
-            and trial.fit is not None
-            and problem.given.penalty - trial.fit.penalty > LIMIT.DECISIVE
-        )
-        dear = kind in ("rate", "coupling", "offset", "spring") and not nearer
-        return float(LIMIT.RATE_GAIN) * dear
+        beside = kind == "spring" and bool((known * np.transpose(unmodelled)).any())
+        dear = beside or kind in ("rate", "coupling", "offset", "scale")
+        dear |= kind == "spring" and nearer <= LIMIT.DECISIVE
+        return float(LIMIT.RATE_GAIN) * dear + beside * max(nearer, 0.0)
 
     return sorted(
         (replace(trial, gain=trial.gain - price(trial)) for trial in trials),
