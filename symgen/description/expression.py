@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 
 LONGEST_SLOPE = 2000  # terms of a derivative
 LARGEST_PRIME = 1000  # of the trial division under square roots
-PLACES = 40  # of a decimal
+PLACES, LARGEST_RATIO = 40, 360  # of a decimal; denominator of a ratio written as one
 
 Atom: TypeAlias = "str | Number | Call"
 Monomial = tuple[tuple[Atom, int], ...]
@@ -519,6 +519,14 @@ def quarter_turns(angle: Expression) -> tuple[int, Expression]:
     c = angle.terms.get((("pi", 1),), Fraction(0)) * 2
     k = c.numerator // c.denominator
     return k, angle - PI * Fraction(k, 2)
+
+
+def ratio(x: float) -> Fraction:
+    """The fraction of a denominator up to LARGEST_RATIO that x is but for rounding, such as 1/3 of
+    0.3333333333333333, else its shortest decimal.
+    """
+    near = Fraction(x).limit_denominator(LARGEST_RATIO)
+    return near if float(near) == x else Fraction(repr(x))
 
 
 def twelfths(angle: float, within: float) -> int | None:

@@ -18,13 +18,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from symgen.description.angles import SNAP, Angles, reaches
-from symgen.description.expression import ZERO, Expression, twelfths
+from symgen.description.expression import ZERO, Expression, ratio, twelfths
 from symgen.description.mjcf_text import Mjcf, reduced
 from symgen.description.tree import (
     FIXED_TYPE,
@@ -368,7 +367,7 @@ def _equation(model: Any, names: list[str], e: int, line: int) -> Expression:
     length of a fixed tendon.
     """
     kind, name = int(model.eq_type[e]), model.equality(e).name
-    a0, a1, *higher = (Fraction(repr(float(x))) for x in model.eq_data[e][:5])
+    a0, a1, *higher = (ratio(float(x)) for x in model.eq_data[e][:5])
     if any(higher):
         raise DescriptionError(
             f"equality {name!r}: polycoef {[float(x) for x in model.eq_data[e][:5]]}; linear "
@@ -387,7 +386,7 @@ def _deflection(model: Any, names: list[str], kind: int, k: int) -> Expression:
         return Expression.symbol(names[k]) - reference
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
     coefficients = {
-        int(model.wrap_objid[w]): Fraction(repr(float(model.wrap_prm[w])))
+        int(model.wrap_objid[w]): ratio(float(model.wrap_prm[w]))
         for w in range(first, first + count)
     }
     deflections = (

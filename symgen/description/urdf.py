@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from symgen.description.angles import Angles, reaches
-from symgen.description.expression import Expression
+from symgen.description.expression import Expression, ratio
 from symgen.description.tree import (
     DROPPED,
     FIXED_TYPE,
@@ -59,7 +59,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
             if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
                 leader = mimic.text("joint")
                 factor, offset = (
-                    Expression.number(repr(mimic.number(key, default)))
+                    Expression.number(ratio(mimic.number(key, default)))
                     for key, default in (("multiplier", "1"), ("offset", "0"))
                 )
                 mimics[joints[-1].name] = leader, factor * Expression.symbol(leader) + offset

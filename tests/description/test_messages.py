@@ -82,6 +82,11 @@ def test_joints_that_cannot_follow_have_the_names_of_the_file():
     assert e.value.file == "hand.urdf" and e.value.path == ("constraints", "q2")
 
 
+def test_a_fraction_in_all_its_decimals_is_that_fraction():
+    robot, _ = read_tree(MIMIC.replace("RATIO", repr(-2 / 3)).encode(), "hand.urdf")
+    assert str(robot.constraints[2]).startswith("-2*q1/3")
+
+
 @pytest.mark.parametrize("ratio", ["0", "0.333"])
 def test_a_joint_follows_by_any_number(ratio: str):
     """By zero times it stands still."""
