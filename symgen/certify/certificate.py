@@ -394,10 +394,10 @@ def _modulo(
         try:  # identities at the numbers of the file, where some were recognised; rank at any
             draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p)
             fixed = closed_draw(numbered(robot), seed, states, p=p)
+            few = np.moveaxis(sample(draw, names), 0, 1)
+            rank = len(rref(sample(fixed, regrouping.own)[0], p, reduced=False)[0])
         except ArithmeticError:
             return None, list(names) if regrouping.method == EXACT else []
-        few = np.moveaxis(sample(draw, names), 0, 1)
-        rank = len(rref(sample(fixed, regrouping.own)[0], p, reduced=False)[0])
     else:
         draw = Draw(robot, seed, states_for(robot, names), p=p)
         W = sampler(draw, names)

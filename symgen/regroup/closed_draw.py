@@ -76,7 +76,8 @@ class ClosedDraw(Draw):
         more = wide * (int(samples * 2.4 ** len(robot.loops)) + SPARE)
         drawn = {v: np.repeat(x, more) for v, x in geometry.items()}
         super().__init__(robot, seed, count * more, p=p, geometry=drawn)
-        self.parts |= dict.fromkeys(self.tied, 1)  # of second degree in points of q_u alone
+        hinges = [u for u in self.tied if robot.frame(u).sigma == REVOLUTE]
+        self.parts |= dict.fromkeys(hinges, 1)  # of second degree in points of q_u alone
         self.shape = (count, samples)
         self._take(self._close().reshape(-1, more))
         ends = loop_ends(robot, self, self.system.closure)

@@ -4,15 +4,18 @@ oracle.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign import some
 
+from oracles.random_loops import random_loop
 from oracles.test_random_loops import module_of, torques_agree
 from symgen.certify.modules import certify
 from symgen.description import Robot, parse_robot
+from symgen.description.grammar import parse
 from symgen.emit.generate import generate_module
 from symgen.regroup.regrouping import EXACT, regroup
 
@@ -73,6 +76,19 @@ def test_joints_that_turn_fast_are_followed_in_small_steps(tmp_path: Path) -> No
     q = np.linspace(0.5, 1.5, 41)[:, None]
     alone = np.concatenate([module.passive_joints(x[None]) for x in q])
     assert np.abs(np.diff(alone, axis=0)).max() < 0.2
+
+
+@pytest.mark.parametrize("kind", ["jack", "offset slider-crank, driven by the slide"])
+def test_a_motor_before_a_loop_that_follows_a_joint_of_it(kind: str, tmp_path: Path) -> None:
+    """By a fraction of a hinge that the loop alone ties: in numbers, told."""
+    robot = random_loop(kind, 60, behind=2)
+    relation = parse("0.333*q3", [f"q{j}" for j in robot.moving])
+    frames = tuple(replace(f, mu=int(f.mu and f.j != 1)) for f in robot.frames)
+    robot = replace(robot, frames=frames, constraints={**robot.constraints, 1: relation})
+    found = regroup(robot)
+    assert "turns 333/1000 times with q3" in found.method
+    assert certify(found).valid
+    torques_agree(robot, module_of(generate_module(robot), tmp_path))
 
 
 def test_a_loop_through_the_cut_joint_of_another(tmp_path: Path) -> None:
