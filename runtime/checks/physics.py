@@ -62,10 +62,10 @@ def measured(case: Case) -> Answer | None:
     """
     if case.alone is None or any(record.by_law for record in case.study.record):
         return None
-    elements, K = elements_of(case.model), case.alone.physical.K
-    kinds = [elements.get(name, ("",))[0] for name in case.alone.physical.standard]
+    elements = elements_of(case.model)
+    kinds = [elements.get(name, ("",))[0] for name in case.model.BASE_PARAMETERS]
     chosen = np.isin(kinds, ("viscous", "coulomb"))
-    friction = np.linalg.norm(case.D @ (K[:, chosen] @ case.alone.given.X[chosen]), axis=0)
+    friction = np.linalg.norm(case.D[:, :, chosen] @ case.alone.free.X[chosen], axis=0)
     share = float((friction / np.linalg.norm(case.samples.tau, axis=0)).max())
     if chosen.any() and share < LIMIT.LEAST_FRICTION:
         return Answer(

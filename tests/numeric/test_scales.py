@@ -65,6 +65,12 @@ def test_two_columns_that_are_one_are_named(arm: slips_simulated.Simulated) -> N
     assert found.worst.finding == "Positions of joints 2 and 3 are the same"
 
 
+def test_torques_with_the_wrong_sign_have_friction(right: slips.Case) -> None:
+    """The best physical robot of these has none: it cannot be negative."""
+    checks = {one.question: one.state for one in replace(right, tau=-right.tau).judged().checks}
+    assert checks["Were the torques measured?"] == "good"
+
+
 @pytest.mark.parametrize("friction", [True, False], ids=["with friction", "without friction"])
 def test_torques_that_a_controller_computes_are_asked_about(
     arm: slips_simulated.Simulated, friction: bool
