@@ -58,11 +58,15 @@ def test_a_factor_far_from_its_first_step_is_found() -> None:
     assert row["named"] and not row["other causes"]
 
 
-def test_two_columns_that_are_one_are_named(arm: slips_simulated.Simulated) -> None:
-    case = arm.right
-    found = replace(case, q=case.q[:, [0, 2, 2, 3, 4, 5]]).judged()
-    assert found.worst is not None and not found.named
-    assert found.worst.finding == "Positions of joints 2 and 3 are the same"
+@pytest.mark.parametrize("side", ["joint", "motor"])
+def test_two_columns_that_are_one_are_named(
+    right: slips.Case, arm: slips_simulated.Simulated, side: str
+) -> None:
+    """Columns of the file: those of motors with other gears are no equal positions of joints."""
+    case = arm.right if side == "joint" else right
+    found = replace(case, q=case.q[:, [0, 2, 2, *range(3, case.q.shape[1])]]).judged()
+    assert not found.named
+    assert "Positions of joints 2 and 3 are the same" in [one.finding for one in found.checks]
 
 
 def test_torques_with_the_wrong_sign_have_friction(right: slips.Case) -> None:
