@@ -311,8 +311,14 @@ class Lagrange:
         if not passive:
             return x, np.asarray(qd), np.asarray(qdd), G
         wanted, regular = x[..., actuated].copy(), np.ones(x.shape[:-1], dtype=bool)
-        if self._home is not None:
-            x[...] = self._home
+        if self._home is not None:  # a `start` as it is drawn does not close to the last digit
+            x = newton(
+                self._gap,
+                np.broadcast_to(self._home, x.shape),
+                passive,
+                steps=NEWTON_STEPS,
+                tolerance=SETTLED,
+            )
         for left in range(1 if self._home is None else FOLLOWED, 0, -1):
             J = self._floats("loop_jacobian", x)
             step = (wanted - x[..., actuated]) / left
