@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import campaign
 from typer.testing import CliRunner
 
 import symgen
@@ -16,6 +17,7 @@ NAME = b"caf\xe9.csv"  # Latin-1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@campaign
 def test_a_record_with_a_latin_1_name(tmp_path: Path) -> None:
     """Every result is written, and study.yaml finds the file again: it had ended in a
     UnicodeEncodeError after the whole identification.

@@ -67,6 +67,7 @@ def shown(folder, emps_data):
     return run(folder / "fleet.yaml", "-o", folder / "out")
 
 
+@campaign
 def test_one_job_fails_and_the_others_go_on(shown):
     assert shown.exit_code == 1, shown.output
     assert "5 of 5" in shown.stderr

@@ -62,6 +62,7 @@ def test_measured_record_of_one_joint(emps_data, tmp_path):
     assert "Not done" not in html
 
 
+@campaign
 def test_noise_is_not_for_use(record, tmp_path):
     """With a method that no prediction of the resolution knows: it is said, the rest is there."""
     (tmp_path / "study.yaml").write_text(

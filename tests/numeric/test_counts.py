@@ -457,6 +457,7 @@ def test_by_blocks_as_a_whole(planar, record, monkeypatch):
 @pytest.mark.parametrize(
     ("step", "wrap"), [pytest.param(5e-3, 2**32, marks=pytest.mark.campaign), (4e-5, 2**16)]
 )
+@campaign
 def test_in_pieces_as_a_whole(planar, monkeypatch, step, wrap):
     """Pieces with the stretches that their filters reach, gaps in all and one over a cut, counts
     that wrap in the first piece too.

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from campaign import campaign
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -128,6 +129,7 @@ def clocks(draw):
     method=st.sampled_from(["cubic", "linear"]),
     rate=st.sampled_from([None, RATE, 777.0]),
 )
+@campaign
 def test_resampled_signal_is_the_signal(t, method, rate):
     """To the bounds of de Boor at steps of 1.66 periods (a step of 1 + 2 x 0.33), inside of a
     stretch; the grid is exact; no sample lies in a gap.

@@ -137,7 +137,7 @@ def test_numeric_regressor_of_loops() -> None:
     for robot in (four_bar(), four_bar(rocker=0.45, start={1: 1.4, 2: -0.9, 3: 1.1, 4: 0.6})):
         W = sampled(robot, states=30, seed=1).W
         assert W.shape == (30, len(robot.parameters)) and np.isfinite(W).all()
-    with pytest.raises(DescriptionError, match="frame 4 .cut. and frame 5 .twin. cannot coincide"):
+    with pytest.raises(DescriptionError, match="cannot coincide"):
         sampled(four_bar(rocker=3.0), states=5)
 
 
