@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import planar_2r_model as planar
 import pytest
-from campaign import campaign
 from planar_data import record
 
 from runtime.errors import InputError
@@ -119,7 +118,7 @@ def started(folder, limit=0):
     return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@campaign
+@pytest.mark.campaign  # a process of its own imports this file
 def test_killed_and_resumed(tmp_path, whole):
     process = started(tmp_path)
     limit = time.monotonic() + 60
@@ -137,7 +136,7 @@ def test_killed_and_resumed(tmp_path, whole):
     assert not [name for name in files(tmp_path) if "unfinished" in name]
 
 
-@campaign
+@pytest.mark.campaign  # a process of its own imports this file
 def test_full_disk(tmp_path, whole):
     """A limit on the size of files, below that of study.json."""
     process = started(tmp_path, limit=1000)
