@@ -75,7 +75,7 @@ def recorded(folder, kind):
 
 
 @pytest.mark.parametrize("kind", sampled(list(KINDS), 4))
-@some(2)
+@some(1)
 def test_what_is_printed_has_at_most_25_lines(kind, tmp_path):
     robot, study, more = KINDS[kind]
     yaml = YAML()

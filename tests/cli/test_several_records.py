@@ -80,6 +80,7 @@ def test_every_way_gives_the_same_numbers(folder):
     assert sum(record["rows"] for record in by_line["by_record"]) == by_line["rows"]
 
 
+@campaign
 def test_the_record_that_does_not_fit_is_seen(folder, tmp_path):
     result = CliRunner().invoke(
         app,

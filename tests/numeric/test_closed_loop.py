@@ -500,6 +500,7 @@ def test_a_simulation_that_does_not_follow_is_no_result(arm, clean):
     )
 
 
+@campaign
 def test_a_fit_survives_a_validation_that_fails(arm, clean, monkeypatch):
     """DIDIM by a subset of columns without ZZ1R has no inertia about joint 1: told, and the fit of
     all parameters stands.

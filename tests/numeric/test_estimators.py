@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from campaign import campaign
 from hypothesis import given
 from hypothesis import strategies as st
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
@@ -107,6 +108,7 @@ def test_covariance_weights_equal_generalised_least_squares():
     assert np.allclose(found.covariance, np.linalg.inv(seen.W.T @ V @ seen.W), rtol=1e-8)
 
 
+@campaign
 def test_stated_sigma_matches_the_scatter_of_200_runs():
     # per parameter sum z^2 is chi2(200); 1e-4 and 1 - 1e-4 quantiles over 10 parameters: 1 in 500
     # that a correct code fails, the seed is fixed

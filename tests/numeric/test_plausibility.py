@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import slips
-from campaign import campaign, sampled
+from campaign import campaign, sampled, some
 
 import runtime
 import symgen
@@ -42,6 +42,7 @@ def test_a_right_study_is_left_alone(right: slips.Case) -> None:
 
 
 @pytest.mark.parametrize("slip", sampled(slips.SIMULATED, 3), ids=lambda slip: slip.name)
+@some(1)
 def test_a_slip_of_the_palletiser_is_named(right: slips.Case, slip: slips.Slip) -> None:
     state, text = slips.told(right, slip.change(right), slip, set())
     assert state == "named", text

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import planar_2r_model as planar
 import pytest
+from campaign import campaign
 from planar_data import TRUE, motion
 from scipy.integrate import solve_ivp
 
@@ -80,6 +81,7 @@ def law_torque(log=None):
     return KP * (r - q) + KD * (rd - qd) + ff
 
 
+@campaign
 def test_the_law_is_the_torque_whole_and_by_blocks(tmp_path):
     study = written(tmp_path)
     (record,) = read_records(study.record)

@@ -90,7 +90,7 @@ class Pinocchio:
 
 @pytest.mark.parametrize("oracle", [Lagrange, Pinocchio], ids=["lagrange", "pinocchio"])
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
-@some(30)
+@some(12)
 def test_module_against_oracle(robot: Robot, oracle, tmp_path: Path) -> None:
     module, model = emitted(robot, tmp_path), oracle(robot)
     chi, (q, qd, qdd) = random_parameters(robot, seed=3), random_state(robot, 6, seed=4)

@@ -64,7 +64,7 @@ def hand(ratio: str, other: str, alpha: str = "0", tilt: str = "0") -> Robot:
         ("q2/361", "q1/7"),
     ],
 )
-@some(7)
+@some(4)
 def test_torques_and_rank(ratio: str, other: str, alpha: str, tmp_path: Path) -> None:
     """To 1e-10 of the largest torque, at all angles; the number of base parameters is the rank of
     the oracle's regressor.

@@ -131,7 +131,7 @@ def regular_states(
 
 
 @pytest.mark.parametrize("name", SAMPLE)
-@some(6)
+@some(3)
 def test_module_against_multipliers(name: str, emitted: Emitted) -> None:
     robot, module = robot_of(name), emitted(name)
     model = Lagrange(robot)

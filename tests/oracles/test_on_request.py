@@ -44,7 +44,7 @@ def close(found: Array, expected: Array, scale: float) -> None:
 
 
 @pytest.mark.parametrize("robot", [*PACKAGED[:4], *ROBOTS], ids=lambda r: r.name)
-@some(4)
+@some(2)
 def test_dynamics_on_request(robot: Robot, tmp_path) -> None:
     (file, text), *_ = generate_files(robot, options=OPTIONS).items()
     (tmp_path / file).write_text(text, encoding="utf-8")
