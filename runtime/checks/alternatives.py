@@ -107,9 +107,11 @@ class Alternative:
 
     def subtracted(self, samples: Samples) -> Array:
         """Torques known beside the model, shape (K, n)."""
-        unmodelled = (self.unmodelled * unmodelled_torques(samples)).sum(axis=2)
-        unmodelled = unmodelled * np.reshape(self.share, (-1, 1))
-        return np.asarray(self.known_factor * samples.tau_known + unmodelled)
+        known = np.asarray(self.known_factor * samples.tau_known)
+        if np.ndim(self.unmodelled) == 0:  # of most alternatives
+            return known
+        more = (self.unmodelled * unmodelled_torques(samples)).sum(axis=2)
+        return np.asarray(known + more * np.reshape(self.share, (-1, 1)))
 
     @property
     def on_data(self) -> bool:

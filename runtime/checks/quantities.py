@@ -102,6 +102,7 @@ def quantities(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> l
     plain = unchanged(problem.samples.n)
     joints, units = list(joint_labels(problem.model)), joint_units(problem.model)
     number, make = np.arange(len(joints)), Maker(problem.model, sides)
+    ratios_of = partial(_ratios, problem, *explained_rows(problem, plain))
     which: list[tuple[str, str, float, Callable[[float], dict[str, Any]]]] = [
         ("rate", "the sampling rate", 1.0, _rate),
         (
@@ -124,14 +125,16 @@ def quantities(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> l
         if units[j] == "rad":
             fields = partial(_zero, number == j, joint)
             which.append(("zero", f"the zero of joint {joint}", 1.2, fields))
-        ratios = _ratios(problem, np.outer(number == j, TERMS[units[j]]))
+        ratios = ratios_of(np.outer(number == j, TERMS[units[j]]))
         if ratios is not None and (units[j] == "rad" or ratios[j, 0] > 0):
             of = f"a spring or counterbalance of joint {joint}"
             which.append(("spring", of, 2.0, partial(_unmodelled, of, *SPRING, ratios)))
-    slow = _ratios(problem, np.outer(number >= 0, SLOW), LIMIT.CERTAIN_FRICTION)
+    slow = ratios_of(np.outer(number >= 0, SLOW), LIMIT.CERTAIN_FRICTION)
     if slow is not None:
-        named = ", ".join(joints[j] for j in np.flatnonzero(slow.any(axis=1)))
-        of = f"the friction of joint {named} at low speed"
+        of = (
+            "the friction of joint "
+            f"{', '.join(joints[j] for j in np.flatnonzero(slow.any(axis=1)))} at low speed"
+        )
         which.append(("friction", of, 2.0, partial(_unmodelled, of, *STRIBECK, slow)))
     for i, k in neighbours(units):
         of = f"the coupling of joints {joints[min(i, k)]} and {joints[max(i, k)]}"
@@ -205,11 +208,13 @@ def _offset(joint: str, unit: str, chosen: Array, size: float, xi: float) -> dic
     }
 
 
-def _ratios(problem: Problem, terms: Array, certain: float = 0.0) -> Array | None:
+def _ratios(
+    problem: Problem, D: Array, now: Array, mask: Array, terms: Array, certain: float = 0.0
+) -> Array | None:
     """Factors of these `unmodelled_torques`, bool (n, 5), beside the model to first order, without
-    those below so many deviations; None where the samples do not tell any from it.
+    those below so many deviations; None where the samples do not tell any from it. D, now, mask :
+    `explained_rows` of the study.
     """
-    D, now, mask = explained_rows(problem, unchanged(problem.samples.n))
     joint, term = np.nonzero(terms)
     size = np.sqrt((problem.samples.tau**2).mean(axis=0))[joint]  # the factors in this unit
     effect = size * unmodelled_torques(problem.samples)[:, joint, term]

@@ -51,10 +51,11 @@ def jumps(case: Case) -> Answer:
         files = np.diff(record.q if drives is None else drives.motor_position(record.q), axis=0)
         for two in combinations(np.flatnonzero(steps.any(axis=0)), 2):
             if np.ptp(files[:, two], axis=1).max() <= 1e-9 * np.abs(files[:, two]).max():
-                text = "Positions of joints {} and {} are the same".format(
-                    *(case.labels[j] for j in two)
+                return Answer(
+                    "no",
+                    f"Positions of joints {' and '.join(case.labels[j] for j in two)} are the same",
+                    "one column stands for both: look at record.columns.q",
                 )
-                return Answer("no", text, "one column stands for both: look at record.columns.q")
         usual = _usual(steps)
         around = median_filter(np.diff(q, axis=0), (2 * LIMIT.JUMP_STEPS + 1, 1))
         apart = np.abs(np.diff(q, axis=0) - around)

@@ -569,6 +569,21 @@ def test_a_torque_by_position_that_nobody_told_is_named(kind) -> None:
     assert named[:1] == ([] if kind == "none" else ["a spring or counterbalance of joint 1"]), named
 
 
+def swung(model, low: float, seed: int, amplitudes, friction, noise: float):
+    """20 s of a robot with the values of its file and this friction: t, q and joint torques, noise
+    relative to their deviation.
+    """
+    rng = np.random.default_rng(seed)
+    t, w = np.arange(4000) / 200, rng.uniform(low, 3, (2, 3))[:, :, None]
+    q, qd, qdd = (
+        np.array(amplitudes) * x.sum(axis=1).T
+        for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
+    )
+    bodies = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES | friction
+    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(bodies))
+    return t, q, tau + noise * tau.std(axis=0) * rng.standard_normal(tau.shape)
+
+
 LEVEL = """
 symgen: 1
 name: level
@@ -587,16 +602,8 @@ def test_a_spring_over_a_small_range_is_named() -> None:
     told as "d and r of frame 2 are exchanged (or: the sampling rate is 1/2.5 of the stated one)".
     """
     robot = parse_robot(LEVEL.encode(), "level.yaml")
-    model, rng = symgen.model(robot), np.random.default_rng(1)
-    t, w = np.arange(4000) / 200, rng.uniform(0.5, 3, (2, 3))[:, :, None]
-    q, qd, qdd = (
-        np.array([1.2, 0.2]) * x.sum(axis=1).T
-        for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
-    )
-    friction = {"FV1": 0.1, "FV2": 0.1, "FS1": 0.2, "FS2": 0.2}
-    bodies = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES | friction
-    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(bodies))
-    tau = tau + 0.005 * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    model, friction = symgen.model(robot), {"FV1": 0.1, "FV2": 0.1, "FS1": 0.2, "FS2": 0.2}
+    t, q, tau = swung(model, 0.5, 1, (1.2, 0.2), friction, 0.005)
     tau[:, 1] += np.sin(q[:, 1])
     record = runtime.Record(t, q, tau, name="run")
     found = runtime.plausibility(model, record, variants=symgen.variants(robot))
@@ -625,15 +632,8 @@ elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
 def test_a_spring_of_a_slide_is_named(slope, force, cause) -> None:
     """It was silent, or "the torque of joint 2 is off by 0.66 N"; a constant force is no spring."""
     robot = parse_robot(SLIDE.encode(), "slider.yaml")
-    model, rng = symgen.model(robot), np.random.default_rng(0)
-    t, w = np.arange(4000) / 200, rng.uniform(0.8, 3, (2, 3))[:, :, None]
-    q, qd, qdd = (
-        np.array([0.6, 0.15]) * x.sum(axis=1).T
-        for x in (np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t))
-    )
-    bodies = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES
-    tau = model.inverse_dynamics(q, qd, qdd, model.base_parameters(bodies))
-    tau = tau + 0.02 * tau.std(axis=0) * rng.standard_normal(tau.shape)
+    model = symgen.model(robot)
+    t, q, tau = swung(model, 0.8, 0, (0.6, 0.15), {}, 0.02)
     tau[:, 1] += slope * q[:, 1] + force
     record = runtime.Record(t, q, tau, name="run")
     found = runtime.plausibility(model, record, variants=symgen.variants(robot))
