@@ -34,6 +34,7 @@ from pydantic_core import ArgsKwargs
 from runtime.errors import SettingsError, settings_error, shown
 from runtime.json_documents import plain
 from runtime.settings.arithmetic import number
+from runtime.settings.gone import gone
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]
@@ -204,7 +205,23 @@ def structure(cls: type[T], value: Any, path: Path = ()) -> T:
     try:
         return _adapter(cls).validate_python(value)  # type: ignore[arg-type, no-any-return]
     except ValidationError as e:
-        raise settings_error(e, value, path) from None
+        error = settings_error(e, value, path)
+        reason = gone(error.path, _value_at(error.path[len(path) :], value)) or error.reason
+        raise SettingsError(reason, path=error.path) from None
+
+
+def _value_at(path: Path, value: Any) -> Any:
+    """What these keys lead to in a mapping as read from a file; None where it has no such keys."""
+    for key in path:
+        if isinstance(value, Mapping):
+            value = (
+                value if isinstance(key, int) else value.get(key)
+            )  # one stands for a list of one
+        elif isinstance(value, list | tuple) and isinstance(key, int) and key < len(value):
+            value = value[key]
+        else:
+            return None
+    return value
 
 
 def to_mapping(settings: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 from runtime.errors import InputError, SettingsError
 from runtime.records.datasets import DATASETS, dataset_study
 from runtime.records.named import study_of
+from runtime.settings import gone
 from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text
+from runtime.settings.gone import WENT
 from runtime.settings.study import (
     CestacSettings,
     Lowpass,
@@ -180,6 +183,35 @@ def test_errors_give_the_path(mapping, path, said):
         study_from_mapping(mapping)
     assert e.value.path[: len(path)] == path or e.value.path == path[:-1]
     assert said in str(e.value)
+
+
+def test_a_setting_that_went_names_what_to_use_instead():
+    for name, said in WENT.items():
+        key, _, value = name.partition(": ")
+        mapping = value or "auto"
+        for part in reversed(key.split(".")):
+            mapping = {part: mapping}
+        with pytest.raises(SettingsError) as e:
+            study_from_mapping(mapping)
+        assert (e.value.path, e.value.reason) == (tuple(key.split(".")), said)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("old: 3\n", "line 1: old: read whole"),
+        ("rows: {trim: 1}\nrecord:\n- {files: a}\n- {old: 1}\n", "line 4: record[1].old: by name"),
+        ("record: {old: 1}\n", "line 1: record.old: by name"),
+        ("symgen: 1\nestimate: {method: magic}\n", "line 2: estimate.method: use ols"),
+    ],
+)
+def test_what_went_is_told_from_what_is_unknown(monkeypatch, text, said):
+    went = {"old": "read whole", "record.old": "by name", "estimate.method: magic": "use ols"}
+    monkeypatch.setattr(gone, "WENT", went)
+    with pytest.raises(SettingsError, match=re.escape(said)):
+        study_from_text(text)
+    with pytest.raises(SettingsError, match="expected ols"):
+        study_from_text("estimate: {method: other}")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,25 @@
+"""Settings that earlier versions read, each with the sentence that names what to use instead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+WENT: Mapping[str, str] = {}
+"""By the key, "stream", or by the key and its value, "estimate.method: tls"; keys of lists have no
+numbers: "record.resample".
+"""
+
+
+def gone(path: tuple[str | int, ...], value: Any) -> str | None:
+    """The sentence on a setting that went; None for any other.
+
+    Parameters
+    ----------
+    path : tuple of str and int
+        Keys that lead to the setting in a study.
+    value : object
+        What it is set to.
+    """
+    key = ".".join(name for name in path if isinstance(name, str))
+    return WENT.get(key) or WENT.get(f"{key}: {value}")
