@@ -64,6 +64,7 @@ class Rewrite:
         self._drawn: dict[object, Array] = {}  # of symbols that are no states, and of directions
         self._value: dict[int, Array] = {}  # of the nodes of self.graph, over F_p
         self._first: dict[tuple[int, ...], Scalar] = {}  # by value
+        self._same: dict[int, Scalar | int] = {}  # of a node: the first one of the same value
         self._image: dict[int, Scalar | int] = {}
         self._replaced: set[int] = set()  # nodes of the source that depend on inputs of one case
 
@@ -179,21 +180,24 @@ class Rewrite:
 
     def _merged(self, image: Scalar) -> Scalar | int:
         """`image`, or an equal node that was there before."""
-        if image.node.index in self._value:
-            return image
-        value = self._value_of(image.node)
-        value = (value if len(value) == SAMPLES else np.repeat(value, SAMPLES)) % self.draw.p
-        p, residues = self.draw.p, value.tolist()
-        if residues[0] in (0, 1, p - 1) and len({*residues}) == 1 and image.node.op != CONST:
-            return image.sign * (residues[0] if residues[0] < 2 else -1)
+        node = image.node
+        if node.index not in self._same:
+            self._same[node.index] = self._first_of(node)
+        same = self._same[node.index]
+        return same if image.sign > 0 else -same
+
+    def _first_of(self, node: Node) -> Scalar | int:
+        """0, 1 or -1 where that is the value of the node, else the first node of its value."""
+        p = self.draw.p
+        value = self._value_of(node)
+        residues = np.broadcast_to(value % p, SAMPLES).tolist()
+        number = {0: 0, 1: 1, p - 1: -1}.get(residues[0])
+        if number is not None and len({*residues}) == 1 and node.op != CONST:
+            return number
         sign = -1 if residues[0] > p // 2 else 1
-        first = self._first.setdefault(
-            tuple(sign * x % p for x in residues), self.graph.scalar(image.node.index, sign)
-        )
-        if first.node is image.node:
-            self._value[image.node.index] = value
-            return image
-        return first if sign * image.sign > 0 else -first
+        key = tuple(sign * x % p for x in residues)
+        first = self._first.setdefault(key, self.graph.scalar(node.index, sign))
+        return first if sign > 0 else -first
 
     def _value_of(self, node: Node) -> Array:
         if node.index not in self._value:
