@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from symgen.certify.printed import definitions, equations, evaluated
+from symgen.certify.printed import definitions, evaluated
 from symgen.certify.witness import Witness
 from symgen.derive.columns import acting, element_names, unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
 from symgen.emit.header import channels, scalars
-from symgen.errors import CertificateError
-from symgen.regroup.regrouping import Regrouping
 
 EVALUATED_TWICE = 1e-9  # of the largest: formulas and rows evaluated twice
 ZERO_ENTRY = 1e-13  # of the largest: an entry that is zero, evaluated once
@@ -148,13 +146,3 @@ def _same_elements(table: Any, constants: Mapping[str, float], witness: Witness)
         if any(abs(row[i] - c) > EVALUATED_TWICE * abs(c) for i, c in right.items()):
             return False
     return True
-
-
-def certified_formulas(regrouping: Regrouping, text: str) -> str:
-    """Printed formulas of base parameters. Raises CertificateError where one of them is false."""
-    formulas = [(name, e) for name, e in equations(text) if name.isidentifier()]
-    if not formulas_hold(formulas, Witness(regrouping)):
-        raise CertificateError(
-            f"{regrouping.robot.name}: a formula as printed is false; nothing is printed", text
-        )
-    return text

@@ -15,10 +15,10 @@ from symgen.cli import options
 from symgen.cli.session import described_robot, fail, reported_errors
 
 if TYPE_CHECKING:
-    from symgen.certify.certificate import Certificate
-    from symgen.regroup.regrouping import Regrouping
+    from symgen.description import Robot
 
-FORMATS = ("text", "latex", "json", "sympy")
+FORMATS = ("text", "latex", "latex-fragment", "json", "sympy")
+OF_MODELS = ("latex-fragment", "sympy")
 
 
 def show(
@@ -57,7 +57,12 @@ def show(
     passive: Annotated[
         str | None, typer.Option(help="Passive joints of loops as functions or as symbols.")
     ] = None,
-    format: Annotated[str, typer.Option(help="text, latex or json; sympy with --model.")] = "text",
+    format: Annotated[
+        str,
+        typer.Option(
+            help="text, latex or json; with --model also sympy, and latex-fragment: no document around it."
+        ),
+    ] = "text",
     at_values: options.AtValues = False,
     exact: options.Exact = False,
     only: Annotated[str | None, typer.Option(help="One base parameter, e.g. XX2R.")] = None,
@@ -82,9 +87,6 @@ def show(
 ) -> None:
     """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the
     models cost; or, with --model, a model in symbols.
-
-    What is printed is certified, read back as it is printed: where the certificate does not hold,
-    nothing is printed but one sentence, and the exit code is 1.
     """
     kind = "json" if json else format
     of_model = {
@@ -111,8 +113,8 @@ def show(
         "--only and --recursive are for base parameters; a model has --form recursive": (
             model and formulas
         ),
-        "--frame, --of, --rows, --form, --parameters, --value, --passive and --format sympy need "
-        "--model": not model and (asked or kind == "sympy"),
+        "--frame, --of, --rows, --form, --parameters, --value, --passive and --format sympy or "
+        "latex-fragment need --model": not model and (asked or kind in OF_MODELS),
     }
     for message, given in conflicts.items():
         if given:
@@ -120,45 +122,28 @@ def show(
     with reported_errors():
         described = described_robot(robot, at_values, exact)
         if model is not None:
-            text, note = model_text(described, model, kind, asked)
-            typer.echo(text)
-            typer.echo(note, err=True, nl=bool(note))
-            return
-        from symgen.certify.modules import certify, require_valid
-        from symgen.certify.tables import certified_formulas
-        from symgen.regroup.regrouping import regroup
-        from symgen.report.formulas import printed
-
-        regrouping = regroup(described)
-        certificate = certify(regrouping)
-        require_valid(certificate)
-        if html:
-            typer.echo(page_file(regrouping, certificate, output))
+            typer.echo(model_text(described, model, kind, asked))
+        elif html:
+            typer.echo(page_file(described, output))
         else:
+            from symgen.regroup.regrouping import regroup
+            from symgen.report.formulas import printed
+
             form = "recursive" if recursive else kind
-            read = printed(regrouping, certificate, "text" if form == "latex" else form, only)
-            certified_formulas(regrouping, read)
-            typer.echo(printed(regrouping, certificate, form, only))
+            typer.echo(printed(regroup(described), form, only))
 
 
-def page_file(regrouping: Regrouping, certificate: Certificate, output: Path | None) -> Path:
-    """Path of the page of a robot, written to `output` or to <name>.html once its models hold."""
-    from symgen.certify.shown import require_models
+def page_file(robot: Robot, output: Path | None) -> Path:
+    """Path of the page of a robot, written to `output` or to <name>.html."""
+    from symgen.regroup.regrouping import regroup
     from symgen.report.page import robot_page
 
-    require_models(regrouping)
-    path = output or Path(f"{regrouping.robot.name}.html")
-    return write_all(path.parent, {path.name: robot_page(regrouping, certificate)})[0]
+    path = output or Path(f"{robot.name}.html")
+    return write_all(path.parent, {path.name: robot_page(regroup(robot))})[0]
 
 
-def model_text(robot: Any, model: str, kind: str, asked: Mapping[str, Any]) -> tuple[str, str]:
-    """A model of a robot in one of FORMATS, and what its certificate leaves out; `asked` are the
-    options of --model that were given.
-    """
-    from symgen.certify.modules import certify, require_valid
-    from symgen.certify.shown import certified_model
-    from symgen.certify.witness import ungrouped
-    from symgen.regroup.regrouping import regroup
+def model_text(robot: Robot, model: str, kind: str, asked: Mapping[str, Any]) -> str:
+    """A model of a robot in one of FORMATS; `asked` are the options of --model that were given."""
     from symgen.symbols.symbolic import symbolic
 
     given = dict(asked)
@@ -166,12 +151,7 @@ def model_text(robot: Any, model: str, kind: str, asked: Mapping[str, Any]) -> t
     models = symbolic(robot, values=_values(given.pop("value", ())), **of_robot)
     if "rows" in given:
         given["rows"] = _numbers(given["rows"])
-    if models.source.kind == "standard":
-        return certified_model(models, ungrouped(robot), model, format=kind, **given)
-    regrouping = regroup(robot)
-    text, note = certified_model(models, regrouping, model, format=kind, **given)
-    require_valid(certify(regrouping, {}))
-    return text, note
+    return models.show(model, format=kind, **given)
 
 
 def _values(given: list[str]) -> dict[str, str]:

@@ -8,7 +8,6 @@ import difflib
 import json
 from typing import Any
 
-from symgen.certify.certificate import Certificate
 from symgen.derive.derivation import derive
 from symgen.description.expression import ONE, Expression
 from symgen.emit.header import loop_lines, wrapped
@@ -18,16 +17,14 @@ from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import BaseParameter, Regrouping
 
 
-def printed(
-    regrouping: Regrouping, certificate: Certificate, form: str, only: str | None = None
-) -> str:
+def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
     """The formulas as text, latex, json, or recursive (link by link).
 
     only : name of one base parameter; its formula alone. Raises SymgenError where there is none of
     that name.
     """
     if form == "json":
-        return json.dumps(mapping(regrouping, certificate, only), indent=2, ensure_ascii=False)
+        return json.dumps(mapping(regrouping, only), indent=2, ensure_ascii=False)
     if form == "recursive":
         return "\n".join(f"{name} = {text}" for name, text in recursive_formulas(regrouping))
     base = selected(regrouping, only)
@@ -47,7 +44,7 @@ def printed(
 
 def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
     """Aligned formulas as eq. (27), parameters that absorb nothing in one list, those without
-    effect, counts and costs; names of the joints and relations of passive ones where there are any.
+    effect, their counts; names of the joints and relations of passive ones where there are any.
     """
     robot = regrouping.robot
     alone = " ".join(b.name for b in regrouping.base if b.name == b.own)
@@ -68,19 +65,11 @@ def _page(regrouping: Regrouping, formulas: list[str]) -> list[str]:
         *wrapped("as they are: " + alone, ""),
         "",
         *wrapped("no effect: " + (" ".join(regrouping.no_effect) or "none"), ""),
-        "",
-        "operations per sample",
-        *(
-            f"  {name:<26} {cost['mul']:>5} multiplications {cost['add']:>5} additions"
-            for name, cost in operations(regrouping).items()
-        ),
     ]
 
 
-def mapping(
-    regrouping: Regrouping, certificate: Certificate, only: str | None = None
-) -> dict[str, Any]:
-    """Plain values of the formulas, the operations of the models and the certificate."""
+def mapping(regrouping: Regrouping, only: str | None = None) -> dict[str, Any]:
+    """Plain values of the formulas, and the operations of the models."""
     return {
         "name": regrouping.robot.name,
         "count": len(regrouping),
@@ -91,7 +80,6 @@ def mapping(
         ],
         "no_effect": list(regrouping.no_effect),
         "operations": operations(regrouping),
-        "certificate": certificate.mapping(),
     }
 
 

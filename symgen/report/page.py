@@ -21,8 +21,6 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from symgen.certify.certificate import Certificate
-from symgen.certify.modules import certify
 from symgen.derive.closure import Closure
 from symgen.derive.columns import unit
 from symgen.derive.loops import close
@@ -44,15 +42,8 @@ HEADINGS = {"ant": "a", "mu": "μ", "sigma": "σ", "gamma": "γ", "alpha": "α",
 KINDS_OF_JOINT = ("revolute", "prismatic", "fixed")
 
 
-def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -> str:
+def robot_page(regrouping: Regrouping) -> str:
     """HTML text of the page of a robot. Same robot file, same version: same bytes.
-
-    Parameters
-    ----------
-    regrouping : Regrouping
-        Base parameters with their formulas.
-    certificate : Certificate, optional
-        Their certificate; made where left out.
 
     Raises
     ------
@@ -61,7 +52,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
     """
     robot, spec, closure = regrouping.robot, module_spec(regrouping), close(regrouping.robot)
     drawing, parameters = figure(robot, closure), effects(spec)
-    certificate, absorbed = certificate or certify(regrouping), absorptions(regrouping)
+    absorbed = absorptions(regrouping)
     models, notes = shown_models(regrouping)
     style, script = _resource("page.css"), "\n".join(map(_resource, SCRIPTS))
     sources = passive_text(robot, closure)
@@ -75,7 +66,7 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
             "base-uri 'none'; form-action 'none'"
         ),
         data=embedded(drawing | {"parameters": _pointed_at(spec, parameters, absorbed)}),
-        verdict=_verdict(regrouping, certificate),
+        verdict=_verdict(regrouping),
         joints=[j | {"name": _symbol(f"q{j['j']}")} for j in drawing["joints"]],
         passive=[(_symbol(f"q{j}"), j, text) for j, text in sources.items()],
         frames=_frame_rows(robot),
@@ -90,7 +81,6 @@ def robot_page(regrouping: Regrouping, certificate: Certificate | None = None) -
         places=_places(parameters),
         without=_without_effect(parameters),
         costs=[(name.replace("_", " "), function) for name, function in spec.functions.items()],
-        certificate=certificate,
         version=VERSION,
     )
 
@@ -117,14 +107,13 @@ def _resource(name: str) -> str:
     return files("symgen.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def _verdict(regrouping: Regrouping, certificate: Certificate) -> str:
+def _verdict(regrouping: Regrouping) -> str:
     robot = regrouping.robot
     counts = (
         f"{len(regrouping)} base parameters of {len(robot.parameters)} standard parameters, "
         f"{len(regrouping.no_effect)} without effect"
     )
-    proof = "the certificate holds" if certificate.valid else "the certificate does NOT hold"
-    return f"{counts}; {regrouping.method}; {proof}."
+    return f"{counts}; {regrouping.method}."
 
 
 def _frame_rows(robot: Robot) -> dict[str, Any]:

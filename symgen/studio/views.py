@@ -110,19 +110,14 @@ def formulas(path: str, before: str) -> dict[str, Any]:
 
 @answered
 def model(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """A model in symbols in three notations, certified as it is printed."""
-    from symgen.certify.shown import certified_model
-
-    described = symgen.load_robot(path)
+    """A model in symbols in three notations."""
+    models = symgen.symbolic(symgen.load_robot(path))
     name, form = request.get("model", "gravity"), request.get("form", "closed")
-    frames = {key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()}
-    models, regrouping = symgen.symbolic(described), symgen.regrouping(described)
-    texts = {
-        kind: certified_model(models, regrouping, name, form, kind, **frames)
-        for kind in ("text", "latex", "sympy")
+    frames: dict[str, Any] = {
+        key: int(x) for key in ("of", "frame") if (x := request.get(key, "")).isdigit()
     }
-    notes = sorted({note for _, note in texts.values() if note})
-    return {"texts": {kind: text for kind, (text, _) in texts.items()}, "notes": notes}
+    kinds = ("text", "latex", "sympy")
+    return {"texts": {kind: models.show(name, form=form, format=kind, **frames) for kind in kinds}}
 
 
 @answered

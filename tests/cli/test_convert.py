@@ -24,7 +24,6 @@ def test_a_par_file_becomes_a_robot_file(tmp_path):
     assert run("convert", PAR, file).exit_code == 0
     assert load_robot(file).frames == load_robot("planar_2r").frames == load_robot(PAR).frames
     shown = [json.loads(run("show", source, "--json").stdout) for source in (PAR, file)]
-    assert all(one.pop("certificate")["valid"] for one in shown)  # which names its file
     assert shown[0] == shown[1] and shown[0]["count"] > 10
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import symgen
-from symgen.certify.certificate import certify_formulas
 from symgen.report.page import robot_page
 from symgen.symbols.markup import shown_models
 from symgen.symbols.symbolic import symbolic
@@ -47,7 +46,7 @@ def test_text_of_the_entries() -> None:
 
 def test_page_has_the_section() -> None:
     base = symgen.regrouping(symgen.load_robot("emps"))
-    html = robot_page(base, certify_formulas(base))
+    html = robot_page(base)
     assert '<h2 id="models">' in html and html.count("<details") == 8
 
 

@@ -31,9 +31,9 @@ def base():
 
 
 def test_formulas_in_every_language(base) -> None:
-    of_text = printed(base, None, "text")
+    of_text = printed(base, "text")
     assert "2*0.15*MZ2" in of_text and "0.25**2*M3" in of_text and "1/4" not in of_text
-    of_latex = printed(base, None, "latex")
+    of_latex = printed(base, "latex")
     assert r"2 \cdot 0.15\,MZ_{2}" in of_latex and r"0.25 \cdot 0.5\,M_{3}" in of_latex
     html = robot_page(base)
     assert "<mn>2</mn><mo>·</mo><mn>0.15</mn>" in html and "<mn>0.4318</mn>" in html
