@@ -101,16 +101,17 @@ def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
                 file=file,
                 line=line,
             )
-        place = (*path, str(key.value))
-        if place[-1] in table:
+        name = str(key.value)
+        place = (*path, name)
+        if name in table:
             raise SettingsError(
-                f"key {place[-1]!r:.60} is given twice (first on line {lines[place]}); keep one",
+                f"key {name!r:.60} is given twice (first on line {lines[place]}); keep one",
                 path=path,
                 file=file,
                 line=line,
             )
         lines[place] = line
-        table[place[-1]] = _value(item, place, lines, file)
+        table[name] = _value(item, place, lines, file)
     return table
 
 
