@@ -41,6 +41,7 @@ ROOMS = {
         "excitation",
         "resolution",
         "checks",
+        "plausible",
         "identification",
         "reporting",
     ),

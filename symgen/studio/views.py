@@ -212,7 +212,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """Checks of record, study and robot with their remedies, and the predicted deviation of every
     parameter, %.
     """
-    from runtime.checks.motion import unexcited_shares
+    from runtime.plausible.motion import unexcited_shares
 
     loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))
