@@ -302,9 +302,7 @@ def units(physical: PhysicalModel) -> Array:
 
 
 def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
-    """The pull to the values of the robot file; InputError where they are missing or not those of a
-    body.
-    """
+    """The pull to the values of the robot file; InputError where they are missing."""
     if kind == "none" or weight == 0:
         return None
     numbers = known_inertia(physical)
@@ -314,18 +312,7 @@ def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | No
             path=("estimate", "options", "prior"),
         )
     chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
-    if kind != "euclidean":
-        numbers = tuple(k for j in physical.links for k in physical.link(j))
-        if missing := [
-            physical.standard[k] for k in numbers if physical.standard[k] not in physical.values
-        ]:
-            message = (
-                f"{kind} needs all values of every link; the robot file has none of "
-                f"{', '.join(missing)}. Use prior: euclidean"
-            )
-            raise SettingsError(message, path=("estimate", "options", "prior"))
-        chi0 = with_volume(physical, chi0)
-    return Prior(kind, chi0, scales(physical), numbers, weight)
+    return Prior(chi0, scales(physical), numbers, weight)
 
 
 def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
@@ -336,30 +323,6 @@ def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
         for k in physical.link(j)
         if physical.standard[k] in physical.values
     )
-
-
-def with_volume(physical: PhysicalModel, chi: Array) -> Array:
-    """chi with every point, line and plane of mass made a body: its pseudo-inertia gets a share of
-    the largest second moment (1 g m^2 at least) and of 1 g.
-
-    SettingsError where a link is no body at all, its pseudo-inertia indefinite.
-    """
-    chi = chi.copy()
-    for c in (c for c in physical.conditions if c.name.startswith("link ")):
-        P = c.matrix(chi)
-        size, least = max(float(np.trace(P[:3, :3])), 1e-3), float(np.linalg.eigvalsh(P)[0])
-        if least < -LIMIT.FLAT_LINK * max(size, P[3, 3]):
-            message = (
-                f"the values of {c.name} are those of no body: its pseudo-inertia has the "
-                f"eigenvalue {least:.3g}; correct them, or use prior: euclidean"
-            )
-            raise SettingsError(message, path=("estimate", "options", "prior"))
-        if least < LIMIT.FLAT_LINK * size:
-            body = LIMIT.FLAT_LINK * np.diag([size, size, size, 1.0])  # second moments, mass
-            chi[list(c.numbers)] += np.linalg.lstsq(
-                c.B.reshape(len(c.B), -1).T, body.ravel(), rcond=None
-            )[0]
-    return chi
 
 
 def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:

@@ -14,21 +14,14 @@ squares is feasible, it is the solution.
 options (all of `runtime.estimators.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition: of a link with values in the robot file as
                share of its second moment and mass there (S_j), of others in SI; 1e-6
-    prior      none | euclidean | entropic | pullback: distance D of the inertial parameters from
-               the values of the robot file; "auto": euclidean
-               where it has values of links, else none
+    prior      none | euclidean: distance D of the inertial parameters from the values of the robot file; "auto": euclidean where it has values of links, else none
     weight     of D, a number; "held-out": that by which four fifths of the record in time predict
                the fifth that is left out best; "auto": the
                largest, to half a decade, that raises the residual norm by at most 1 %
     reach      size of the robot, m, which bounds masses and their centres
                "auto": from its frames where these say enough; null
-    explain    whether every condition in the way of least squares is named, and the ranges of
-               masses are given; true
+    explain    whether every condition in the way of least squares is named; true
     linear     options of the least squares behind it: rank_tolerance, block
-
-`details.masses` holds, for every link, the smallest and largest mass of the physical robots whose
-residual is at most 1 % larger: what the record says
-of it, the prior aside. A mass of which it says little is no value to use by itself.
 
 sigma and covariance are those of least squares without conditions, eq. (10): the theory of
 estimates on the boundary of a cone has no such formula. `sigma_corrected` of a parameter is
@@ -41,8 +34,7 @@ as it says, whatever the prior. Resampled records would not tell: those that end
 or at the value of the file, do not scatter. A parameter held by an active condition is told by
 `details`.
 
-Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018); Lee, Wensing and Park (2020)
-for the distances.
+Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018).
 """
 
 from __future__ import annotations
@@ -74,7 +66,6 @@ from runtime.estimators.semidefinite import (
     Optimum,
     closest,
     everything,
-    extreme,
 )
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel
@@ -97,9 +88,7 @@ class FeasibleOptions(RobotLimits):
         Smallest eigenvalue of every condition: of a link with values in the robot file as share of
         its second moment and mass there, of others in SI.
     prior : str
-        Distance D of the inertial parameters from the values of the robot file: none, euclidean,
-        entropic or pullback; auto: euclidean where the
-        file has values of links, else none.
+        Distance D of the inertial parameters from the values of the robot file: none or euclidean; auto: euclidean where the file has values of links, else none.
     weight : float or str
         Weight of D; held-out: that by which four fifths of the record in time predict the fifth
         that is left out best; auto: the largest, to half
@@ -111,8 +100,7 @@ class FeasibleOptions(RobotLimits):
         links have a length and prismatic joints limits, and the record does not contradict it;
         null: no such bounds.
     explain : bool
-        Name every condition that least squares breaks, and give the ranges of the masses; false:
-        the parameters alone, in a third of the time.
+        Name every condition that least squares breaks; false: the parameters alone, in a third of the time.
     linear : mapping
         Options of the least squares that starts the method: rank_tolerance, block.
     """
@@ -125,7 +113,7 @@ class FeasibleOptions(RobotLimits):
     linear: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        message = f"{self.weight} with prior: none; set prior: euclidean, entropic or pullback"
+        message = f"{self.weight} with prior: none; set prior: euclidean"
         require(self.prior != "none" or isinstance(self.weight, str), message, "weight")
 
 
@@ -137,70 +125,73 @@ def fit(start: Beginning) -> Fitted:
         raise InputError(
             "method feasible needs the model: it knows which parameters belong to one link"
         )
-    observation, system, free = start.observation, start.system, start.solution
+    observation = start.observation
+    system = start.system
+    free = start.solution
     physical = physical_model(start.model)
     options = decided(start.options, start.model, physical)
     guess = reach_text(options) if start.options.reach == "auto" else ""
-    if guess and contradicted(system.weighted, physical, options, start.options):
-        options = decided(replace(start.options, reach=None), start.model, physical)
-        guess += " The record contradicts them: they are left out."
-    unconstrained = within_limits(physical, system.names, free.X, options)
+    without_prior = None
+    if guess:
+        open_options = decided(replace(start.options, reach=None), start.model, physical)
+        unbounded, bounded = by_reach(system.weighted, physical, open_options, options)
+        without_prior = bounded
+        if contradicted(system.weighted, physical, unbounded, bounded):
+            options = open_options
+            without_prior = unbounded
+            guess += " The record contradicts them: they are left out."
+    unconstrained = None
+    if options.explain or options.prior == "none":
+        unconstrained = within_limits(physical, system.names, free.X, options)
     if (
-        unconstrained.feasible
+        options.prior == "none"
+        and unconstrained is not None
+        and unconstrained.feasible
         and unconstrained.margin >= options.margin
-        and options.prior == "none"
     ):
-        X, chi, weight = free.X, unconstrained.chi, 0.0
+        X = free.X
+        chi = unconstrained.chi
+        weight = 0.0
     else:
-        searched = options.prior != "none" and options.weight == "held-out"
-        fixed = (
-            replace(options, weight=held_out_weight(observation, system, physical, options))
-            if searched
-            else options
-        )
-        known = isinstance(fixed.weight, float)
-        at(f"feasible, weight of the prior {fixed.weight:g}" if known else "feasible")
-        chi, weight = weighed(system.weighted, physical, fixed)
+        searched = options
+        if options.prior != "none" and options.weight == "held-out":
+            found = held_out_weight(observation, system, physical, options)
+            searched = replace(options, weight=found)
+        known = isinstance(searched.weight, float)
+        at(f"feasible, weight of the prior {searched.weight:g}" if known else "feasible")
+        chi, weight = weighed(system.weighted, physical, searched, without_prior)
         X = physical.rows(system.names) @ chi
     if weight == 0:  # nothing was pulled: chi is one of many
         chi = nearest_standard(physical, system.names, X, chi, options)
     smallest = physical.smallest(chi)
-    active = [
-        name for name, value in smallest.items() if value < LIMIT.ACTIVE_CONDITION * options.margin
-    ]
+    limit = LIMIT.ACTIVE_CONDITION * options.margin
+    active = [name for name, value in smallest.items() if value < limit]
     method = "ols" if start.settings.weights == "none" else "wls"
     residual, measured = system.norms(free.X)
-    without, given = percent(residual, measured), percent(system.norms(X)[0], measured)
-    masses = mass_ranges(system.weighted, physical, options, chi) if options.explain else {}
+    without = percent(residual, measured)
+    given = percent(system.norms(X)[0], measured)
     details = {
         "standard": physical.named(chi),
         "smallest_eigenvalues": smallest,
         "active": active,
         "options": asdict(options),
         "weight": weight,
-        "masses": masses,
         "least_squares": {
             "method": method,
-            "feasible": unconstrained.feasible,
-            "margin": unconstrained.margin,
-            "blocking": [{"condition": name, "margin": t} for name, t in unconstrained.blocking],
+            **conditions_of(unconstrained),
             "relative_error": without,
             "residual_norm": float(np.linalg.norm(residual)),
             "X": free.X,
         },
     }
     violated = min(smallest.values()) < 0
+    failure = "The solver left a condition violated: try another margin, a prior, or bounds on the masses."
+    judgement = f"Least squares ({method}) is {unconstrained.text}. " if unconstrained else ""
     parts = (
-        "The solver left a condition violated: try another margin, a prior, or bounds on the "
-        "masses."
-        if violated
-        else "",
-        f"Least squares ({method}) is {unconstrained.text}. With the conditions the relative error "
-        f"is {given:.3f} % instead of {without:.3f} %; at their limit: "
-        f"{', '.join(active) or 'none'}.",
+        failure if violated else "",
+        f"{judgement}With the conditions the relative error is {given:.3f} % instead of {without:.3f} %; at their limit: {', '.join(active) or 'none'}.",
         prior_text(physical, options, weight),
         guess,
-        masses_text(masses, options),
     )
     return Fitted(
         system,
@@ -212,6 +203,14 @@ def fit(start: Beginning) -> Fitted:
     )
 
 
+def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
+    """What least squares does to the conditions of a physical robot; nothing where it was not asked."""
+    if judged is None:
+        return {}
+    blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
+    return {"feasible": judged.feasible, "margin": judged.margin, "blocking": blocking}
+
+
 def within_limits(
     physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
 ) -> Feasibility:
@@ -219,24 +218,35 @@ def within_limits(
     are what is known or guessed of a robot, not physics.
     """
     judged = feasibility(physical, names, X, blame=options.explain)
-    if not judged.feasible:
+    named = dict.fromkeys(limit_rows(physical, options).names)
+    if not judged.feasible or not named:
         return judged
     try:
         bounded = feasibility(physical, names, X, options, blame=False)
     except InputError:
         bounded = replace(judged, feasible=False)
-    named = dict.fromkeys(limit_rows(physical, options).names)
     blocking = () if bounded.feasible else tuple((name, bounded.margin) for name in named)
     return replace(bounded, physical=True, blocking=blocking)
 
 
-def weighed(rows: Factor, physical: PhysicalModel, options: FeasibleOptions) -> tuple[Array, float]:
-    """chi of a factored system, and the weight of D."""
+def weighed(
+    rows: Factor,
+    physical: PhysicalModel,
+    options: FeasibleOptions,
+    without_prior: Array | None = None,
+) -> tuple[Array, float]:
+    """chi of a factored system, and the weight of D.
+
+    without_prior : chi of weight 0, shape (p,), where it is known.
+    """
     if options.prior == "none":
-        return fitted(rows, physical, options, 0.0), 0.0
+        if without_prior is None:
+            without_prior = fitted(rows, physical, options, 0.0)
+        return without_prior, 0.0
     if not isinstance(options.weight, str):
         return fitted(rows, physical, options, options.weight), options.weight
-    K, free = physical.rows(rows.names), fitted(rows, physical, options, 0.0)
+    K = physical.rows(rows.names)
+    free = without_prior if without_prior is not None else fitted(rows, physical, options, 0.0)
     allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ free)
     for weight in map(float, WEIGHTS):
         try:
@@ -285,10 +295,13 @@ def held_out_weight(
             return float("inf")
         return squares
 
-    chosen, best = 0.0, float("inf")
+    chosen = 0.0
+    best = float("inf")
     for weight in map(float, (0.0, *DECADES[::-1])):
-        if (squares := error(weight, best)) <= best:
-            chosen, best = weight, squares
+        squares = error(weight, best)
+        if squares <= best:
+            chosen = weight
+            best = squares
     return chosen
 
 
@@ -340,95 +353,30 @@ def reach_text(options: FeasibleOptions) -> str:
     )
 
 
-def contradicted(
-    rows: Factor, physical: PhysicalModel, bounded: FeasibleOptions, asked: FeasibleOptions
-) -> bool:
-    """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot
-    be.
-    """
-    K = physical.rows(rows.names)
-    errors: list[float] = []
-    for one in (replace(asked, reach=None), bounded):
-        options = replace(one, prior="none", weight="auto")  # a weight is of a prior
+def by_reach(
+    rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
+) -> tuple[Array | None, Array | None]:
+    """chi without a prior, and without and with bounds that were guessed; None: no robot is within them."""
+    found: list[Array | None] = []
+    for limits in (unbounded, bounded):
+        options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
         try:
-            chi = fitted(rows, physical, options, 0.0)
+            found.append(fitted(rows, physical, options, 0.0))
         except InputError:
-            return bool(errors)
-        errors.append(residual_norm(rows, K @ chi))
-    return bool(errors[1] > LIMIT.WEIGHT_INCREASE * errors[0])
+            found.append(None)
+    return found[0], found[1]
 
 
-def mass_ranges(
-    rows: Factor, physical: PhysicalModel, options: FeasibleOptions, chi: Array
-) -> dict[str, dict[str, float | bool]]:
-    """Smallest and largest mass of every link, kg, over the physical robots whose residual is at
-    most LIMIT.WEIGHT_INCREASE times that of chi; nan: not found.
-    """
+def contradicted(
+    rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
+) -> bool:
+    """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot be."""
+    if unbounded is None or bounded is None:
+        return unbounded is not None
     K = physical.rows(rows.names)
-    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
-    allowed = (LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ chi) / size) ** 2 - (
-        rows.r22 / size
-    ) ** 2
-    radius = max(float(np.sqrt(max(allowed, 0.0))), 1e-6)
-    bounds, space = limit_rows(physical, options), everything(units(physical))
-    ranges: dict[str, dict[str, float | bool]] = {}
-    for j in physical.links:
-        place = physical.link(j)[-1]
-        ends = []
-        for sign in (1.0, -1.0):
-            direction = np.zeros(len(physical.standard))
-            direction[place] = sign
-            found = extreme(
-                direction,
-                rows.R11 @ K / size,
-                rows.r12 / size,
-                radius,
-                physical.conditions,
-                bounds,
-                space,
-                least=options.margin / 2,
-            )
-            ends.append(float(found.chi[place]) if found.solved else float("nan"))
-        low, high = min(ends[0], chi[place]), max(ends[1], chi[place])
-        determined = all(np.isfinite(ends)) and 100 * (high - low) <= LIMIT.MASS_DETERMINED * (
-            high + low
-        )
-        ranges[f"M{j}"] = {
-            "value": float(chi[place]),
-            "lowest": low,
-            "highest": high,
-            "determined": bool(determined),
-        }
-    return ranges
-
-
-def masses_text(masses: Mapping[str, Mapping[str, float | bool]], options: FeasibleOptions) -> str:
-    """Which masses the record does not determine, and what would narrow them, in words."""
-    loose = [
-        f"{name} ({own['lowest']:.2g} to {own['highest']:.3g} kg)"
-        for name, own in masses.items()
-        if not own["determined"]
-    ]
-    if not loose:
-        return ""
-    weighed = (
-        options.bounds
-        or options.reach is None
-        or not isinstance(options.total_mass, tuple)
-        or options.total_mass[0] > 0
-    )
-    asked = (
-        ""
-        if weighed or options.prior != "none"
-        else (
-            " Give total_mass of the data sheet, or values in the robot file: they narrow these "
-            "ranges."
-        )
-    )
-    return (
-        "Masses that this record does not determine, no values to use by themselves: "
-        f"{', '.join(loose)}.{asked}"
-    )
+    without = residual_norm(rows, K @ unbounded)
+    within = residual_norm(rows, K @ bounded)
+    return bool(within > LIMIT.WEIGHT_INCREASE * without)
 
 
 def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:

@@ -2,7 +2,6 @@
 
     closest     min ||R chi - z||^2 + weight D(chi)    subject to
             P >= least S of every condition, rows, chi in a Space
-    extreme     min d'chi                              subject to  the same, ||R chi - z|| <= radius
     margin      max t                                  subject to
             P >= t S of every condition, rows, chi in a Space
 
@@ -15,10 +14,6 @@ distance, of unknowns in units of their size, is). A symmetric matrix enters by 
 upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and
 holds to
 rounding. Clarabel is deterministic: same problem, same bits.
-
-    entropic distance, without its constants     tr M - log det M,  M = L P L' with P0 = (L'L)^-1
-    log det M = max sum_i log Z_ii               [[M, Z], [Z', diag(Z_ii)]] >= 0,
-            Z lower triangular
 
 Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004),
 for the cones.
@@ -40,7 +35,7 @@ from runtime.limits import LIMIT
 from runtime.model.inertia import Condition
 
 Array = np.ndarray
-Distance = Literal["none", "euclidean", "entropic", "pullback"]
+Distance = Literal["none", "euclidean"]
 
 TOLERANCES = (
     (1e-14, 1e-12),
@@ -121,8 +116,6 @@ class Prior:
 
     Attributes
     ----------
-    kind : str
-        Distance D.
     chi0 : ndarray, shape (p,), SI
         Where they are pulled to.
     scale : ndarray, shape (p,), SI
@@ -133,7 +126,6 @@ class Prior:
         Weight of D.
     """
 
-    kind: Distance
     chi0: Array
     scale: Array
     numbers: tuple[int, ...]
@@ -238,28 +230,6 @@ class Program:
         self.diagonal[own] = 2 * weight
         self.constraints.append((clarabel.ZeroConeT(len(z)), A, b - z))
 
-    def add_entropy(self, B: Array, numbers: Sequence[int], weight: float) -> None:
-        """weight (tr M - log det M) in the criterion, M = sum_k chi[numbers[k]] B[k], shape (n, n);
-        Z and log Z_ii are further unknowns.
-        """
-        n, p = B.shape[1], len(self.space.origin)
-        i, j = np.tril_indices(n)
-        entries, logarithms = self.more(len(i)), self.more(n)
-        A, b = self.of_chi(on_standard(triangle(np.pad(B, ((0, 0), (0, n), (0, n)))), numbers, p))
-        Z = np.zeros((len(i), 2 * n, 2 * n))
-        Z[np.arange(len(i)), i, n + j] = Z[np.arange(len(i)), n + j, i] = 1.0
-        Z[i == j, n + i[i == j], n + i[i == j]] = 1.0
-        A[:, entries] = triangle(Z)
-        self.constraints.append((clarabel.PSDTriangleConeT(2 * n), A, b))
-        for entry, logarithm in zip(entries[i == j], logarithms, strict=True):
-            E = np.zeros((3, len(self.linear)))
-            E[0, logarithm] = E[2, entry] = 1.0
-            self.constraints.append((clarabel.ExponentialConeT(), E, np.array([0.0, 1.0, 0.0])))
-        self.linear[logarithms] = -weight
-        self.linear[: self.m] += (
-            weight * np.trace(B, axis1=1, axis2=2) @ self.space.basis[list(numbers)]
-        )
-
     def solve(self) -> Optimum:
         """The optimum, by the tightest of TOLERANCES that Clarabel reaches."""
         cones, A, b = zip(*self.constraints, strict=True)
@@ -316,47 +286,12 @@ def closest(
     """
     program = Program(space, rows, conditions, least)
     program.add_squares(R, z, 1.0)
-    if pull is not None and pull.kind == "euclidean":  # M'M well conditioned: no residuals
+    if pull is not None:  # M'M well conditioned: no residuals
         numbers, p = list(pull.numbers), len(pull.chi0)
         A, b = program.of_chi(np.eye(p)[numbers] / pull.scale[numbers, None])
         of_w, rest = A[:, : program.m], b - (pull.chi0 / pull.scale)[numbers]
         program.squares += 2 * pull.weight * of_w.T @ of_w
         program.linear[: program.m] += 2 * pull.weight * of_w.T @ rest
-    elif pull is not None:
-        for c in (c for c in conditions if c.name.startswith("link ")):
-            L = np.linalg.inv(np.linalg.cholesky(c.matrix(pull.chi0)))
-            B = L @ c.B @ L.T  # the identity at chi0
-            B = (B + B.swapaxes(1, 2)) / 2
-            if pull.kind == "entropic":
-                program.add_entropy(B, c.numbers, pull.weight)
-            else:
-                M = on_standard(triangle(B), c.numbers, len(pull.chi0))
-                program.add_squares(M, triangle(np.eye(4)[None])[:, 0], pull.weight / 2)
-    return program.solve()
-
-
-def extreme(
-    direction: Array,
-    R: Array,
-    z: Array,
-    radius: float,
-    conditions: Sequence[Condition],
-    rows: LinearBounds,
-    space: Space,
-    *,
-    least: float,
-) -> Optimum:
-    """The chi of `space` with the smallest direction'chi, direction of shape (p,), among those with
-    ||R chi - z|| <= radius; scaled as for `closest`.
-    """
-    program = Program(space, rows, conditions, least)
-    program.linear += direction @ program.space.basis
-    A, b = program.of_chi(R)
-    ball = np.vstack([np.zeros(program.m), A]), np.concatenate([[radius], b - z])
-    program.constraints.append((clarabel.SecondOrderConeT(1 + len(z)), *ball))
-    bounds = np.full(program.m, LIMIT.LARGEST_UNKNOWN)
-    program.at_least_zero(-np.eye(program.m), bounds)
-    program.at_least_zero(np.eye(program.m), bounds)
     return program.solve()
 
 

@@ -456,16 +456,7 @@ def separate(fit: Estimate) -> Answer:
 def physical(estimate: Estimate, feasibility: Feasibility | None) -> Answer:
     """Whether a physical robot can have all parameters."""
     if "standard" in estimate.details:
-        masses = estimate.details.get("masses", {})
-        loose = [name for name, mass in masses.items() if not mass["determined"]]
-        text = "Yes: they were fitted under these conditions"
-        if loose:
-            text += (
-                "; the record does not determine the masses "
-                f"{', '.join(loose[: LIMIT.PARAMETERS_NAMED])}: none of them is a value to use by "
-                "itself"
-            )
-        return Answer("good", text)
+        return Answer("good", "Yes: they were fitted under these conditions")
     if feasibility is None:
         return Answer("open", "Not asked", "symgen report, or symgen identify --physical")
     if feasibility.feasible:

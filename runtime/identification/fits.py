@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from runtime.errors import InputError
@@ -17,7 +18,10 @@ from runtime.identification.parameter_sets import (
     SetName,
     best_set,
     held_out_validation,
-    parameter_sets,
+    least_squares_sets,
+    physical_asked,
+    physical_possible,
+    physical_set,
 )
 from runtime.identification.validation import (
     CrossValidation,
@@ -42,18 +46,15 @@ class Fits:
     reduced : Essential
         By its linear companion.
     sets : mapping of str to Estimate
-        The nested sets; empty where the method is not linear.
+        The nested sets, the feasible one where it was asked; empty where the method is not linear.
     settings : mapping of str to EstimateSettings
         Settings that give each set from parts of the rows.
-    missing : tuple of str
-        Why a set is not there.
     """
 
     estimate: Estimate
     reduced: Essential
     sets: Mapping[SetName, Estimate]
     settings: Mapping[Any, EstimateSettings]
-    missing: tuple[str, ...] = ()
 
     def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
         """The estimate that stands for the robot."""
@@ -64,7 +65,7 @@ class Fits:
 def fitted(
     observation: Observation, study: Study, model: GeneratedModel, provenance: Mapping[str, Any]
 ) -> Fits:
-    """All parameters, the essential ones, and the nested sets of a linear method."""
+    """All parameters and the essential ones."""
     at("least squares, essential parameters")
     reduced = essential_of(
         observation,
@@ -74,8 +75,7 @@ def fitted(
         provenance=provenance,
     )
     if study.estimate.method in LINEAR:
-        sets, settings, note = parameter_sets(observation, study.estimate, reduced, model=model)
-        return Fits(reduced.all_parameters, reduced, sets, settings, (note,) if note else ())
+        return Fits(reduced.all_parameters, reduced, *least_squares_sets(study.estimate, reduced))
     at(study.estimate.method)
     essential = replace(study.estimate, columns=reduced.names)
     return Fits(
@@ -93,32 +93,63 @@ def validated(
     study: Study,
     model: GeneratedModel,
     name: str,
-) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
+) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
     """Windows of the records of that `name` against each other, or fifths of them where halves
-    prefer all parameters to physical ones, then further records, `unseen`; and what could not be
-    done. Nothing is validated where the method did not end well, since each validation would
-    simulate a wrong loop once more.
+    prefer all parameters to physical ones, then further records, `unseen`; the fits, with the
+    feasible set where it may stand for the robot; and what could not be done. Nothing is validated
+    where the method did not end well, since each validation would simulate a wrong loop once more.
     """
     method, status = study.estimate.method, fits.estimate.status
     if status != "ok" and method not in LINEAR:
-        return (), (*fits.missing, f"validation: {method} ended with status {status}")
+        return fits, (), (f"validation: {method} ended with status {status}",)
     at("validation")
-    validation, missing = [], list(fits.missing)
+    predict = partial(_validation, observation, unseen, study, model, name)
+    validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
+    errors = validation[-1].errors() if validation else {}
+    linear = method in LINEAR
+    possible = linear and physical_possible(observation, study.estimate, fits.estimate)
+    if possible and physical_asked(errors, study.essential.first):
+        try:
+            fit, settings = physical_set(observation, study.estimate, model)
+        except InputError as e:
+            return fits, validation, (f"physical parameters: {e}", *missing)
+        if fit.status != "ok":
+            reason = f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
+            return fits, validation, (reason, *missing)
+        sets, choices = {**fits.sets, "feasible": fit}, {**fits.settings, "feasible": settings}
+        fits = replace(fits, sets=sets, settings=choices)
+        physical, more = predict({"feasible": settings}, {"feasible": fit})
+        validation = tuple(map(CrossValidation.beside, validation, physical))
+        missing = tuple(dict.fromkeys((*missing, *more)))
+    halved = not unseen and not study.validate.split and "feasible" in fits.sets
+    if halved and validation and best_set(validation[0].errors()) == "all":
+        by_fifths = held_out_validation(observation, fits.settings, model=model)
+        validation, missing = (by_fifths,), by_fifths.missing
+    return fits, validation, missing
+
+
+def _validation(
+    observation: Observation,
+    unseen: Mapping[str, Observation],
+    study: Study,
+    model: GeneratedModel,
+    name: str,
+    choices: Mapping[Any, EstimateSettings],
+    known: Mapping[Any, Estimate],
+) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
+    """The sets `choices` between windows of the records, then those `known` of all rows on further
+    records; and what could not be done.
+    """
+    validation, missing = [], []
     try:
         windows = study.validate.split or halves(*observation.span)
-        validation.append(split_validation(observation, windows, fits.settings, model=model))
+        validation.append(split_validation(observation, windows, choices, model=model))
     except InputError as e:
         missing.append(f"validation between windows of the record: {e}")
     if unseen:
-        known = fits.sets or {"all": fits.estimate}
         validation.append(
-            cross_validation(
-                observation, unseen, fits.settings, name=name, model=model, fitted=known
-            )
+            cross_validation(observation, unseen, choices, name=name, model=model, fitted=known)
         )
-    halved = not unseen and not study.validate.split and "feasible" in fits.sets
-    if halved and validation and best_set(validation[0].errors()) == "all":
-        validation = [held_out_validation(observation, fits.settings, model=model)]
     missing += [text for part in validation for text in part.missing]
     return tuple(validation), tuple(missing)
 

@@ -10,12 +10,15 @@ The feasible set stands for the robot and is printed first, unless all parameter
 data better by more than LIMIT.PREFERRED_SET: the validation records, else the second half of the
 record and the fifths of `held_out_validation` too. Half a record may leave friction
 open, where a joint moves one way; then both sets fail on the other half, and which fails less
-means nothing.
+means nothing. The feasible set takes semidefinite programs: it is fitted where it may stand for the
+robot (`physical_asked`), or is written for a program where the essential ones do, and the weight of its prior and the bounds by reach, which all rows
+decide, hold for fits of parts of them.
 
 The essential set is an aid to reading: which parameters carry the model. Its deviations take the
 parameters that were removed as zero, and what they are in truth moves those that stay: 95 %
 intervals hold 67 to 74 % of the true values (docs/truth.md). With essential: {first: true}, the
-choice of the chapter, it stands for the robot where it predicts as well as the others.
+choice of the chapter, it stands for the robot where it predicts as well as all; the feasible set is
+then not asked.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError, instant
+from runtime.errors import instant
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.identification.validation import CrossValidation, cross_validation
@@ -41,50 +44,53 @@ SetName = Literal["essential", "feasible", "all"]
 ORDER: tuple[SetName, ...] = ("essential", "feasible", "all")
 
 
-def parameter_sets(
-    observation: Observation,
-    settings: EstimateSettings,
-    reduced: Essential,
-    *,
-    model: GeneratedModel,
-) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings], str]:
-    """The sets of a linear method that can be had, the settings that give each, and why one is
-    missing ("": none is).
-
-    The weight of the prior that the whole of the rows asks for is kept in the settings of the
-    feasible set, for fits of parts of them.
-    """
+def least_squares_sets(
+    settings: EstimateSettings, reduced: Essential
+) -> tuple[dict[SetName, Estimate], dict[SetName, EstimateSettings]]:
+    """The essential parameters and all, of a linear method, and the settings that give each."""
+    essential = EstimateSettings(settings.method, settings.weights, reduced.names, settings.options)
     sets: dict[SetName, Estimate] = {"essential": reduced.estimate, "all": reduced.all_parameters}
-    how: dict[SetName, EstimateSettings] = {
-        "essential": EstimateSettings(
-            settings.method, settings.weights, reduced.names, settings.options
-        ),
-        "all": settings,
-    }
-    if (
-        settings.columns != "all"
-        or settings.weights == "covariance"
-        or reduced.all_parameters.status != "ok"
-        or observation.reduced
-    ):
-        return sets, how, ""
+    return sets, {"essential": essential, "all": settings}
+
+
+def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
+    """Whether the feasible set may stand for the robot.
+
+    Parameters
+    ----------
+    errors : mapping of float, %
+        Of the essential parameters and of all on unseen data; empty where nothing was predicted.
+    first : bool
+        essential.first of the study.
+    """
+    known = np.isfinite(errors.get("essential", np.nan))
+    stands = first and known and best_set(errors, essential=True) == "essential"
+    return bool(errors) and not stands
+
+
+def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
+    """Whether there is a feasible set beside `fit`, all parameters by a linear method."""
+    whole = settings.columns == "all" and fit.status == "ok"
+    return whole and settings.weights != "covariance" and not observation.reduced
+
+
+def physical_set(
+    observation: Observation, settings: EstimateSettings, model: GeneratedModel
+) -> tuple[Estimate, EstimateSettings]:
+    """The feasible parameters of all rows, and the settings that give those of parts of them: with
+    the prior, its weight and the bounds by reach that all rows asked for.
+    """
     at("physical parameters")
     options = {"linear": settings.options} if settings.options else {}
     own = EstimateSettings(
         "feasible", "none" if settings.method == "ols" else "joint", "all", options
     )
-    try:
-        fit = estimate_of(observation, own, model=model)
-    except InputError as e:
-        return sets, how, f"physical parameters: {e}"
-    if fit.status != "ok":
-        return sets, how, f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
-    sets["feasible"] = fit
-    prior = fit.details["options"]["prior"] != "none"
-    how["feasible"] = (
-        replace(own, options={**options, "weight": fit.details["weight"]}) if prior else own
-    )
-    return sets, how, ""
+    fit = estimate_of(observation, own, model=model)
+    decided = fit.details["options"]
+    known = {"prior": decided["prior"], "reach": decided["reach"]}
+    if decided["prior"] != "none":
+        known["weight"] = fit.details["weight"]
+    return fit, replace(own, options={**options, **known})
 
 
 def held_out_validation(

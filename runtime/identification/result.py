@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from runtime.checks.known import torque_unit_doubt
+from runtime.checks.plausibility import Plausibility
+from runtime.errors import InputError
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR
@@ -27,6 +30,8 @@ from runtime.identification.parameter_sets import (
     ORDER,
     SetName,
     best_set,
+    physical_possible,
+    physical_set,
     ranking_text,
     whole_set,
 )
@@ -44,8 +49,6 @@ from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.plausible.known import torque_unit_doubt
-from runtime.plausible.plausibility import Plausibility
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream
@@ -215,7 +218,23 @@ class Identification:
         """All base parameters, for a robot file or a program: `model_estimate`, or the physical
         ones where the essential ones stand for the robot.
         """
-        return self.sets.get(whole_set(self.sets, self.model_columns), self.estimate)
+        return self.written_sets.get(
+            whole_set(self.written_sets, self.model_columns), self.estimate
+        )
+
+    @cached_property
+    def written_sets(self) -> Mapping[SetName, Estimate]:
+        """`sets`, and the physical set where the essential one stands for the robot: a robot file or a program is given all parameters."""
+        linear = self.study.estimate.method in LINEAR
+        if self.model_columns != "essential" or "feasible" in self.sets or not linear:
+            return self.sets
+        if not physical_possible(self.observation, self.study.estimate, self.estimate):
+            return self.sets
+        try:
+            fit, _ = physical_set(self.observation, self.study.estimate, self.model)
+        except InputError:
+            return self.sets
+        return {**self.sets, "feasible": fit} if fit.status == "ok" else self.sets
 
     @property
     def torque_unit(self) -> str:
@@ -568,7 +587,7 @@ class Identification:
                     "sigma_corrected": fit.sigma_corrected,
                     "standard": fit.details.get("standard", {}),
                 }
-                for name, fit in self.sets.items()
+                for name, fit in self.written_sets.items()
             ],
             "model_columns": self.model_columns,
         }

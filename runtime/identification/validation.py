@@ -132,6 +132,12 @@ class CrossValidation(Result):
             for columns in dict.fromkeys(p.columns for p in unseen)
         }
 
+    def beside(self, other: CrossValidation) -> CrossValidation:
+        """The predictions of both, of the same parts of the data."""
+        predictions = (*self.predictions, *other.predictions)
+        joints = self.joints or other.joints
+        return CrossValidation(joints, predictions, (*self.missing, *other.missing))
+
     def table(self, form: str = ".3f") -> Table:
         """One line per part and set of columns, errors in %."""
         return Table(

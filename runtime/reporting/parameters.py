@@ -190,11 +190,10 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
 def physical_section(result: Identification) -> Section:
     """Conditions with their smallest eigenvalues, then the standard parameters."""
     details = result.model_estimate.details
-    masses = details.get("masses", {})
     standard = Table(
         "Standard parameters of one such robot",
-        ("parameter", "value", "what the record says of it"),
-        [(n, *_value_cells(v, masses.get(n))) for n, v in details["standard"].items()],
+        ("parameter", "value"),
+        [(name, number(value, ".5g")) for name, value in details["standard"].items()],
     )
     text = (
         result.model_estimate.message,
@@ -202,25 +201,10 @@ def physical_section(result: Identification) -> Section:
         "inertia and friction not negative; all base parameters "
         "are fitted together. The standard parameters give exactly the torques of the base "
         "parameters; what the torques leave open is nearest to "
-        "the values of the robot file. A mass that the record does not determine has a dash and "
-        "its range here: standard_parameters.csv holds one complete "
-        "set, to be used as a whole.",
+        "the values of the robot file. No single one of them is a value to use by itself: "
+        "standard_parameters.csv holds one complete set, to be used as a whole.",
     )
     return Section("Physical consistency", text, tables=[result.eigenvalue_table(), standard])
-
-
-def _value_cells(value: float, mass: Mapping[str, Any] | None) -> tuple[str, str]:
-    """Value and remark of a standard parameter; of a mass that the record does not determine, a
-    dash and its range.
-    """
-    text = number(value, ".5g")
-    return (text, "") if mass is None else (text if mass["determined"] else "-", mass_text(mass))
-
-
-def mass_text(mass: Mapping[str, Any]) -> str:
-    """The range of a mass over the physical robots that explain the record."""
-    known = "determined" if mass["determined"] else "NOT determined"
-    return f"{known}: {number(mass['lowest'], '.2g')} to {number(mass['highest'], '.3g')} kg"
 
 
 def payload_section(study: PayloadStudy) -> Section:
@@ -233,13 +217,8 @@ def payload_section(study: PayloadStudy) -> Section:
 
 
 def standard_csv(fit: Estimate) -> str:
-    """standard_parameters.csv: name, value, note; a note says which masses the record does not
-    determine.
-    """
-    masses = fit.details.get("masses", {}).items()
-    loose = {name: mass_text(mass) for name, mass in masses if not mass["determined"]}
-    rows = [(name, value, loose.get(name, "")) for name, value in fit.details["standard"].items()]
-    return csv_text(("name", "value", "note"), rows)
+    """standard_parameters.csv: name, value."""
+    return csv_text(("name", "value"), list(fit.details["standard"].items()))
 
 
 def parameters_csv(result: Identification) -> str:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-WENT: Mapping[str, str] = {}
+WENT: Mapping[str, str] = {
+    "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",
+    "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
+}
 """By the key, "stream", or by the key and its value, "estimate.method: tls"; keys of lists have no
 numbers: "record.resample".
 """

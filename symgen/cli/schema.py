@@ -34,7 +34,6 @@ def schema(
 
         typer.echo(schema_text(), nl=False)
     else:
-        from runtime.identification.schemas import json_schema
-        from runtime.json_documents import json_text
+        from runtime import json_documents
 
-        typer.echo(json_text(json_schema(of)), nl=False)
+        typer.echo(json_documents.schema_text(of), nl=False)

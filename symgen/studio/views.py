@@ -82,8 +82,7 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     from symgen.emit.spec import module_spec
     from symgen.report.effects import effects
     from symgen.report.page import printed
-    from symgen.symbols import expressions
-    from symgen.symbols.printers import math, math_terms
+    from symgen.symbols import mathml, trees
 
     regrouping = symgen.regrouping(symgen.load_robot(path))
     reasons = {a.name: f"{a.columns}: {a.rule}" for a in symgen.absorptions(regrouping)}
@@ -94,15 +93,15 @@ def formulas(path: str, before: str) -> dict[str, Any]:
         difference = str(symgen.base_difference(earlier, regrouping))
     base = [
         {
-            "symbol": math(expressions.parameter(b.name)),
-            "terms": math_terms(expressions.formula(b.formula)) if b.name != b.own else [],
+            "symbol": mathml.math(trees.parameter(b.name)),
+            "terms": mathml.terms(trees.formula(b.formula)) if b.name != b.own else [],
             "unit": printed(of[b.own].unit),
         }
         for b in regrouping.base
     ]
     parameters = [
         asdict(e)
-        | {"symbol": math(expressions.parameter(e.name)), "unit": printed(e.unit)}
+        | {"symbol": mathml.math(trees.parameter(e.name)), "unit": printed(e.unit)}
         | {"why": e.why or reasons.get(e.name, "identified in its own name")}
         for e in of.values()
     ]
@@ -213,7 +212,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """Checks of record, study and robot with their remedies, and the predicted deviation of every
     parameter, %.
     """
-    from runtime.plausible.motion import unexcited_shares
+    from runtime.checks.motion import unexcited_shares
 
     loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))

@@ -255,7 +255,8 @@ def test_the_parameters_printed_first_are_written(tmp_path) -> None:
     )
     study = runtime.Study(essential=EssentialSettings(first=True))
     chapter = runtime.identify(model, record, study)
-    assert chapter.whole_estimate is chapter.sets["feasible"]
+    assert chapter.model_columns == "essential" and "feasible" not in chapter.sets
+    assert_allclose(chapter.whole_estimate.X, X, rtol=1e-9)
 
     document = json.loads((tmp_path / "results" / "estimate.json").read_text())
     next(own for own in document["sets"] if own["name"] == "feasible")["X"].pop()

@@ -16,12 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from runtime.estimators.physical import frame_origins
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, drives_of
-from runtime.model.inertia import PhysicalModel, physical_model
-from runtime.plausible.alternatives import Alternative, alternatives, unchanged
-from runtime.plausible.fits import (
+from runtime.checks.alternatives import Alternative, alternatives, unchanged
+from runtime.checks.fits import (
     Barrier,
     Fit,
     Grams,
@@ -30,7 +26,11 @@ from runtime.plausible.fits import (
     physical_fit,
     quick_fit,
 )
-from runtime.plausible.samples import Samples, moving
+from runtime.checks.samples import Samples, moving
+from runtime.estimators.physical import frame_origins
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, drives_of
+from runtime.model.inertia import PhysicalModel, physical_model
 
 Array = np.ndarray
 
