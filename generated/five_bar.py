@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 361544bd160672ea58a6b870391c252932a4e275e3903913b1b96190d9363c8b
+# sha256 of what follows: 0a56ecd62ecc477d98a212d00d3833d8e14544bc88fdd5338ce705588625e0cb
 """Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor,
     dynamics.
 
@@ -59,6 +59,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     P    origin of a frame in frame 0
@@ -66,7 +68,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
 Cost per sample
     regressor          38 multiplications, 22 additions, 4 sin, 4 cos
     inverse_dynamics   49 multiplications, 36 additions, 4 sin, 4 cos
-    inertia_matrix     27 multiplications, 17 additions, 2 sin, 1 cos
+    inertia_matrix     20 multiplications, 17 additions, 2 sin, 1 cos
     bias               45 multiplications, 30 additions, 4 sin, 4 cos
     gravity            21 multiplications, 14 additions, 4 sin, 4 cos
     frame_poses        8 multiplications, 7 additions, 4 sin, 4 cos
@@ -690,34 +692,25 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     C2 = np.cos(q2)
     S2 = np.sin(q2)
     S4 = np.sin(q4)
-    # Link 2
-    WP321 = G21 + 1
-    # Joint 4
-    F141 = -MY4*G41
-    N341 = ZZ4R*G41
-    FDI241 = S4*F141
-    NE331 = N341 + L3*FDI241
-    # Joint 2
-    F121 = -MY2*WP321
-    F221 = MX2R*WP321
-    N321 = ZZ2R*WP321 + MX2R*L1*C2 - MY2*L1*S2
-    FDI221 = S2*F121 + C2*F221
-    # Joint 1
-    NE311 = ZZ1R + N321 + L1*FDI221
-    # Link 4
-    WP343 = 1 + G43
-    # Joint 4
-    F143 = -MY4*WP343
-    N343 = ZZ4R*WP343 - MY4*L3*S4
-    FDI243 = S4*F143
-    # Joint 3
-    NE333 = ZZ3R + N343 + L3*FDI243
-    # Joint 2
-    N323 = ZZ2R*G23
+    # Composite link 4
+    AS14 = -MY4*S4
+    L3AS14 = L3*AS14
+    JP333 = ZZ3R + ZZ4R + 2*L3AS14
+    # Composite link 2
+    AS12 = MX2R*C2 - MY2*S2
+    L1AS12 = L1*AS12
+    JP331 = ZZ1R + ZZ2R + 2*L1AS12
+    # Unit acceleration of joint 2
+    NE312 = ZZ2R + L1AS12
+    # Unit acceleration of joint 4
+    NE334 = ZZ4R + L3AS14
+    # Unit acceleration of joint 5
+    A11a = NE312 + ZZ2R*G21
+    ZZ4RG41 = ZZ4R*G41
     # Inertia matrix
-    A[0, 0] = NE311 + G21*N321 + G41*N341
-    A[0, 1] = A[1, 0] = NE331 + N321*G23 + N341*G43
-    A[1, 1] = NE333 + G23*N323 + G43*N343
+    A[0, 0] = JP331 + G21*NE312 + G21*A11a + G41*ZZ4RG41
+    A[0, 1] = A[1, 0] = G41*NE334 + G23*A11a + G43*ZZ4RG41
+    A[1, 1] = JP333 + G43*NE334 + G23*ZZ2R*G23 + G43*(NE334 + ZZ4R*G43)
 
 
 def _bias_block(q, qd, qdd, G, GAM, X, L1, L3, g):

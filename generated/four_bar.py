@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: c081e48c4577e57a31fa09a59d3acb80b1ab4b65e126b999ea9537b77b60251a
+# sha256 of what follows: 6254f4bf75b198225e97ddea6c967d817b78e4d97ee75ba7192da6ad6d60f19e
 """Planar four-bar linkage, 1 actuated joint, general closed loop: base parameters, regressor,
     dynamics.
 
@@ -57,6 +57,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     P    origin of a frame in frame 0
@@ -64,7 +66,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
 Cost per sample
     regressor          22 multiplications, 13 additions, 3 sin, 2 cos
     inverse_dynamics   30 multiplications, 21 additions, 3 sin, 2 cos
-    inertia_matrix     13 multiplications, 8 additions, 1 sin, 1 cos
+    inertia_matrix     9 multiplications, 8 additions, 1 sin, 1 cos
     bias               28 multiplications, 18 additions, 3 sin, 2 cos
     gravity            14 multiplications, 8 additions, 3 sin, 2 cos
     frame_poses        6 multiplications, 4 additions, 3 sin, 3 cos
@@ -621,19 +623,14 @@ def _inertia_matrix_block(q, G, A, X, L1):
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
-    # Link 2
-    WP321 = G21 + 1
-    # Joint 3
-    N331 = ZZ3R*G31
-    # Joint 2
-    F121 = -MY2*WP321
-    F221 = MX2R*WP321
-    N321 = ZZ2R*WP321 + MX2R*L1*C2 - MY2*L1*S2
-    FDI221 = S2*F121 + C2*F221
-    # Joint 1
-    NE311 = ZZ1R + N321 + L1*FDI221
+    # Composite link 2
+    AS12 = MX2R*C2 - MY2*S2
+    L1AS12 = L1*AS12
+    JP331 = ZZ1R + ZZ2R + 2*L1AS12
+    # Unit acceleration of joint 2
+    NE312 = ZZ2R + L1AS12
     # Inertia matrix
-    A[0, 0] = NE311 + G21*N321 + G31*N331
+    A[0, 0] = JP331 + G21*NE312 + G21*(NE312 + ZZ2R*G21) + G31*ZZ3R*G31
 
 
 def _bias_block(q, qd, qdd, G, GAM, X, L1, g):

@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: ae50655a4d4fe4886626769f0b0443e8e75ccfb6e285edfc8a5cd723e2ab4707
+# sha256 of what follows: c02b8ccf277b6597693ad3b71afb4826a9812a50e9c0729b51492a9e5236129f
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
     parallelogram: base parameters, regressor, dynamics.
 
@@ -67,6 +67,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DF   the part of DG that pushes: velocity times force
@@ -74,12 +77,12 @@ Names       family, then component digits, then link: W12 is component 1 of link
     P    origin of a frame in frame 0
 
 Cost per sample
-    regressor          97 multiplications, 58 additions, 6 sin, 6 cos
-    inverse_dynamics   141 multiplications, 119 additions, 6 sin, 6 cos
-    inertia_matrix     42 multiplications, 26 additions, 4 sin, 5 cos
-    bias               131 multiplications, 98 additions, 6 sin, 6 cos
+    regressor          97 multiplications, 58 additions, 5 sin, 5 cos
+    inverse_dynamics   141 multiplications, 117 additions, 5 sin, 5 cos
+    inertia_matrix     46 multiplications, 33 additions, 4 sin, 4 cos
+    bias               131 multiplications, 96 additions, 5 sin, 5 cos
     gravity            42 multiplications, 33 additions, 5 sin, 5 cos
-    frame_poses        21 multiplications, 6 additions, 4 sin, 4 cos
+    frame_poses        21 multiplications, 6 additions, 3 sin, 3 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis
             of samples; rad or m and seconds
@@ -792,9 +795,6 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     MY3 = X[22]
     MX4R = X[23]
     MY6 = X[29]
-    # Constants
-    Z241 = np.cos(c)
-    F341 = -Z241*MX4R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -806,44 +806,49 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     th5b = q5 - c
     C5b = np.cos(th5b)
     S5b = np.sin(th5b)
-    # Link 3
-    C2D3 = D3*C2
-    # Link 4
-    VSP341 = C2D3 - D4*C5
-    # Joint 6
-    F361 = -MY6*S2
-    N161 = MY6*D6*C5
-    NE151 = C2m5*N161
-    NE251 = S2m5*N161 - D6*F361
-    # Joint 4
-    N241 = -MX4R*VSP341
-    # Joint 3
-    F331 = MY3*S5 - MX3R*C5
-    E331 = F341 + F331
-    N331 = YZ3R*C5 + XZ3R*S5
-    N131 = XX3R*S5 + XY3R*C5 + MY3*C2D3
-    N231 = XY3R*S5 - MX3R*C2D3
-    NE131 = S5b*N241 + N131
-    NE231 = C5b*N241 + N231 - D4*F341
-    # Joint 2
-    N121 = -XX2R*S2 - XY2R*C2
-    N221 = -XY2R*S2
-    N321 = -YZ2R*C2 - XZ2R*S2
-    NE121 = N121 - C2m5*NE131 - S2m5*NE231
-    NE221 = S2m5*NE131 + N221 - C2m5*NE231 - D3*E331
-    # Joint 1
-    NE311 = ZZ1R - S5*NE151 - C5*NE251 - S2*NE121 - C2*NE221
-    # Joint 6
-    FDI262 = -MY6*S2m5
-    NE352 = D6*FDI262
-    # Joint 3
-    N332 = -MX3R*D3*C2m5 - MY3*D3*S2m5
+    # Composite link 7
+    C2m5C2m5 = C2m5**2
+    C2m5S2m5 = C2m5*S2m5
+    # Composite link 6
+    AS16 = -MY6*S2m5
+    AS26 = MY6*C2m5
+    NE356 = D6*AS16
+    JP225 = 2*NE356
+    JP125 = -D6*AS26
+    # Composite link 4
+    AS14 = MX4R*C5b
+    AS24 = -MX4R*S5b
+    NE334 = D4*AS14
+    JP223 = 2*NE334
+    JP123 = XY3R - D4*AS24
+    MSP13 = MX3R + AS14
+    MSP23 = MY3 + AS24
+    # Composite link 3
+    AS13 = -C2m5*MSP13 - S2m5*MSP23
+    AS23 = S2m5*MSP13 - C2m5*MSP23
+    JP112a = XX3R - JP223
+    JP112b = C2m5C2m5*JP112a + 2*C2m5S2m5*JP123
+    NE123 = -XZ3R*C2m5 - YZ3R*S2m5
+    NE223 = XZ3R*S2m5 - YZ3R*C2m5
+    D3AS13 = D3*AS13
+    JP112 = XX2R + JP223 + JP112b
+    JP122 = XY2R + 2*C2m5C2m5*JP123 - C2m5S2m5*JP112a - JP123 - D3*AS23
+    JP132 = XZ2R + NE123
+    JP222 = XX3R + 2*D3AS13 - JP112b
+    JP232 = YZ2R + NE223
+    # Composite link 2
+    NE312 = -S2*JP132 - C2*JP232
+    JP331 = ZZ1R + JP225*C5**2 + JP125*2*C5*S5 + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    # Unit acceleration of joint 3
+    NE313 = -S2*NE123 - C2*NE223
+    # Unit acceleration of joint 4
+    E224 = -S2m5*AS24 - C2m5*AS14
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = N321
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312 - NE313
     A[1, 1] = ZZ2R
-    A[0, 2] = A[2, 0] = N331
-    A[1, 2] = A[2, 1] = NE352 + N332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE356 + D3AS13 - D3*E224
     A[2, 2] = ZZ3R
 
 

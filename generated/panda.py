@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: d6970e2aaadf0428c375d0396e17a9ccfe06852b2ef18b4a956ea3e5927ebd5e
+# sha256 of what follows: f4233d13050e8322601f668a62b336e510310a83a919d84814a85c67e98161ad
 """Franka Emika Panda, 7 revolute joints: base parameters, regressor, dynamics.
 
 GENERATED from panda.yaml, sha256 69d8ce994a1a, by symgen 0.2.0.
@@ -57,6 +57,10 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AJA  the inertia tensor JP by the axes of the antecedent's frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DF   the part of DG that pushes: velocity times force
@@ -65,9 +69,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 
 Cost per sample
     regressor          684 multiplications, 497 additions, 6 sin, 6 cos
-    inverse_dynamics   333 multiplications, 321 additions, 6 sin, 6 cos
-    inertia_matrix     567 multiplications, 415 additions, 6 sin, 6 cos
-    bias               322 multiplications, 299 additions, 6 sin, 6 cos
+    inverse_dynamics   333 multiplications, 315 additions, 6 sin, 6 cos
+    inertia_matrix     207 multiplications, 171 additions, 6 sin, 6 cos
+    bias               322 multiplications, 293 additions, 6 sin, 6 cos
     gravity            60 multiplications, 42 additions, 6 sin, 6 cos
     frame_poses        77 multiplications, 41 additions, 7 sin, 7 cos
 
@@ -1300,381 +1304,186 @@ def _inertia_matrix_block(q, A, X, RL3, D4, RL5, D7):
     S6 = np.sin(q6)
     C7 = np.cos(q7)
     S7 = np.sin(q7)
-    # Link 3
-    S2C3 = S2*C3
-    S2S3 = S2*S3
-    VSP331 = RL3*S2
-    S3VSP331 = S3*VSP331
-    C3VSP331 = C3*VSP331
-    # Link 4
-    F371a = C4*S2C3 - C2*S4
-    VSP351a = C2*C4 + S4*S2C3
-    D4S2S3 = D4*S2S3
-    VSP241 = C3VSP331 + D4*C2
-    VP141 = C4*S3VSP331 - S4*D4S2S3
-    VP241 = -C4*D4S2S3 - S4*S3VSP331
-    # Link 5
-    F371b = C5*F371a - S5*S2S3
-    F371c = C5*S2S3 + S5*F371a
-    VSP151 = VP141 + RL5*S2S3
-    VSP251 = D4S2S3 + VP241
-    VSP351 = D4*VSP351a - VSP241 - RL5*F371a
-    VP151 = C5*VSP151 - S5*VSP351
-    VP251 = -C5*VSP351 - S5*VSP151
-    # Link 6
-    F371d = C6*F371b - S6*VSP351a
-    VSP371a = C6*VSP351a + S6*F371b
-    VP161 = C6*VP151 + S6*VSP251
-    VP261 = C6*VSP251 - S6*VP151
-    # Link 7
-    F371e = C7*F371d + S7*F371c
-    F371f = C7*F371c - S7*F371d
-    VSP271 = VP261 - D7*F371c
-    VSP371 = -VP251 - D7*VSP371a
-    VP171 = C7*VP161 + S7*VSP371
-    VP271 = C7*VSP371 - S7*VP161
-    # Joint 7
-    F171 = MY7*VSP371a
-    F271 = -MX7*VSP371a
-    F371 = MX7*F371f - MY7*F371e
-    N171 = -XX7R*F371e - XZ7*VSP371a - XY7*F371f - MY7*VSP271
-    N271 = MX7*VSP271 - XY7*F371e - YZ7*VSP371a
-    N371 = MX7*VP271 - ZZ7*VSP371a - YZ7*F371f - XZ7*F371e - MY7*VP171
-    FDI171 = C7*F171 - S7*F271
-    FDI371 = S7*F171 + C7*F271
-    # Joint 6
-    F161 = MY6R*F371c
-    F261 = -MX6R*F371c
-    F361 = -MX6R*VSP371a - MY6R*F371d
-    E161 = FDI171 + F161
-    E261 = F261 - F371
-    E361 = FDI371 + F361
-    N161 = XY6R*VSP371a - XX6R*F371d - XZ6*F371c - MY6R*VP251
-    N261 = MX6R*VP251 - XY6R*F371d - YZ6*F371c
-    N361 = YZ6*VSP371a + MX6R*VP261 - ZZ6R*F371c - XZ6*F371d - MY6R*VP161
-    NE161 = C7*N171 + N161 - S7*N271
-    NE261 = N261 - N371 - D7*FDI371
-    NE361 = S7*N171 + C7*N271 + N361 - D7*F371
-    FDI161 = C6*E161 - S6*E261
-    FDI361 = S6*E161 + C6*E261
-    # Joint 5
-    F151 = -MY5R*VSP351a
-    F251 = MX5*VSP351a
-    F351 = -MX5*F371c - MY5R*F371b
-    E151 = FDI161 + F151
-    E251 = F251 - E361
-    E351 = FDI361 + F351
-    N151 = XZ5*VSP351a + XY5*F371c + MY5R*VSP251 - XX5R*F371b
-    N251 = YZ5*VSP351a - XY5*F371b - MX5*VSP251
-    N351 = ZZ5R*VSP351a + YZ5*F371c + MX5*VP251 - XZ5*F371b - MY5R*VP151
-    NE151 = C6*NE161 + N151 - S6*NE261
-    NE251 = N251 - NE361
-    NE351 = S6*NE161 + C6*NE261 + N351
-    FDI151 = C5*E151 - S5*E251
-    FDI351 = -S5*E151 - C5*E251
-    # Joint 4
-    F141 = MY4R*S2S3
-    F241 = -MX4R*S2S3
-    F341 = -MX4R*VSP351a - MY4R*F371a
-    E141 = FDI151 + F141
-    E241 = E351 + F241
-    E341 = FDI351 + F341
-    N141 = XY4R*VSP351a - XX4R*F371a - XZ4*S2S3 - MY4R*VSP241
-    N241 = MX4R*VSP241 - XY4R*F371a - YZ4*S2S3
-    N341 = YZ4*VSP351a + MX4R*VP241 - ZZ4R*S2S3 - XZ4*F371a - MY4R*VP141
-    NE141 = C5*NE151 + RL5*FDI351 + N141 - S5*NE251
-    NE241 = NE351 + D4*FDI351 + N241
-    NE341 = N341 - S5*NE151 - C5*NE251 - D4*E351 - RL5*FDI151
-    FDI141 = C4*E141 - S4*E241
-    FDI341 = S4*E141 + C4*E241
-    # Joint 3
-    F131 = -MY3R*C2
-    F231 = MX3R*C2
-    E131 = FDI141 + F131
-    E231 = F231 - E341
-    N131 = XZ3*C2 + XY3R*S2S3 - XX3R*S2C3
-    N231 = YZ3*C2 - XY3R*S2C3
-    N331 = ZZ3R*C2 + YZ3*S2S3 + MX3R*C3VSP331 - XZ3*S2C3 - MY3R*S3VSP331
-    NE131 = C4*NE141 + N131 - S4*NE241
-    NE231 = N231 - NE341 - D4*FDI341
-    NE331 = S4*NE141 + C4*NE241 + N331 - D4*E341
-    FDI131 = C3*E131 - S3*E231
-    FDI331 = S3*E131 + C3*E231
-    # Joint 2
-    N121 = -XX2R*S2 - XY2*C2
-    N221 = -XY2*S2
-    N321 = -YZ2*C2 - XZ2*S2
-    NE121 = C3*NE131 + N121 - S3*NE231 - RL3*FDI331
-    NE221 = N221 - NE331
-    NE321 = S3*NE131 + C3*NE231 + RL3*FDI131 + N321
-    # Joint 1
-    NE311 = ZZ1R - S2*NE121 - C2*NE221
-    # Link 3
-    C3RL3 = RL3*C3
-    S3RL3 = RL3*S3
-    # Link 4
-    S3C4 = S3*C4
-    S3S4 = S3*S4
-    C3D4 = D4*C3
-    VP142 = C4*C3RL3 - S4*C3D4
-    VP242 = -C4*C3D4 - S4*C3RL3
-    # Link 5
-    F372a = C5*S3C4 + C3*S5
-    F372b = C3*C5 - S5*S3C4
-    VSP152 = VP142 + RL5*C3
-    VSP252 = C3D4 + VP242
-    VSP352 = S3RL3 + RL5*S3C4 - D4*S3S4
-    VP152 = C5*VSP152 - S5*VSP352
-    VP252 = -C5*VSP352 - S5*VSP152
-    # Link 6
-    F372c = C6*F372a - S6*S3S4
-    VSP372a = C6*S3S4 + S6*F372a
-    VP162 = C6*VP152 + S6*VSP252
-    VP262 = C6*VSP252 - S6*VP152
-    # Link 7
-    F372d = C7*F372c - S7*F372b
-    F372e = C7*F372b + S7*F372c
-    VSP272 = VP262 - D7*F372b
-    VSP372 = D7*VSP372a - VP252
-    VP172 = C7*VP162 + S7*VSP372
-    VP272 = C7*VSP372 - S7*VP162
-    # Joint 7
-    F172 = -MY7*VSP372a
-    F272 = MX7*VSP372a
-    F372 = MX7*F372e + MY7*F372d
-    N172 = XX7R*F372d + XZ7*VSP372a - XY7*F372e - MY7*VSP272
-    N272 = XY7*F372d + YZ7*VSP372a + MX7*VSP272
-    N372 = ZZ7*VSP372a + XZ7*F372d + MX7*VP272 - YZ7*F372e - MY7*VP172
-    FDI172 = C7*F172 - S7*F272
-    FDI372 = S7*F172 + C7*F272
-    # Joint 6
-    F162 = MY6R*F372b
-    F262 = -MX6R*F372b
-    F362 = MX6R*VSP372a + MY6R*F372c
-    E162 = FDI172 + F162
-    E262 = F262 - F372
-    E362 = FDI372 + F362
-    N162 = XX6R*F372c - XZ6*F372b - XY6R*VSP372a - MY6R*VP252
-    N262 = XY6R*F372c + MX6R*VP252 - YZ6*F372b
-    N362 = XZ6*F372c + MX6R*VP262 - ZZ6R*F372b - YZ6*VSP372a - MY6R*VP162
-    NE162 = C7*N172 + N162 - S7*N272
-    NE262 = N262 - N372 - D7*FDI372
-    NE362 = S7*N172 + C7*N272 + N362 - D7*F372
-    FDI162 = C6*E162 - S6*E262
-    FDI362 = S6*E162 + C6*E262
-    # Joint 5
-    F152 = MY5R*S3S4
-    F252 = -MX5*S3S4
-    F352 = MY5R*F372a - MX5*F372b
-    E152 = FDI162 + F152
-    E252 = F252 - E362
-    E352 = FDI362 + F352
-    N152 = XX5R*F372a + XY5*F372b + MY5R*VSP252 - XZ5*S3S4
-    N252 = XY5*F372a - YZ5*S3S4 - MX5*VSP252
-    N352 = YZ5*F372b + XZ5*F372a + MX5*VP252 - ZZ5R*S3S4 - MY5R*VP152
-    NE152 = C6*NE162 + N152 - S6*NE262
-    NE252 = N252 - NE362
-    NE352 = S6*NE162 + C6*NE262 + N352
-    FDI152 = C5*E152 - S5*E252
-    FDI352 = -S5*E152 - C5*E252
-    # Joint 4
-    F142 = MY4R*C3
-    F242 = -MX4R*C3
-    F342 = MX4R*S3S4 + MY4R*S3C4
-    E142 = FDI152 + F142
-    E242 = E352 + F242
-    E342 = FDI352 + F342
-    N142 = XX4R*S3C4 + MY4R*S3RL3 - XZ4*C3 - XY4R*S3S4
-    N242 = XY4R*S3C4 - YZ4*C3 - MX4R*S3RL3
-    N342 = XZ4*S3C4 + MX4R*VP242 - ZZ4R*C3 - YZ4*S3S4 - MY4R*VP142
-    NE142 = C5*NE152 + RL5*FDI352 + N142 - S5*NE252
-    NE242 = NE352 + D4*FDI352 + N242
-    NE342 = N342 - S5*NE152 - C5*NE252 - D4*E352 - RL5*FDI152
-    FDI142 = C4*E142 - S4*E242
-    FDI342 = S4*E142 + C4*E242
-    # Joint 3
-    N132 = XX3R*S3 + XY3R*C3
-    N232 = XY3R*S3
-    N332 = YZ3*C3 + XZ3*S3 - MX3R*S3RL3 - MY3R*C3RL3
-    NE132 = C4*NE142 + N132 - S4*NE242
-    NE232 = N232 - NE342 - D4*FDI342
-    NE332 = S4*NE142 + C4*NE242 + N332 - D4*E342
-    FDI132 = C3*FDI142 + S3*E342
-    # Joint 2
-    NE322 = ZZ2R + S3*NE132 + C3*NE232 + RL3*FDI132
-    # Link 5
-    S4C5 = S4*C5
-    S4S5 = S4*S5
-    VSP353 = D4*C4 + RL5*S4 - D4
-    S5VSP353 = S5*VSP353
-    C5VSP353 = C5*VSP353
-    # Link 6
-    F373a = C6*S4C5 + C4*S6
-    VSP373a = C4*C6 - S6*S4C5
-    C6S5VSP353 = C6*S5VSP353
-    S6S5VSP353 = S6*S5VSP353
-    # Link 7
-    F373b = C7*F373a + S7*S4S5
-    F373c = C7*S4S5 - S7*F373a
-    VSP273 = S6S5VSP353 + D7*S4S5
-    VSP373 = C5VSP353 - D7*VSP373a
-    VP173 = S7*VSP373 - C7*C6S5VSP353
-    VP273 = C7*VSP373 + S7*C6S5VSP353
-    # Joint 7
-    F173 = MY7*VSP373a
-    F273 = -MX7*VSP373a
-    F373 = MY7*F373b - MX7*F373c
-    N173 = XX7R*F373b + XY7*F373c - XZ7*VSP373a - MY7*VSP273
-    N273 = XY7*F373b + MX7*VSP273 - YZ7*VSP373a
-    N373 = YZ7*F373c + XZ7*F373b + MX7*VP273 - ZZ7*VSP373a - MY7*VP173
-    FDI173 = C7*F173 - S7*F273
-    FDI373 = S7*F173 + C7*F273
-    # Joint 6
-    F163 = -MY6R*S4S5
-    F263 = MX6R*S4S5
-    F363 = MY6R*F373a - MX6R*VSP373a
-    E163 = FDI173 + F163
-    E263 = F263 - F373
-    E363 = FDI373 + F363
-    N163 = XX6R*F373a + XZ6*S4S5 + XY6R*VSP373a + MY6R*C5VSP353
-    N263 = XY6R*F373a + YZ6*S4S5 - MX6R*C5VSP353
-    N363 = ZZ6R*S4S5 + YZ6*VSP373a + XZ6*F373a + MX6R*S6S5VSP353 + MY6R*C6S5VSP353
-    NE163 = C7*N173 + N163 - S7*N273
-    NE263 = N263 - N373 - D7*FDI373
-    NE363 = S7*N173 + C7*N273 + N363 - D7*F373
-    FDI163 = C6*E163 - S6*E263
-    FDI363 = S6*E163 + C6*E263
-    # Joint 5
-    F153 = -MY5R*C4
-    F253 = MX5*C4
-    F353 = MX5*S4S5 + MY5R*S4C5
-    E153 = FDI163 + F153
-    E253 = F253 - E363
-    E353 = FDI363 + F353
-    N153 = XX5R*S4C5 + XZ5*C4 - XY5*S4S5
-    N253 = XY5*S4C5 + YZ5*C4
-    N353 = ZZ5R*C4 + XZ5*S4C5 + MY5R*S5VSP353 - YZ5*S4S5 - MX5*C5VSP353
-    NE153 = C6*NE163 + N153 - S6*NE263
-    NE253 = N253 - NE363
-    NE353 = S6*NE163 + C6*NE263 + N353
-    FDI153 = C5*E153 - S5*E253
-    FDI353 = -S5*E153 - C5*E253
-    # Joint 4
-    F343 = MY4R*S4 - MX4R*C4
-    E343 = FDI353 + F343
-    N343 = YZ4*C4 + XZ4*S4
-    N143 = XX4R*S4 + XY4R*C4 - D4*MY4R
-    N243 = XY4R*S4 + D4*MX4R
-    NE143 = C5*NE153 + RL5*FDI353 + N143 - S5*NE253
-    NE243 = NE353 + D4*FDI353 + N243
-    NE343 = N343 - S5*NE153 - C5*NE253 - D4*E353 - RL5*FDI153
-    # Joint 3
-    NE333 = ZZ3R + S4*NE143 + C4*NE243 - D4*E343
-    # Link 5
-    C5RL5 = RL5*C5
-    S5RL5 = RL5*S5
-    # Link 6
-    S5C6 = S5*C6
-    S5S6 = S5*S6
-    VP164 = -C6*C5RL5 - D4*S6
-    VP264 = S6*C5RL5 - D4*C6
-    # Link 7
-    F374a = C7*S5C6 - C5*S7
-    F374b = C5*C7 + S7*S5C6
-    VSP274 = VP264 + D7*C5
-    VSP374 = -S5RL5 - D7*S5S6
-    VP174 = C7*VP164 + S7*VSP374
-    VP274 = C7*VSP374 - S7*VP164
-    # Joint 7
-    F174 = MY7*S5S6
-    F274 = -MX7*S5S6
-    F374 = -MX7*F374b - MY7*F374a
-    N174 = XY7*F374b - XX7R*F374a - XZ7*S5S6 - MY7*VSP274
-    N274 = MX7*VSP274 - XY7*F374a - YZ7*S5S6
-    N374 = YZ7*F374b + MX7*VP274 - ZZ7*S5S6 - XZ7*F374a - MY7*VP174
-    FDI174 = C7*F174 - S7*F274
-    FDI374 = S7*F174 + C7*F274
-    # Joint 6
-    F164 = -MY6R*C5
-    F264 = MX6R*C5
-    F364 = -MX6R*S5S6 - MY6R*S5C6
-    E164 = FDI174 + F164
-    E264 = F264 - F374
-    E364 = FDI374 + F364
-    N164 = XZ6*C5 + XY6R*S5S6 - XX6R*S5C6 - MY6R*S5RL5
-    N264 = YZ6*C5 + MX6R*S5RL5 - XY6R*S5C6
-    N364 = ZZ6R*C5 + YZ6*S5S6 + MX6R*VP264 - XZ6*S5C6 - MY6R*VP164
-    NE164 = C7*N174 + N164 - S7*N274
-    NE264 = N264 - N374 - D7*FDI374
-    NE364 = S7*N174 + C7*N274 + N364 - D7*F374
-    FDI164 = C6*E164 - S6*E264
-    FDI364 = S6*E164 + C6*E264
-    # Joint 5
-    F354 = MX5*C5 - MY5R*S5
-    E354 = FDI364 + F354
-    N154 = -XX5R*S5 - XY5*C5 - D4*MY5R
-    N254 = D4*MX5 - XY5*S5
-    N354 = MX5*S5RL5 + MY5R*C5RL5 - YZ5*C5 - XZ5*S5
-    NE154 = C6*NE164 + N154 - S6*NE264
-    NE254 = N254 - NE364
-    NE354 = S6*NE164 + C6*NE264 + N354
-    FDI154 = C5*FDI164 + S5*E364
-    # Joint 4
-    NE344 = ZZ4R - S5*NE154 - C5*NE254 - D4*E354 - RL5*FDI154
-    # Link 7
-    S6C7 = S6*C7
-    S6S7 = S6*S7
-    C6D7 = D7*C6
-    # Joint 7
-    F375 = MX7*S6S7 + MY7*S6C7
-    N175 = XX7R*S6C7 - XZ7*C6 - XY7*S6S7
-    N275 = XY7*S6C7 - YZ7*C6
-    N375a = MX7*C7*C6D7 - MY7*S7*C6D7
-    N375 = XZ7*S6C7 - ZZ7*C6 - YZ7*S6S7 - N375a
-    # Joint 6
-    N165 = XX6R*S6 + XY6R*C6
-    N265 = XY6R*S6
-    N365 = YZ6*C6 + XZ6*S6
-    NE165 = C7*N175 + N165 - S7*N275
-    NE265 = N375a + N265 - N375
-    NE365 = S7*N175 + C7*N275 + N365 - D7*F375
-    # Joint 5
-    NE355 = ZZ5R + S6*NE165 + C6*NE265
-    # Joint 7
-    F376 = MY7*S7 - MX7*C7
-    N376 = YZ7*C7 + XZ7*S7
-    N176 = XX7R*S7 + XY7*C7 - D7*MY7
-    N276 = XY7*S7 + D7*MX7
-    # Joint 6
-    NE366 = ZZ6R + S7*N176 + C7*N276 - D7*F376
+    # Composite link 7
+    AS17 = MX7*C7 - MY7*S7
+    AS37 = MX7*S7 + MY7*C7
+    C7C7 = C7**2
+    C7S7 = C7*S7
+    AJA117 = XX7R*C7C7 - XY7*2*C7S7
+    NE167 = XZ7*C7 - YZ7*S7
+    NE367 = XZ7*S7 + YZ7*C7
+    D7AS17 = D7*AS17
+    JP226a = 2*D7AS17
+    JP116 = XX6R + AJA117
+    JP126 = XY6R - NE167
+    JP136 = XZ6 + XX7R*C7S7 + XY7*2*C7C7 - XY7 - D7*AS37
+    JP226 = ZZ7 + JP226a
+    JP236 = YZ6 - NE367
+    JP336 = ZZ6R + XX7R + JP226a - AJA117
+    MSP16 = MX6R + AS17
+    # Composite link 6
+    AS16 = C6*MSP16 - MY6R*S6
+    AS36 = S6*MSP16 + MY6R*C6
+    C6C6 = C6**2
+    C6S6 = C6*S6
+    JP115a = JP116 - JP226
+    JP115b = C6C6*JP115a - JP126*2*C6S6
+    NE156 = C6*JP136 - S6*JP236
+    NE356 = S6*JP136 + C6*JP236
+    JP115 = XX5R + JP226 + JP115b
+    JP125 = XY5 - NE156
+    JP135 = XZ5 + C6S6*JP115a + JP126*2*C6C6 - JP126
+    JP235 = YZ5 - NE356
+    JP335 = ZZ5R + JP116 - JP115b
+    MSP15 = MX5 + AS16
+    MSP25 = MY5R - AS37
+    # Composite link 5
+    AS15 = C5*MSP15 - S5*MSP25
+    AS35 = -S5*MSP15 - C5*MSP25
+    C5C5 = C5**2
+    C5S5 = C5*S5
+    JP114a = JP336 - JP115
+    JP114b = C5C5*JP114a + JP125*2*C5S5
+    AJA125 = C5*JP135 - S5*JP235
+    D4AS15 = D4*AS15
+    RL5AS36 = RL5*AS36
+    RL5AS15 = RL5*AS15
+    D4AS35 = D4*AS35
+    JP114 = XX4R + JP336 + 2*RL5AS36 - JP114b
+    JP124 = XY4R + AJA125 + D4*AS36 - RL5AS15
+    JP134 = XZ4 + C5S5*JP114a + JP125 + D4AS35 - JP125*2*C5C5
+    JP224 = JP335 - 2*D4AS15
+    NE345 = -S5*JP135 - C5*JP235 - RL5*AS35
+    JP234 = YZ4 + NE345
+    JP334 = ZZ4R + JP115 + JP114b - 2*(D4AS15 - RL5AS36)
+    MSP14 = MX4R + AS15
+    MSP24 = MY4R + AS36
+    # Composite link 4
+    AS14 = C4*MSP14 - S4*MSP24
+    AS34 = S4*MSP14 + C4*MSP24
+    C4C4 = C4**2
+    C4S4 = C4*S4
+    JP113a = JP114 - JP224
+    JP113b = C4C4*JP113a - JP124*2*C4S4
+    NE134 = C4*JP134 - S4*JP234
+    NE334 = S4*JP134 + C4*JP234
+    D4AS14 = D4*AS14
+    JP223a = 2*D4AS14
+    JP113 = XX3R + JP224 + JP113b
+    JP123 = XY3R + D4AS35 - NE134
+    JP133 = XZ3 + C4S4*JP113a + JP124*2*C4C4 - JP124 - D4*AS34
+    JP223 = JP334 + JP223a
+    JP233 = YZ3 - NE334
+    JP333 = ZZ3R + JP114 + JP223a - JP113b
+    MSP13 = MX3R + AS14
+    MSP23 = MY3R - AS35
+    # Composite link 3
+    AS13 = C3*MSP13 - S3*MSP23
+    AS33 = S3*MSP13 + C3*MSP23
+    C3C3 = C3**2
+    C3S3 = C3*S3
+    JP112a = JP113 - JP223
+    JP112b = C3C3*JP112a - JP123*2*C3S3
+    JP112c = 2*RL3*AS34
+    JP112 = XX2R + JP223 + JP112b + JP112c
+    NE123 = C3*JP133 - S3*JP233 - RL3*AS13
+    JP122 = XY2 - NE123
+    JP132 = XZ2 + C3S3*JP112a + JP123*2*C3C3 - JP123
+    NE323 = S3*JP133 + C3*JP233 - RL3*AS33
+    JP232 = YZ2 - NE323
+    JP332 = ZZ2R + JP113 + JP112c - JP112b
+    # Composite link 2
+    NE312 = -S2*JP132 - C2*JP232
+    JP331 = ZZ1R + JP112 + C2**2*(JP333 - JP112) + JP122*2*C2*S2
+    # Unit acceleration of joint 3
+    NE313 = C2*JP333 - S2*NE123
+    # Unit acceleration of joint 4
+    NE234 = -JP334 - D4AS14
+    E124 = -C3*AS34
+    E324 = -S3*AS34
+    NE124 = C3*NE134 - S3*NE234 - RL3*E324
+    NE324 = S3*NE134 + C3*NE234 + RL3*E124
+    NE314 = C2*NE334 - S2*NE124
+    # Unit acceleration of joint 5
+    NE145 = AJA125 - RL5AS15
+    NE245 = JP335 - D4AS15
+    E135 = C4*AS35
+    E335 = S4*AS35
+    NE135 = C4*NE145 - S4*NE245
+    NE235 = -NE345 - D4*E335
+    NE335 = D4AS15 + S4*NE145 + C4*NE245
+    E125 = C3*E135 - S3*AS15
+    E325 = S3*E135 + C3*AS15
+    NE125 = C3*NE135 - S3*NE235 - RL3*E325
+    NE325 = S3*NE135 + C3*NE235 + RL3*E125
+    NE315 = C2*NE335 - S2*NE125
+    # Unit acceleration of joint 6
+    E146 = -C5*AS36
+    E346 = S5*AS36
+    D4E346 = D4*E346
+    NE146 = C5*NE156 + S5*JP336 + RL5*E346
+    NE246 = NE356 + D4E346
+    NE346 = C5*JP336 - S5*NE156 - D4*AS16 - RL5*E146
+    E136 = C4*E146 - S4*AS16
+    E336 = S4*E146 + C4*AS16
+    NE136 = C4*NE146 - S4*NE246
+    NE236 = -NE346 - D4*E336
+    NE336 = S4*NE146 + C4*NE246 - D4E346
+    E126 = C3*E136 + S3*E346
+    E326 = S3*E136 - C3*E346
+    NE126 = C3*NE136 - S3*NE236 - RL3*E326
+    NE326 = S3*NE136 + C3*NE236 + RL3*E126
+    NE316 = C2*NE336 - S2*NE126
+    # Unit acceleration of joint 7
+    NE267 = -ZZ7 - D7AS17
+    E157 = -C6*AS37
+    E357 = -S6*AS37
+    NE157 = C6*NE167 - S6*NE267
+    NE357 = S6*NE167 + C6*NE267
+    E147 = C5*E157 + S5*AS17
+    E347 = C5*AS17 - S5*E157
+    D4E347 = D4*E347
+    NE147 = C5*NE157 + S5*NE367 + RL5*E347
+    NE247 = NE357 + D4E347
+    NE347 = C5*NE367 - S5*NE157 - D4*E357 - RL5*E147
+    E137 = C4*E147 - S4*E357
+    E337 = S4*E147 + C4*E357
+    NE137 = C4*NE147 - S4*NE247
+    NE237 = -NE347 - D4*E337
+    NE337 = S4*NE147 + C4*NE247 - D4E347
+    E127 = C3*E137 + S3*E347
+    E327 = S3*E137 - C3*E347
+    NE127 = C3*NE137 - S3*NE237 - RL3*E327
+    NE327 = S3*NE137 + C3*NE237 + RL3*E127
+    NE317 = C2*NE337 - S2*NE127
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = NE321
-    A[1, 1] = NE322
-    A[0, 2] = A[2, 0] = NE331
-    A[1, 2] = A[2, 1] = NE332
-    A[2, 2] = Ia3 + NE333
-    A[0, 3] = A[3, 0] = NE341
-    A[1, 3] = A[3, 1] = NE342
-    A[2, 3] = A[3, 2] = NE343
-    A[3, 3] = Ia4 + NE344
-    A[0, 4] = A[4, 0] = NE351
-    A[1, 4] = A[4, 1] = NE352
-    A[2, 4] = A[4, 2] = NE353
-    A[3, 4] = A[4, 3] = NE354
-    A[4, 4] = Ia5 + NE355
-    A[0, 5] = A[5, 0] = NE361
-    A[1, 5] = A[5, 1] = NE362
-    A[2, 5] = A[5, 2] = NE363
-    A[3, 5] = A[5, 3] = NE364
-    A[4, 5] = A[5, 4] = NE365
-    A[5, 5] = Ia6 + NE366
-    A[0, 6] = A[6, 0] = N371
-    A[1, 6] = A[6, 1] = N372
-    A[2, 6] = A[6, 2] = N373
-    A[3, 6] = A[6, 3] = N374
-    A[4, 6] = A[6, 4] = N375
-    A[5, 6] = A[6, 5] = N376
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
+    A[2, 2] = Ia3 + JP333
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE324
+    A[2, 3] = A[3, 2] = NE334
+    A[3, 3] = Ia4 + JP334
+    A[0, 4] = A[4, 0] = NE315
+    A[1, 4] = A[4, 1] = NE325
+    A[2, 4] = A[4, 2] = NE335
+    A[3, 4] = A[4, 3] = NE345
+    A[4, 4] = Ia5 + JP335
+    A[0, 5] = A[5, 0] = NE316
+    A[1, 5] = A[5, 1] = NE326
+    A[2, 5] = A[5, 2] = NE336
+    A[3, 5] = A[5, 3] = NE346
+    A[4, 5] = A[5, 4] = NE356
+    A[5, 5] = Ia6 + JP336
+    A[0, 6] = A[6, 0] = NE317
+    A[1, 6] = A[6, 1] = NE327
+    A[2, 6] = A[6, 2] = NE337
+    A[3, 6] = A[6, 3] = NE347
+    A[4, 6] = A[6, 4] = NE357
+    A[5, 6] = A[6, 5] = NE367
     A[6, 6] = ZZ7 + Ia7
 
 

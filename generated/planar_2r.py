@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: 2550d6b8c7f7c219ccdde8d7ce394dd5986194d44cce2bb9afb080dea3a99438
+# sha256 of what follows: ced955a0437791cb23f2f3a00013bbebbbd478f161abee0d5f8d2e558757f073
 """Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
 
 GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.2.0.
@@ -48,6 +48,8 @@ Names       family, then component digits, then link: W12 is component 1 of link
     N    moment that moves a link, about the origin of its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     P    origin of a frame in frame 0
@@ -55,7 +57,7 @@ Names       family, then component digits, then link: W12 is component 1 of link
 Cost per sample
     regressor          16 multiplications, 10 additions, 2 sin, 2 cos
     inverse_dynamics   28 multiplications, 22 additions, 2 sin, 2 cos
-    inertia_matrix     4 multiplications, 5 additions, 1 sin, 1 cos
+    inertia_matrix     4 multiplications, 4 additions, 1 sin, 1 cos
     bias               22 multiplications, 15 additions, 2 sin, 2 cos
     gravity            10 multiplications, 7 additions, 2 sin, 2 cos
     frame_poses        2 multiplications, 1 additions, 2 sin, 2 cos
@@ -424,14 +426,15 @@ def _inertia_matrix_block(q, A, X, D2):
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
-    # Joint 2
-    N321a = MX2*D2*C2 - MY2*D2*S2
-    N321 = ZZ2 + N321a
-    # Joint 1
-    NE311 = ZZ1R + N321a + N321
+    # Composite link 2
+    AS12 = MX2*C2 - MY2*S2
+    D2AS12 = D2*AS12
+    JP331 = ZZ1R + ZZ2 + 2*D2AS12
+    # Unit acceleration of joint 2
+    NE312 = ZZ2 + D2AS12
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = N321
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
     A[1, 1] = ZZ2 + Ia2
 
 

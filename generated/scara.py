@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: 2625aef415b13a6955b36029b6144e9716c8ecddfac71b9043fece9683638f8b
+# sha256 of what follows: 4e26155916f5a0b357794f24a0348ea8e0a3442ae6bc180753b9e5e0b65d43b8
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
 GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0.
@@ -53,6 +53,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     P    origin of a frame in frame 0
@@ -60,9 +63,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 Cost per sample
     regressor          39 multiplications, 28 additions, 2 sin, 2 cos
     inverse_dynamics   51 multiplications, 44 additions, 2 sin, 2 cos
-    inertia_matrix     29 multiplications, 27 additions, 2 sin, 2 cos
-    bias               38 multiplications, 29 additions, 2 sin, 2 cos
-    gravity            1 multiplications, 1 additions, 0 sin, 0 cos
+    inertia_matrix     13 multiplications, 18 additions, 2 sin, 2 cos
+    bias               37 multiplications, 29 additions, 2 sin, 2 cos
+    gravity            0 multiplications, 0 additions, 0 sin, 0 cos
     frame_poses        4 multiplications, 4 additions, 3 sin, 3 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 4), or (4,) for one state: results then have no axis
@@ -531,49 +534,30 @@ def _inertia_matrix_block(q, A, X, D2, D3):
     S2 = np.sin(q2)
     C3 = np.cos(q3)
     S3 = np.sin(q3)
-    # Link 2
-    S2D2 = D2*S2
-    C2D2 = D2*C2
-    # Link 3
-    VSP231 = D3 + C2D2
-    VP131 = C3*S2D2 + S3*VSP231
-    VP231 = C3*VSP231 - S3*S2D2
-    # Joint 4
-    F141 = M4R*VP131
-    F241 = M4R*VP231
-    # Joint 3
-    E131 = F141 - MY3R
-    E231 = MX3R + F241
-    N331 = ZZ3R + MX3R*VP231 - MY3R*VP131
-    FDI131 = C3*E131 - S3*E231
-    FDI231 = S3*E131 + C3*E231
-    # Joint 2
-    E121 = FDI131 - MY2
-    E221 = MX2R + FDI231
-    N321 = ZZ2R + MX2R*C2D2 - MY2*S2D2
-    NE321 = N331 + D3*FDI231 + N321
-    FDI221 = S2*E121 + C2*E221
-    # Joint 1
-    NE311 = ZZ1R + NE321 + D2*FDI221
-    # Link 3
-    S3D3 = D3*S3
-    C3D3 = D3*C3
-    # Joint 4
-    F142 = M4R*S3D3
-    F242 = M4R*C3D3
-    # Joint 3
-    E132 = F142 - MY3R
-    E232 = MX3R + F242
-    N332 = ZZ3R + MX3R*C3D3 - MY3R*S3D3
-    FDI232 = S3*E132 + C3*E232
-    # Joint 2
-    NE322 = ZZ2R + N332 + D3*FDI232
+    # Composite link 3
+    AS13 = MX3R*C3 - MY3R*S3
+    AS23 = MX3R*S3 + MY3R*C3
+    JP332a = AS13 + D3*M4R
+    D3AS13 = D3*AS13
+    JP332 = ZZ2R + ZZ3R + D3AS13 + D3*JP332a
+    MSP12 = MX2R + JP332a
+    MSP22 = MY2 + AS23
+    # Composite link 2
+    AS12 = C2*MSP12 - S2*MSP22
+    D2AS12 = D2*AS12
+    JP331 = ZZ1R + JP332 + D2AS12 + D2*(AS12 + D2*M4R)
+    # Unit acceleration of joint 2
+    NE312 = JP332 + D2AS12
+    # Unit acceleration of joint 3
+    NE323 = ZZ3R + D3AS13
+    E213 = C2*AS13 - S2*AS23
+    NE313 = NE323 + D2*E213
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = NE321
-    A[1, 1] = Ia2 + NE322
-    A[0, 2] = A[2, 0] = N331
-    A[1, 2] = A[2, 1] = N332
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = Ia2 + JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = ZZ3R + Ia3
     A[3, 3] = M4R
 

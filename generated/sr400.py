@@ -5,7 +5,7 @@
 # to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
 # STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
 # VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 6c134909beaada14360d0d6be6a9ad2cb7ba955487f02b0900c6934bde5a971b
+# sha256 of what follows: cef057cfe50980928e8bfb2bc94eec00eab7025a81c6d299c019bcd261907e68
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
 GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0.
@@ -65,6 +65,10 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AJA  the inertia tensor JP by the axes of the antecedent's frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DF   the part of DG that pushes: velocity times force
@@ -73,9 +77,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 
 Cost per sample
     regressor          392 multiplications, 284 additions, 6 sin, 6 cos
-    inverse_dynamics   300 multiplications, 281 additions, 6 sin, 6 cos
-    inertia_matrix     284 multiplications, 201 additions, 6 sin, 6 cos
-    bias               283 multiplications, 248 additions, 6 sin, 6 cos
+    inverse_dynamics   300 multiplications, 276 additions, 6 sin, 6 cos
+    inertia_matrix     164 multiplications, 129 additions, 6 sin, 6 cos
+    bias               283 multiplications, 243 additions, 6 sin, 6 cos
     gravity            45 multiplications, 36 additions, 5 sin, 5 cos
     frame_poses        56 multiplications, 29 additions, 6 sin, 6 cos
 
@@ -1166,9 +1170,6 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     MX7R = X[54]
     MY7 = X[55]
     MY8 = X[59]
-    # Constants
-    N1_7_1 = D2*MY7
-    N2_7_1 = -D2*MX7R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -1183,230 +1184,144 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     S5 = np.sin(q5)
     C6 = np.cos(q6)
     S6 = np.sin(q6)
-    # Link 3
-    VSP3_3_1 = D2 + D3*C2
-    # Link 4
-    C7C4 = C7*C4
-    C7S4 = C7*S4
-    VSP3_4_1 = VSP3_3_1 - D4*S7 - RL4*C7
-    S4VSP3_4_1 = S4*VSP3_4_1
-    C4VSP3_4_1 = C4*VSP3_4_1
-    # Link 5
-    F3_6_1a = C5*C7C4 - S7*S5
-    F1_6_1a = S7*C5 + S5*C7C4
-    C5S4VSP3_4_1 = C5*S4VSP3_4_1
-    S5S4VSP3_4_1 = S5*S4VSP3_4_1
-    # Link 6
-    F3_6_1b = C6*F3_6_1a - S6*C7S4
-    F3_6_1c = C6*C7S4 + S6*F3_6_1a
-    VP1_6_1 = -C6*C5S4VSP3_4_1 - S6*C4VSP3_4_1
-    VP2_6_1 = S6*C5S4VSP3_4_1 - C6*C4VSP3_4_1
-    # Link 8
-    VSP3_8_1 = D2 + D8*C7
-    # Joint 8
-    F3_8_1 = -MY8*S2
-    N1_8_1 = MY8*VSP3_8_1
-    # Joint 7
-    F3_7_1 = MX7R*C7 - MY7*S7
-    E3_7_1 = F3_8_1 + F3_7_1
-    NE1_7_1 = C2m7*N1_8_1 + N1_7_1
-    NE2_7_1 = S2m7*N1_8_1 + N2_7_1 - D8*F3_8_1
-    # Joint 6
-    F1_6_1 = -MY6*F1_6_1a
-    F2_6_1 = MX6*F1_6_1a
-    F3_6_1 = -MX6*F3_6_1c - MY6*F3_6_1b
-    N1_6_1 = XZ6*F1_6_1a + XY6*F3_6_1c + MY6*S5S4VSP3_4_1 - XX6R*F3_6_1b
-    N2_6_1 = YZ6*F1_6_1a - XY6*F3_6_1b - MX6*S5S4VSP3_4_1
-    N3_6_1 = ZZ6*F1_6_1a + YZ6*F3_6_1c + MX6*VP2_6_1 - XZ6*F3_6_1b - MY6*VP1_6_1
-    FDI1_6_1 = C6*F1_6_1 - S6*F2_6_1
-    FDI3_6_1 = -S6*F1_6_1 - C6*F2_6_1
-    # Joint 5
-    F1_5_1 = MY5R*C7S4
-    F2_5_1 = -MX5*C7S4
-    F3_5_1 = -MX5*F1_6_1a - MY5R*F3_6_1a
-    E1_5_1 = FDI1_6_1 + F1_5_1
-    E2_5_1 = F3_6_1 + F2_5_1
-    E3_5_1 = FDI3_6_1 + F3_5_1
-    N1_5_1 = XY5*F1_6_1a + MY5R*C4VSP3_4_1 - XX5R*F3_6_1a - XZ5*C7S4
-    N2_5_1 = -XY5*F3_6_1a - YZ5*C7S4 - MX5*C4VSP3_4_1
-    N3_5_1 = YZ5*F1_6_1a + MX5*S5S4VSP3_4_1 + MY5R*C5S4VSP3_4_1 - ZZ5R*C7S4 - XZ5*F3_6_1a
-    NE1_5_1 = C6*N1_6_1 + N1_5_1 - S6*N2_6_1
-    NE2_5_1 = N3_6_1 + N2_5_1
-    NE3_5_1 = N3_5_1 - S6*N1_6_1 - C6*N2_6_1
-    FDI1_5_1 = C5*E1_5_1 - S5*E2_5_1
-    FDI3_5_1 = S5*E1_5_1 + C5*E2_5_1
-    # Joint 4
-    F1_4_1 = -MY4R*S7
-    F2_4_1 = MX4*S7
-    F3_4_1 = -MX4*C7S4 - MY4R*C7C4
-    E1_4_1 = FDI1_5_1 + F1_4_1
-    E2_4_1 = F2_4_1 - E3_5_1
-    E3_4_1 = FDI3_5_1 + F3_4_1
-    N1_4_1 = XZ4*S7 + XY4*C7S4 - XX4R*C7C4
-    N2_4_1 = YZ4*S7 - XY4*C7C4
-    N3_4_1 = ZZ4R*S7 + YZ4*C7S4 + MY4R*S4VSP3_4_1 - XZ4*C7C4 - MX4*C4VSP3_4_1
-    NE1_4_1 = C5*NE1_5_1 + N1_4_1 - S5*NE2_5_1
-    NE2_4_1 = N2_4_1 - NE3_5_1
-    NE3_4_1 = S5*NE1_5_1 + C5*NE2_5_1 + N3_4_1
-    FDI1_4_1 = C4*E1_4_1 - S4*E2_4_1
-    FDI3_4_1 = -S4*E1_4_1 - C4*E2_4_1
-    # Joint 3
-    F3_3_1 = -MX3R*S7 - MY3R*C7
-    E3_3_1 = FDI3_4_1 + F3_3_1
-    N3_3_1 = YZ3R*S7 - XZ3R*C7
-    N1_3_1 = XY3R*S7 + MY3R*VSP3_3_1 - XX3R*C7
-    N2_3_1 = -XY3R*C7 - MX3R*VSP3_3_1
-    NE1_3_1 = C4*NE1_4_1 + RL4*FDI3_4_1 + N1_3_1 - S4*NE2_4_1
-    NE2_3_1 = NE3_4_1 + N2_3_1 - D4*FDI3_4_1
-    NE3_3_1 = D4*E3_4_1 + N3_3_1 - S4*NE1_4_1 - C4*NE2_4_1 - RL4*FDI1_4_1
-    FDI2_3_1 = C2m7*FDI1_4_1 + S2m7*E3_4_1
-    # Joint 2
-    F3_2_1 = MX2R*C2 - MY2*S2
-    E3_2_1 = E3_3_1 + F3_2_1
-    N3_2_1 = -YZ2R*C2 - XZ2R*S2
-    N1_2_1 = D2*MY2 - XX2R*S2 - XY2R*C2
-    N2_2_1 = -XY2R*S2 - D2*MX2R
-    NE1_2_1 = S2m7*NE1_3_1 + N1_2_1 - C2m7*NE2_3_1
-    NE2_2_1 = C2m7*NE1_3_1 + S2m7*NE2_3_1 + N2_2_1 - D3*E3_3_1
-    NE3_2_1 = NE3_3_1 + D3*FDI2_3_1 + N3_2_1
-    # Joint 1
-    NE3_1_1 = ZZ1R + D2*E3_7_1 + D2*E3_2_1 - S7*NE1_7_1 - C7*NE2_7_1 - S2*NE1_2_1 - C2*NE2_2_1
-    # Friction, actuators
-    NE3_1_2 = NE3_2_1 - NE3_3_1
-    # Link 3
-    C2m7D3 = D3*C2m7
-    S2m7D3 = D3*S2m7
-    # Link 4
-    C4C2m7D3 = C4*C2m7D3
-    S4C2m7D3 = S4*C2m7D3
-    # Link 5
-    VP1_5_2 = C5*C4C2m7D3 + S5*S2m7D3
-    VP2_5_2 = C5*S2m7D3 - S5*C4C2m7D3
-    # Link 6
-    VP1_6_2 = C6*VP1_5_2 - S6*S4C2m7D3
-    VP2_6_2 = -C6*S4C2m7D3 - S6*VP1_5_2
-    # Joint 8
-    FDI2_8_2 = -MY8*S2m7
-    NE3_7_2 = D8*FDI2_8_2
-    # Joint 6
-    N1_6_2 = MY6*VP2_5_2
-    N2_6_2 = -MX6*VP2_5_2
-    N3_6_2 = MX6*VP2_6_2 - MY6*VP1_6_2
-    # Joint 5
-    N1_5_2 = MY5R*S4C2m7D3
-    N2_5_2 = -MX5*S4C2m7D3
-    N3_5_2 = MX5*VP2_5_2 - MY5R*VP1_5_2
-    NE1_5_2 = C6*N1_6_2 + N1_5_2 - S6*N2_6_2
-    NE2_5_2 = N3_6_2 + N2_5_2
-    NE3_5_2 = N3_5_2 - S6*N1_6_2 - C6*N2_6_2
-    # Joint 4
-    N1_4_2 = MY4R*S2m7D3
-    N2_4_2 = -MX4*S2m7D3
-    N3_4_2 = -MX4*S4C2m7D3 - MY4R*C4C2m7D3
-    NE1_4_2 = C5*NE1_5_2 + N1_4_2 - S5*NE2_5_2
-    NE2_4_2 = N2_4_2 - NE3_5_2
-    NE3_4_2 = S5*NE1_5_2 + C5*NE2_5_2 + N3_4_2
-    # Joint 3
-    N3_3_2 = MX3R*S2m7D3 - MY3R*C2m7D3
-    NE3_3_2 = N3_3_2 - S4*NE1_4_2 - C4*NE2_4_2
-    # Link 6
-    S5C6 = S5*C6
-    S5S6 = S5*S6
-    # Joint 6
-    F1_6_4 = -MY6*C5
-    F2_6_4 = MX6*C5
-    F3_6_4 = MX6*S5S6 + MY6*S5C6
-    N1_6_4 = XX6R*S5C6 + XZ6*C5 - XY6*S5S6
-    N2_6_4 = XY6*S5C6 + YZ6*C5
-    N3_6_4 = ZZ6*C5 + XZ6*S5C6 - YZ6*S5S6
-    FDI1_6_4 = C6*F1_6_4 - S6*F2_6_4
-    FDI3_6_4 = -S6*F1_6_4 - C6*F2_6_4
-    # Joint 5
-    F3_5_4 = MY5R*S5 - MX5*C5
-    E3_5_4 = FDI3_6_4 + F3_5_4
-    N1_5_4 = XX5R*S5 + XY5*C5
-    N2_5_4 = XY5*S5
-    N3_5_4 = YZ5*C5 + XZ5*S5
-    NE1_5_4 = C6*N1_6_4 + N1_5_4 - S6*N2_6_4
-    NE2_5_4 = N3_6_4 + N2_5_4
-    NE3_5_4 = N3_5_4 - S6*N1_6_4 - C6*N2_6_4
-    FDI1_5_4 = C5*FDI1_6_4 - S5*F3_6_4
-    # Joint 4
-    E1_4_4 = FDI1_5_4 - MY4R
-    E2_4_4 = MX4 - E3_5_4
-    NE1_4_4 = XZ4 + C5*NE1_5_4 - S5*NE2_5_4
-    NE2_4_4 = YZ4 - NE3_5_4
-    NE3_4_4 = ZZ4R + S5*NE1_5_4 + C5*NE2_5_4
-    FDI1_4_4 = C4*E1_4_4 - S4*E2_4_4
-    FDI3_4_4 = -S4*E1_4_4 - C4*E2_4_4
-    NE3_3_4 = -S4*NE1_4_4 - C4*NE2_4_4 - RL4*FDI1_4_4
-    # Joint 6
-    F3_6_5 = MX6*C6 - MY6*S6
-    N1_6_5 = -XX6R*S6 - XY6*C6
-    N2_6_5 = -XY6*S6
-    N3_6_5 = -YZ6*C6 - XZ6*S6
-    # Joint 5
-    E2_5_5 = MX5 + F3_6_5
-    NE1_5_5 = XZ5 + C6*N1_6_5 - S6*N2_6_5
-    NE2_5_5 = YZ5 + N3_6_5
-    NE3_5_5 = ZZ5R - S6*N1_6_5 - C6*N2_6_5
-    FDI1_5_5 = -MY5R*C5 - S5*E2_5_5
-    NE1_4_5 = C5*NE1_5_5 - S5*NE2_5_5
-    # Joint 4
-    FDI1_4_5 = C4*FDI1_5_5
-    NE3_3_5 = C4*NE3_5_5 - S4*NE1_4_5 - D4*E3_5_4 - RL4*FDI1_4_5
-    # Joint 6
+    # Composite link 9
+    C2m7S2m7 = C2m7*S2m7
+    # Composite link 8
+    AS1_8 = -MY8*S2m7
+    AS2_8 = MY8*C2m7
+    NE3_7_8 = D8*AS1_8
+    JP2_2_7 = 2*NE3_7_8
+    JP1_2_7 = -D8*AS2_8
+    MSP1_7 = MX7R + AS1_8
+    MSP2_7 = MY7 + AS2_8
+    # Composite link 7
+    AS1_7 = C7*MSP1_7 - S7*MSP2_7
+    # Composite link 6
+    AS1_6 = MX6*C6 - MY6*S6
+    AS3_6 = -MX6*S6 - MY6*C6
+    C6C6 = C6**2
+    C6S6 = C6*S6
+    AJA1_1_6 = XX6R*C6C6 - XY6*2*C6S6
     NE1_5_6 = XZ6*C6 - YZ6*S6
-    # Joint 5
+    NE3_5_6 = -XZ6*S6 - YZ6*C6
+    JP1_1_5 = XX5R + AJA1_1_6
+    JP1_2_5 = XY5 + NE1_5_6
+    JP1_3_5 = XZ5 + XY6 - XX6R*C6S6 - XY6*2*C6C6
+    JP2_3_5 = YZ5 + NE3_5_6
+    JP3_3_5 = ZZ5R + XX6R - AJA1_1_6
+    MSP1_5 = MX5 + AS1_6
+    # Composite link 5
+    AS1_5 = C5*MSP1_5 - MY5R*S5
+    AS3_5 = S5*MSP1_5 + MY5R*C5
+    C5C5 = C5**2
+    C5S5 = C5*S5
+    JP1_1_4a = ZZ6 - JP1_1_5
+    JP1_1_4b = C5C5*JP1_1_4a + JP1_2_5*2*C5S5
+    NE1_4_5 = C5*JP1_3_5 - S5*JP2_3_5
+    NE3_4_5 = S5*JP1_3_5 + C5*JP2_3_5
+    JP1_1_4 = XX4R + ZZ6 - JP1_1_4b
+    JP1_2_4 = XY4 - NE1_4_5
+    JP1_3_4 = XZ4 + JP1_2_5*2*C5C5 - C5S5*JP1_1_4a - JP1_2_5
+    JP2_3_4 = YZ4 - NE3_4_5
+    JP3_3_4 = ZZ4R + JP1_1_5 + JP1_1_4b
+    MSP1_4 = MX4 + AS1_5
+    MSP2_4 = MY4R - AS3_6
+    # Composite link 4
+    AS1_4 = C4*MSP1_4 - S4*MSP2_4
+    AS3_4 = -S4*MSP1_4 - C4*MSP2_4
+    C4C4 = C4**2
+    C4S4 = C4*S4
+    JP1_1_3a = JP3_3_5 - JP1_1_4
+    JP1_1_3b = C4C4*JP1_1_3a + JP1_2_4*2*C4S4
+    AJA1_2_4 = C4*JP1_3_4 - S4*JP2_3_4
+    D4AS1_4 = D4*AS1_4
+    RL4AS3_5 = RL4*AS3_5
+    RL4AS1_4 = RL4*AS1_4
+    JP1_1_3 = XX3R + JP3_3_5 + 2*RL4AS3_5 - JP1_1_3b
+    JP1_2_3 = XY3R + AJA1_2_4 - D4*AS3_5 - RL4AS1_4
+    JP1_3_3 = XZ3R + C4S4*JP1_1_3a + JP1_2_4 - JP1_2_4*2*C4C4 - D4*AS3_4
+    JP2_2_3 = JP3_3_4 + 2*D4AS1_4
+    NE3_3_4 = -S4*JP1_3_4 - C4*JP2_3_4 - RL4*AS3_4
+    JP2_3_3 = YZ3R + NE3_3_4
+    JP3_3_3 = ZZ3R + JP1_1_4 + JP1_1_3b + 2*(D4AS1_4 + RL4AS3_5)
+    MSP1_3 = MX3R + AS1_4
+    MSP2_3 = MY3R + AS3_5
+    # Composite link 3
+    AS1_3 = S2m7*MSP1_3 - C2m7*MSP2_3
+    AS2_3 = C2m7*MSP1_3 + S2m7*MSP2_3
+    S2m7S2m7 = S2m7**2
+    JP1_1_2a = JP1_1_3 - JP2_2_3
+    JP1_1_2b = S2m7S2m7*JP1_1_2a - 2*C2m7S2m7*JP1_2_3
+    NE1_2_3 = S2m7*JP1_3_3 - C2m7*JP2_3_3
+    NE2_2_3 = C2m7*JP1_3_3 + S2m7*JP2_3_3
+    D3AS1_3 = D3*AS1_3
+    JP1_1_2 = XX2R + JP2_2_3 + JP1_1_2b
+    JP1_2_2 = XY2R + C2m7S2m7*JP1_1_2a + JP1_2_3*2*S2m7S2m7 - JP1_2_3 - D3*AS2_3
+    JP1_3_2 = XZ2R + NE1_2_3 - D3*AS3_4
+    JP2_2_2 = JP1_1_3 + 2*D3AS1_3 - JP1_1_2b
+    JP2_3_2 = YZ2R + NE2_2_3
+    MSP1_2 = MX2R + AS1_3
+    MSP2_2 = MY2 + AS2_3
+    # Composite link 2
+    AS1_2 = C2*MSP1_2 - S2*MSP2_2
+    NE3_1_2 = -S2*JP1_3_2 - C2*JP2_3_2
+    JP3_3_1 = (ZZ1R + JP2_2_7*C7**2 + JP1_2_7*2*C7*S7 + 2*D2*AS1_7 + JP1_1_2 + JP1_2_2*2*C2*S2 +
+        2*D2*AS1_2 - C2**2*(JP1_1_2 - JP2_2_2))
+    # Unit acceleration of joint 3
+    NE3_1_3 = -S2*NE1_2_3 - C2*NE2_2_3
+    # Unit acceleration of joint 4
+    NE1_3_4 = AJA1_2_4 - RL4AS1_4
+    NE2_3_4 = JP3_3_4 + D4AS1_4
+    E2_2_4 = C2m7*AS3_4
+    NE1_2_4 = S2m7*NE1_3_4 - C2m7*NE2_3_4
+    NE2_2_4 = C2m7*NE1_3_4 + S2m7*NE2_3_4 + D3*AS1_4
+    NE3_1_4 = -S2*NE1_2_4 - C2*NE2_2_4 - D2*AS1_4
+    # Unit acceleration of joint 5
+    E1_3_5 = -C4*AS3_5
+    E3_3_5 = S4*AS3_5
+    NE1_3_5 = C4*NE1_4_5 + S4*JP3_3_5 + RL4*E3_3_5
+    NE2_3_5 = NE3_4_5 - D4*E3_3_5
+    NE3_3_5 = C4*JP3_3_5 + D4*AS1_5 - S4*NE1_4_5 - RL4*E1_3_5
+    E2_2_5 = C2m7*E1_3_5 + S2m7*AS1_5
+    NE1_2_5 = S2m7*NE1_3_5 - C2m7*NE2_3_5
+    NE2_2_5 = C2m7*NE1_3_5 + S2m7*NE2_3_5 - D3*E3_3_5
+    NE3_1_5 = D2*E3_3_5 - S2*NE1_2_5 - C2*NE2_2_5
+    # Unit acceleration of joint 6
+    E1_4_6 = C5*AS3_6
+    E3_4_6 = S5*AS3_6
     NE1_4_6 = C5*NE1_5_6 - ZZ6*S5
-    # Joint 4
-    FDI1_4_6 = C4*FDI1_6_4 - S4*F3_6_5
-    NE3_3_6 = C4*N3_6_5 - S4*NE1_4_6 - D4*F3_6_4 - RL4*FDI1_4_6
-    # Link 4
-    S4RL4 = RL4*S4
-    # Link 5
-    S4C5 = S4*C5
-    S4S5 = S4*S5
-    VP2_5_7 = D4*C5 + S5*RL4*C4
-    # Link 6
-    N1_6_7a = C6*S4C5 + C4*S6
-    # Joint 6
-    N1_6_7 = XZ6*S4S5 + MY6*VP2_5_7 - XX6R*N1_6_7a - XY6*(C4*C6 - S6*S4C5)
-    N2_6_7 = YZ6*S4S5 - XY6*N1_6_7a - MX6*VP2_5_7
-    # Joint 5
-    N1_5_7 = XZ5*C4 + XY5*S4S5 - XX5R*S4C5 - MY5R*S4RL4
-    N2_5_7 = YZ5*C4 + MX5*S4RL4 - XY5*S4C5
-    NE1_5_7 = C6*N1_6_7 + N1_5_7 - S6*N2_6_7
-    NE2_5_7 = NE3_3_6 + N2_5_7
-    # Joint 4
-    N1_4_7 = D4*MY4R - XX4R*S4 - XY4*C4
-    N2_4_7 = -XY4*S4 - D4*MX4
-    NE1_4_7 = C5*NE1_5_7 + N1_4_7 - S5*NE2_5_7
-    NE2_4_7 = N2_4_7 - NE3_3_5
-    # Joint 3
-    NE3_3_7 = ZZ3R - S4*NE1_4_7 - C4*NE2_4_7 - D4*FDI3_4_4 - RL4*FDI1_5_5
+    NE3_4_6 = S5*NE1_5_6 + ZZ6*C5
+    E1_3_6 = C4*E1_4_6 - S4*AS1_6
+    E3_3_6 = -S4*E1_4_6 - C4*AS1_6
+    NE1_3_6 = C4*NE1_4_6 + S4*NE3_5_6 + RL4*E3_3_6
+    NE2_3_6 = NE3_4_6 - D4*E3_3_6
+    NE3_3_6 = C4*NE3_5_6 + D4*E3_4_6 - S4*NE1_4_6 - RL4*E1_3_6
+    E2_2_6 = C2m7*E1_3_6 + S2m7*E3_4_6
+    NE1_2_6 = S2m7*NE1_3_6 - C2m7*NE2_3_6
+    NE2_2_6 = C2m7*NE1_3_6 + S2m7*NE2_3_6 - D3*E3_3_6
+    NE3_1_6 = D2*E3_3_6 - S2*NE1_2_6 - C2*NE2_2_6
     # Inertia matrix
-    A[0, 0] = NE3_1_1
-    A[0, 1] = A[1, 0] = NE3_1_2
+    A[0, 0] = JP3_3_1
+    A[0, 1] = A[1, 0] = NE3_1_2 - NE3_1_3
     A[1, 1] = ZZ2R
-    A[0, 2] = A[2, 0] = NE3_4_1
-    A[1, 2] = A[2, 1] = NE3_4_2
-    A[2, 2] = Ia4 + NE3_4_4
-    A[0, 3] = A[3, 0] = NE3_5_1
-    A[1, 3] = A[3, 1] = NE3_5_2
-    A[2, 3] = A[3, 2] = NE3_5_4
-    A[3, 3] = Ia5 + NE3_5_5
-    A[0, 4] = A[4, 0] = N3_6_1
-    A[1, 4] = A[4, 1] = N3_6_2
-    A[2, 4] = A[4, 2] = N3_6_4
-    A[3, 4] = A[4, 3] = N3_6_5
+    A[0, 2] = A[2, 0] = NE3_1_4
+    A[1, 2] = A[2, 1] = D3*E2_2_4
+    A[2, 2] = Ia4 + JP3_3_4
+    A[0, 3] = A[3, 0] = NE3_1_5
+    A[1, 3] = A[3, 1] = D3*E2_2_5
+    A[2, 3] = A[3, 2] = NE3_4_5
+    A[3, 3] = Ia5 + JP3_3_5
+    A[0, 4] = A[4, 0] = NE3_1_6
+    A[1, 4] = A[4, 1] = D3*E2_2_6
+    A[2, 4] = A[4, 2] = NE3_4_6
+    A[3, 4] = A[4, 3] = NE3_5_6
     A[4, 4] = ZZ6 + Ia6
-    A[0, 5] = A[5, 0] = NE3_3_1
-    A[1, 5] = A[5, 1] = NE3_7_2 + NE3_3_2
+    A[0, 5] = A[5, 0] = NE3_1_3
+    A[1, 5] = A[5, 1] = NE3_7_8 + D3AS1_3
     A[2, 5] = A[5, 2] = NE3_3_4
     A[3, 5] = A[5, 3] = NE3_3_5
     A[4, 5] = A[5, 4] = NE3_3_6
-    A[5, 5] = NE3_3_7
+    A[5, 5] = JP3_3_3
 
 
 def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):

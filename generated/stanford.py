@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: 217b511bdef1a41cf8db820794c0b63032c856c7c55c6e34cd1babcf4af015ad
+# sha256 of what follows: 0f0012f0e4ef2e33593adc4fb38240e98f38e7f71b8a0ca097a84c65793bebca
 """Stanford arm, 5 revolute joints and prismatic joint 3: base parameters, regressor, dynamics.
 
 GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.2.0.
@@ -55,6 +55,10 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AJA  the inertia tensor JP by the axes of the antecedent's frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DF   the part of DG that pushes: velocity times force
@@ -63,9 +67,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 
 Cost per sample
     regressor          338 multiplications, 245 additions, 4 sin, 4 cos
-    inverse_dynamics   243 multiplications, 232 additions, 4 sin, 4 cos
-    inertia_matrix     238 multiplications, 171 additions, 4 sin, 4 cos
-    bias               228 multiplications, 208 additions, 4 sin, 4 cos
+    inverse_dynamics   243 multiplications, 228 additions, 4 sin, 4 cos
+    inertia_matrix     108 multiplications, 92 additions, 4 sin, 4 cos
+    bias               228 multiplications, 204 additions, 4 sin, 4 cos
     gravity            41 multiplications, 28 additions, 4 sin, 4 cos
     frame_poses        43 multiplications, 19 additions, 5 sin, 5 cos
 
@@ -985,194 +989,115 @@ def _inertia_matrix_block(q, A, X, RL2):
     S5 = np.sin(q5)
     C6 = np.cos(q6)
     S6 = np.sin(q6)
-    # Link 2
-    C2RL2 = RL2*C2
-    S2RL2 = RL2*S2
-    # Link 3
-    S2q3 = S2*q3
-    # Link 4
-    S2C4 = S2*C4
-    S2S4 = S2*S4
-    VP141 = S4*S2q3 - C4*C2RL2
-    VP241 = C4*S2q3 + S4*C2RL2
-    # Link 5
-    F361a = C5*S2C4 + C2*S5
-    F161a = C2*C5 - S5*S2C4
-    VP151 = C5*VP141 + S5*S2RL2
-    VP251 = C5*S2RL2 - S5*VP141
-    # Link 6
-    F361b = C6*F361a - S6*S2S4
-    F361c = C6*S2S4 + S6*F361a
-    VP161 = C6*VP151 + S6*VP241
-    VP261 = C6*VP241 - S6*VP151
-    # Joint 6
-    F161 = -MY6*F161a
-    F261 = MX6*F161a
-    F361 = -MX6*F361c - MY6*F361b
-    N161 = XZ6*F161a + XY6*F361c - XX6R*F361b - MY6*VP251
-    N261 = YZ6*F161a + MX6*VP251 - XY6*F361b
-    N361 = ZZ6*F161a + YZ6*F361c + MX6*VP261 - XZ6*F361b - MY6*VP161
-    FDI161 = C6*F161 - S6*F261
-    FDI361 = S6*F161 + C6*F261
-    # Joint 5
-    F151 = -MY5R*S2S4
-    F251 = MX5*S2S4
-    F351 = MX5*F161a - MY5R*F361a
-    E151 = FDI161 + F151
-    E251 = F251 - F361
-    E351 = FDI361 + F351
-    N151 = XZ5*S2S4 + MY5R*VP241 - XX5R*F361a - XY5*F161a
-    N251 = YZ5*S2S4 - XY5*F361a - MX5*VP241
-    N351 = ZZ5R*S2S4 + MX5*VP251 - YZ5*F161a - XZ5*F361a - MY5R*VP151
-    NE151 = C6*N161 + N151 - S6*N261
-    NE251 = N251 - N361
-    NE351 = S6*N161 + C6*N261 + N351
-    FDI151 = C5*E151 - S5*E251
-    FDI351 = -S5*E151 - C5*E251
-    # Joint 4
-    F141 = -MY4R*C2
-    F241 = MX4*C2
-    F341 = -MX4*S2S4 - MY4R*S2C4
-    E141 = FDI151 + F141
-    E241 = E351 + F241
-    E341 = FDI351 + F341
-    N141 = XZ4*C2 + XY4*S2S4 - XX4R*S2C4 - MY4R*S2RL2
-    N241 = YZ4*C2 + MX4*S2RL2 - XY4*S2C4
-    N341 = ZZ4R*C2 + YZ4*S2S4 + MX4*VP241 - XZ4*S2C4 - MY4R*VP141
-    NE141 = C5*NE151 + N141 - S5*NE251
-    NE241 = NE351 + N241
-    NE341 = N341 - S5*NE151 - C5*NE251
-    FDI141 = C4*E141 - S4*E241
-    FDI241 = S4*E141 + C4*E241
-    # Joint 3
-    F131 = -M3R*C2RL2 - MY3*C2
-    F231 = M3R*S2q3 + MX3*C2 + MZ3R*S2
-    F331 = -M3R*S2RL2 - MY3*S2
-    E131 = FDI141 + F131
-    E231 = FDI241 + F231
-    E331 = E341 + F331
-    N131 = -MY3*S2RL2 - MZ3R*S2q3
-    N231 = MX3*S2RL2 - MZ3R*C2RL2
-    N331 = MX3*S2q3 + MY3*C2RL2
-    NE131 = C4*NE141 + N131 - S4*NE241
-    NE231 = S4*NE141 + C4*NE241 + N231
-    NE331 = NE341 + N331
-    # Joint 2
-    N121 = -XX2R*S2 - XY2R*C2
-    N221 = -XY2R*S2
-    N321 = MX2*S2RL2 + MY2*C2RL2 - YZ2R*C2 - XZ2R*S2
-    NE121 = NE131 + N121 - q3*E231
-    NE221 = N221 - NE331
-    NE321 = NE231 + q3*E131 + N321
-    FDI121 = C2*E131 + S2*E331
-    # Joint 1
-    NE311 = ZZ1R - S2*NE121 - C2*NE221 - RL2*FDI121
-    # Link 4
-    q3C4 = q3*C4
-    q3S4 = q3*S4
-    # Link 5
-    S4C5 = S4*C5
-    S4S5 = S4*S5
-    C5q3C4 = C5*q3C4
-    S5q3C4 = S5*q3C4
-    # Link 6
-    F362a = C6*S4C5 + C4*S6
-    F362b = C4*C6 - S6*S4C5
-    VP162 = C6*C5q3C4 - S6*q3S4
-    VP262 = -C6*q3S4 - S6*C5q3C4
-    # Joint 6
-    F162 = -MY6*S4S5
-    F262 = MX6*S4S5
-    F362 = MY6*F362a - MX6*F362b
-    NE236 = ZZ6*S4S5 + YZ6*F362b + XZ6*F362a
-    N162 = XX6R*F362a + XZ6*S4S5 + XY6*F362b + MY6*S5q3C4
-    N262 = XY6*F362a + YZ6*S4S5 - MX6*S5q3C4
-    N362 = NE236 + MX6*VP262 - MY6*VP162
-    FDI162 = C6*F162 - S6*F262
-    FDI362 = S6*F162 + C6*F262
-    # Joint 5
-    F152 = -MY5R*C4
-    F252 = MX5*C4
-    F352 = MX5*S4S5 + MY5R*S4C5
-    E152 = FDI162 + F152
-    E252 = F252 - F362
-    E352 = FDI362 + F352
-    N152 = XX5R*S4C5 + XZ5*C4 - XY5*S4S5 - MY5R*q3S4
-    N252 = XY5*S4C5 + YZ5*C4 + MX5*q3S4
-    N352 = ZZ5R*C4 + XZ5*S4C5 - YZ5*S4S5 - MX5*S5q3C4 - MY5R*C5q3C4
-    NE152 = C6*N162 + N152 - S6*N262
-    NE252 = N252 - N362
-    NE352 = S6*N162 + C6*N262 + N352
-    FDI152 = C5*E152 - S5*E252
-    FDI352 = -S5*E152 - C5*E252
-    # Joint 4
-    F342 = MY4R*S4 - MX4*C4
-    E342 = FDI352 + F342
-    N142 = XX4R*S4 + XY4*C4
-    N242 = XY4*S4
-    N342 = YZ4*C4 + XZ4*S4 - MX4*q3S4 - MY4R*q3C4
-    NE142 = C5*NE152 + N142 - S5*NE252
-    NE242 = NE352 + N242
-    NE342 = N342 - S5*NE152 - C5*NE252
-    FDI142 = C4*FDI152 - S4*E352
-    # Joint 3
-    F132 = MZ3R + M3R*q3
-    E132 = FDI142 + F132
-    E332 = E342 - MX3
-    N232 = MZ3R*q3
-    NE232 = S4*NE142 + C4*NE242 + N232
-    # Joint 2
-    NE322 = ZZ2R + NE232 + q3*E132
-    # Link 6
-    S5C6 = S5*C6
-    S5S6 = S5*S6
-    # Joint 6
-    N163 = MY6*C5
-    N263 = -MX6*C5
-    N363 = MX6*S5S6 + MY6*S5C6
-    FDI364 = -S6*N163 - C6*N263
-    # Joint 5
-    N353 = MY5R*S5 - MX5*C5
-    NE353 = N353 - FDI364
-    # Joint 6
-    N164 = XZ6*C5 + XY6*S5S6 - XX6R*S5C6
-    N264 = YZ6*C5 - XY6*S5C6
-    N364 = ZZ6*C5 + YZ6*S5S6 - XZ6*S5C6
-    # Joint 5
-    N154 = -XX5R*S5 - XY5*C5
-    N254 = -XY5*S5
-    N354 = -YZ5*C5 - XZ5*S5
-    NE154 = C6*N164 + N154 - S6*N264
-    NE254 = N254 - N364
-    NE354 = S6*N164 + C6*N264 + N354
-    # Joint 4
-    NE344 = ZZ4R - S5*NE154 - C5*NE254
-    # Joint 6
-    N165 = XX6R*S6 + XY6*C6
-    N265 = XY6*S6
-    N365 = YZ6*C6 + XZ6*S6
-    # Joint 5
-    NE355 = ZZ5R + S6*N165 + C6*N265
+    # Composite link 6
+    AS16 = MX6*C6 - MY6*S6
+    AS36 = MX6*S6 + MY6*C6
+    C6C6 = C6**2
+    C6S6 = C6*S6
+    AJA116 = XX6R*C6C6 - XY6*2*C6S6
+    NE156 = XZ6*C6 - YZ6*S6
+    NE356 = XZ6*S6 + YZ6*C6
+    JP115 = XX5R + AJA116
+    JP125 = XY5 - NE156
+    JP135 = XZ5 + XX6R*C6S6 + XY6*2*C6C6 - XY6
+    JP235 = YZ5 - NE356
+    JP335 = ZZ5R + XX6R - AJA116
+    MSP15 = MX5 + AS16
+    # Composite link 5
+    AS15 = C5*MSP15 - MY5R*S5
+    AS35 = -S5*MSP15 - MY5R*C5
+    C5C5 = C5**2
+    C5S5 = C5*S5
+    JP114a = ZZ6 - JP115
+    JP114b = C5C5*JP114a + JP125*2*C5S5
+    NE145 = C5*JP135 - S5*JP235
+    NE345 = -S5*JP135 - C5*JP235
+    JP114 = XX4R + ZZ6 - JP114b
+    JP124 = XY4 + NE145
+    JP134 = XZ4 + C5S5*JP114a + JP125 - JP125*2*C5C5
+    JP234 = YZ4 + NE345
+    JP334 = ZZ4R + JP115 + JP114b
+    MSP14 = MX4 + AS15
+    MSP24 = MY4R + AS36
+    # Composite link 4
+    AS14 = C4*MSP14 - S4*MSP24
+    AS24 = S4*MSP14 + C4*MSP24
+    C4C4 = C4**2
+    C4S4 = C4*S4
+    JP113a = JP335 - JP114
+    JP113b = C4C4*JP113a + JP124*2*C4S4
+    JP123 = JP124*2*C4C4 - C4S4*JP113a - JP124
+    NE134 = C4*JP134 - S4*JP234
+    NE234 = S4*JP134 + C4*JP234
+    JP113 = JP335 - JP113b
+    JP223 = JP114 + JP113b
+    MSP13 = MX3 + AS14
+    MSP23 = MY3 + AS24
+    MSP33 = MZ3R + AS35
+    # Composite link 3
+    JP112a = MSP33 + M3R*q3
+    JP112b = q3*MSP33 + q3*JP112a
+    JP112 = XX2R + JP113 + JP112b
+    JP122 = XY2R + q3*MSP13 - NE134
+    JP132 = XZ2R + JP123
+    JP232 = YZ2R + q3*MSP23 - NE234
+    JP332 = ZZ2R + JP223 + JP112b
+    MSP12 = MX2 + MSP13
+    MSP22 = MY2 - JP112a
+    # Composite link 2
+    AS32 = -S2*MSP12 - C2*MSP22
+    NE312 = -S2*JP132 - C2*JP232 - RL2*AS32
+    JP331 = ZZ1R + JP112 + C2**2*(JP334 - JP112) + JP122*2*C2*S2 + RL2*MSP23 + RL2*(MSP23 + RL2*M3R)
+    # Unit acceleration of joint 3
+    E113 = M3R*S2
+    NE313 = -S2*MSP23 - RL2*E113
+    # Unit acceleration of joint 4
+    NE124 = NE134 - q3*AS14
+    NE324 = NE234 - q3*AS24
+    E114 = -C2*AS24
+    NE314 = C2*JP334 - S2*NE124 - RL2*E114
+    # Unit acceleration of joint 5
+    E135 = C4*AS35
+    E235 = S4*AS35
+    NE135 = C4*NE145 - S4*JP335
+    NE235 = S4*NE145 + C4*JP335
+    NE125 = NE135 - q3*E235
+    NE325 = NE235 + q3*E135
+    E115 = C2*E135 - S2*AS15
+    NE315 = C2*NE345 - S2*NE125 - RL2*E115
+    # Unit acceleration of joint 6
+    E146 = -C5*AS36
+    E346 = S5*AS36
+    NE146 = C5*NE156 + ZZ6*S5
+    NE346 = ZZ6*C5 - S5*NE156
+    E136 = C4*E146 - S4*AS16
+    E236 = S4*E146 + C4*AS16
+    NE136 = C4*NE146 - S4*NE356
+    NE236 = S4*NE146 + C4*NE356
+    NE126 = NE136 - q3*E236
+    NE326 = NE236 + q3*E136
+    E116 = C2*E136 + S2*E346
+    NE316 = C2*NE346 - S2*NE126 - RL2*E116
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = NE321
-    A[1, 1] = NE322
-    A[0, 2] = A[2, 0] = E331
-    A[1, 2] = A[2, 1] = E332
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = -MSP13
     A[2, 2] = M3R + Ia3
-    A[0, 3] = A[3, 0] = NE341
-    A[1, 3] = A[3, 1] = NE342
-    A[3, 3] = Ia4 + NE344
-    A[0, 4] = A[4, 0] = NE351
-    A[1, 4] = A[4, 1] = NE352
-    A[2, 4] = A[4, 2] = NE353
-    A[3, 4] = A[4, 3] = NE354
-    A[4, 4] = Ia5 + NE355
-    A[0, 5] = A[5, 0] = N361
-    A[1, 5] = A[5, 1] = N362
-    A[2, 5] = A[5, 2] = N363
-    A[3, 5] = A[5, 3] = N364
-    A[4, 5] = A[5, 4] = N365
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE324
+    A[3, 3] = Ia4 + JP334
+    A[0, 4] = A[4, 0] = NE315
+    A[1, 4] = A[4, 1] = NE325
+    A[2, 4] = A[4, 2] = -AS15
+    A[3, 4] = A[4, 3] = NE345
+    A[4, 4] = Ia5 + JP335
+    A[0, 5] = A[5, 0] = NE316
+    A[1, 5] = A[5, 1] = NE326
+    A[2, 5] = A[5, 2] = E346
+    A[3, 5] = A[5, 3] = NE346
+    A[4, 5] = A[5, 4] = NE356
     A[5, 5] = ZZ6 + Ia6
 
 

@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: aa84697d5fb545d51aaded7108a6bd0b8510ed952ac7ec2ad5dc805a4b17f6a5
+# sha256 of what follows: b51e576eebc0f891e7364c0af542148ab026f1753054dbdcab3f8602a96fe592
 """Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters,
     regressor, dynamics.
 
@@ -61,6 +61,10 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AJA  the inertia tensor JP by the axes of the antecedent's frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DN   the part of DG that turns: axis times moment
@@ -70,9 +74,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 
 Cost per sample
     regressor          270 multiplications, 211 additions, 7 sin, 7 cos
-    inverse_dynamics   300 multiplications, 286 additions, 7 sin, 7 cos
-    inertia_matrix     172 multiplications, 132 additions, 6 sin, 6 cos
-    bias               275 multiplications, 239 additions, 7 sin, 7 cos
+    inverse_dynamics   300 multiplications, 281 additions, 7 sin, 7 cos
+    inertia_matrix     114 multiplications, 102 additions, 5 sin, 5 cos
+    bias               275 multiplications, 234 additions, 7 sin, 7 cos
     gravity            75 multiplications, 54 additions, 6 sin, 6 cos
     frame_poses        55 multiplications, 28 additions, 6 sin, 6 cos
 
@@ -369,7 +373,7 @@ def inertia_matrix(
     X = _parameters(X)
     states = _states(q)
     result = np.zeros((7, 7, len(states[0])))
-    _fill(_inertia_matrix_block, result, states, X, D2, RL2, D4, D6, D7, RL8)
+    _fill(_inertia_matrix_block, result, states, X, D2, RL2, D4, B6, D6, D7, RL8)
     return _by_sample(result, q)
 
 
@@ -432,7 +436,7 @@ def forward_dynamics(
     _states(q, qd, tau)
     rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D6=D6, D7=D7,
         RL8=RL8, GX=GX, GZ=GZ)
-    inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D6=D6, D7=D7, RL8=RL8)
+    inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, B6=B6, D6=D6, D7=D7, RL8=RL8)
     return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
@@ -1099,7 +1103,7 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ
     GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*np.sign(QP8)
 
 
-def _inertia_matrix_block(q, A, X, D2, RL2, D4, D6, D7, RL8):
+def _inertia_matrix_block(q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
     # Inputs
     q2, q3, q4, q6, q7, q8 = q[1:]
@@ -1147,6 +1151,8 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, D6, D7, RL8):
     MX8 = X[61]
     MY8 = X[62]
     Ia8 = X[63]
+    # Constants
+    MSP12 = MX2 - MY3R
     # Trigonometry
     C2 = np.cos(q2)
     S2 = np.sin(q2)
@@ -1156,150 +1162,115 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, D6, D7, RL8):
     S6 = np.sin(q6)
     C7 = np.cos(q7)
     S7 = np.sin(q7)
-    th67 = q6 + q7
-    C67 = np.cos(th67)
-    S67 = np.sin(th67)
     C8 = np.cos(q8)
     S8 = np.sin(q8)
     # Inputs
     r3 = 0.1 + q3
-    # Link 2
-    C2RL2 = RL2*C2
-    S2RL2 = RL2*S2
-    # Link 3
-    VSP331 = D2 + S2*r3
-    # Link 4
-    C2C4 = C2*C4
-    C2S4 = C2*S4
-    VSP241 = C2RL2 + D4*C2
-    VSP341 = -S2RL2 - D4*S2
-    VP141 = S4*VSP331 + C4*VSP341
-    VP241 = C4*VSP331 - S4*VSP341
-    # Link 7
-    VSP371 = D6 + D7*C6
-    # Link 8
-    S67C8 = S67*C8
-    S67S8 = S67*S8
-    VSP381 = VSP371 + RL8*S67
-    # Joint 8
-    F181 = -MY8*C67
-    F281 = MX8*C67
-    F381 = -MX8*S67S8 - MY8*S67C8
-    N181 = XZ8*C67 + XY8*S67S8 - XX8R*S67C8
-    N281 = YZ8*C67 - XY8*S67C8
-    N381 = ZZ8*C67 + YZ8*S67S8 + MX8*C8*VSP381 - XZ8*S67C8 - MY8*S8*VSP381
-    FDI181 = C8*F181 - S8*F281
-    FDI381 = S8*F181 + C8*F281
-    # Joint 7
-    F371 = MX7*C67 - MY7R*S67
-    E371 = FDI381 + F371
-    N371 = -YZ7*C67 - XZ7*S67
-    N171 = MY7R*VSP371 - XX7R*S67 - XY7*C67
-    N271 = -XY7*S67 - MX7*VSP371
-    NE171 = C8*N181 + N171 - S8*N281 - RL8*FDI381
-    NE271 = N271 - N381
-    NE371 = S8*N181 + C8*N281 + RL8*FDI181 + N371
-    FDI271 = S7*FDI181 - C7*F381
-    # Joint 6
-    F361 = MX6R*C6 - MY6*S6
-    E361 = E371 + F361
-    N361 = -YZ6*C6 - XZ6R*S6
-    N161 = D6*MY6 - XX6R*S6 - XY6*C6
-    N261 = -XY6*S6 - D6*MX6R
-    NE161 = C7*NE171 + N161 - S7*NE271
-    NE261 = S7*NE171 + C7*NE271 + N261 - D7*E371
-    NE361 = NE371 + D7*FDI271 + N361
-    # Joint 4
-    F141 = -MY4R*S2
-    F241 = MX4R*S2
-    F341 = MX4R*C2S4 + MY4R*C2C4
-    N141 = XX4R*C2C4 + XZ4R*S2 + MY4R*VSP241 - XY4R*C2S4
-    N241 = XY4R*C2C4 + YZ4R*S2 - MX4R*VSP241
-    N341 = ZZ4R*S2 + XZ4R*C2C4 + MX4R*VP241 - YZ4R*C2S4 - MY4R*VP141
-    FDI141 = S4*F141 + C4*F241
-    FDI341 = C4*F141 - S4*F241
-    # Joint 3
-    F131 = M3R*VSP331 + MZ3*S2 - MY3R*C2
-    F231 = M3R*C2RL2 + MX3R*C2
-    F331 = -M3R*S2RL2 - MX3R*S2
-    E131 = FDI141 + F131
-    E231 = F341 + F231
-    E331 = FDI341 + F331
-    N131 = -MY3R*S2RL2 - MZ3*C2RL2
-    N231 = MZ3*VSP331 + MX3R*S2RL2
-    N331 = MX3R*C2RL2 - MY3R*VSP331
-    NE131 = S4*N141 + C4*N241 + N131
-    NE231 = N341 + N231 - D4*FDI341
-    NE331 = C4*N141 + D4*F341 + N331 - S4*N241
-    # Joint 2
-    F321 = MX2*C2 - MY2*S2
-    E321 = E131 + F321
-    N121 = D2*MY2 - XX2R*S2 - XY2R*C2
-    N221 = -XY2R*S2 - D2*MX2
-    N321 = MX2*S2RL2 + MY2*C2RL2 - YZ2R*C2 - XZ2R*S2
-    NE121 = N121 - NE231 - r3*E131
-    NE221 = N221 - NE331
-    NE321 = NE131 + N321 - r3*E231
-    FDI121 = S2*E331 - C2*E231
-    # Joint 1
-    NE311 = ZZ1R + D6*E361 + D2*E321 - S6*NE161 - C6*NE261 - S2*NE121 - C2*NE221 - RL2*FDI121
-    # Joint 4
-    F342 = MY4R*S4 - MX4R*C4
-    N342 = YZ4R*C4 + XZ4R*S4
-    N142 = XX4R*S4 + XY4R*C4 - MY4R*r3
-    N242 = XY4R*S4 + MX4R*r3
-    # Joint 3
-    F232 = -MZ3 - M3R*r3
-    E232 = F342 + F232
-    N132 = MZ3*r3
-    NE132 = S4*N142 + C4*N242 + N132
-    # Joint 2
-    NE322 = ZZ2R + NE132 - r3*E232
-    # Joint 4
-    N343 = -MX4R*S4 - MY4R*C4
-    # Link 7
-    S7D7 = D7*S7
-    C7D7 = D7*C7
-    # Link 8
-    VSP186 = RL8 + S7D7
-    # Joint 8
-    F386 = MY8*S8 - MX8*C8
-    N187 = XX8R*S8 + XY8*C8
-    N287 = XY8*S8
-    N386a = YZ8*C8 + XZ8*S8
-    N186 = N187 - MY8*C7D7
-    N286 = N287 + MX8*C7D7
-    N386 = N386a - MX8*S8*VSP186 - MY8*C8*VSP186
-    # Joint 7
-    E276 = MX7 - F386
-    N376 = ZZ7R + MX7*C7D7 - MY7R*S7D7
-    NE376 = S8*N186 + C8*N286 + N376
-    FDI276 = C7*E276 - MY7R*S7
-    # Joint 6
-    NE366 = ZZ6R + NE376 + D7*FDI276
-    # Joint 8
-    N387 = N386a - MX8*RL8*S8 - MY8*RL8*C8
-    # Joint 7
-    NE377 = ZZ7R + S8*N187 + C8*N287
+    # Composite link 8
+    AS18 = MX8*C8 - MY8*S8
+    AS38 = MX8*S8 + MY8*C8
+    C8C8 = C8**2
+    C8S8 = C8*S8
+    AJA118 = XX8R*C8C8 - XY8*2*C8S8
+    JP117 = XX7R + AJA118
+    NE178 = XZ8*C8 - YZ8*S8 - RL8*AS18
+    JP127 = XY7 - NE178
+    JP137 = XZ7 + XX8R*C8S8 + XY8*2*C8C8 - XY8
+    NE378 = XZ8*S8 + YZ8*C8 - RL8*AS38
+    JP237 = YZ7 - NE378
+    JP337 = ZZ7R + XX8R - AJA118
+    MSP17 = MX7 + AS18
+    # Composite link 7
+    AS17 = C7*MSP17 - MY7R*S7
+    AS27 = S7*MSP17 + MY7R*C7
+    C7C7 = C7**2
+    C7S7 = C7*S7
+    JP116a = ZZ8 - JP117
+    JP116b = C7C7*JP116a + JP127*2*C7S7
+    NE167 = C7*JP137 - S7*JP237
+    NE267 = S7*JP137 + C7*JP237
+    D7AS17 = D7*AS17
+    JP226a = 2*D7AS17
+    JP116 = XX6R + ZZ8 - JP116b
+    JP126 = XY6 + JP127*2*C7C7 - C7S7*JP116a - JP127 - D7*AS27
+    JP136 = XZ6R + NE167 - D7*AS38
+    JP226 = JP117 + JP116b + JP226a
+    JP236 = YZ6 + NE267
+    JP336 = ZZ6R + JP337 + JP226a
+    MSP16 = MX6R + AS17
+    MSP26 = MY6 + AS27
+    # Composite link 6
+    AS26 = C6*MSP16 - S6*MSP26
+    AS36 = -S6*MSP16 - C6*MSP26
+    NE316 = -S6*JP136 - C6*JP236
+    B6AS36 = B6*AS36
+    # Composite link 4
+    AS14 = MX4R*S4 + MY4R*C4
+    AS34 = MX4R*C4 - MY4R*S4
+    S4S4 = S4**2
+    C4S4 = C4*S4
+    JP113 = XX4R*S4S4 + XY4R*2*C4S4
+    NE134 = XZ4R*S4 + YZ4R*C4
+    NE334 = XZ4R*C4 - YZ4R*S4
+    D4AS14 = D4*AS14
+    JP223a = 2*D4AS14
+    JP133 = XX4R*C4S4 + XY4R - XY4R*2*S4S4 - D4*AS34
+    JP223 = ZZ4R + JP223a
+    JP333 = XX4R + JP223a - JP113
+    MSP13 = MX3R + AS14
+    MSP33 = MZ3 + AS34
+    # Composite link 3
+    JP112a = MSP33 + M3R*r3
+    JP112b = r3*MSP33 + r3*JP112a
+    JP112 = XX2R + JP223 + JP112b
+    JP122 = XY2R + NE334 - MY3R*r3
+    JP132 = XZ2R - NE134
+    JP232 = YZ2R + r3*MSP13 - JP133
+    JP332 = ZZ2R + JP113 + JP112b
+    MSP22 = MY2 - JP112a
+    # Composite link 2
+    AS12 = MSP12*C2 - S2*MSP22
+    AS32 = -MSP12*S2 - C2*MSP22
+    NE312 = -S2*JP132 - C2*JP232 - RL2*AS32
+    JP331 = (ZZ1R + JP116 + JP126*2*C6*S6 + 2*(D6*AS26 + B6AS36) + JP112 + C2**2*(JP333 - JP112) +
+        JP122*2*C2*S2 + D2*AS12 + RL2*MSP13 + D2*(AS12 + D2*M3R) + RL2*(MSP13 +
+            RL2*M3R) - C6**2*(JP116 - JP226) - 2*B6AS36)
+    # Unit acceleration of joint 3
+    E113 = M3R*S2
+    NE313 = -S2*MSP13 - RL2*E113
+    # Unit acceleration of joint 4
+    NE234 = ZZ4R + D4AS14
+    NE124 = -NE234 - r3*AS34
+    E114 = -S2*AS14
+    NE314 = C2*NE334 + D2*AS34 - S2*NE124 - RL2*E114
+    # Unit acceleration of joint 7
+    NE367 = JP337 + D7AS17
+    NE317 = -S6*NE167 - C6*NE267
+    # Unit acceleration of joint 8
+    E268 = -S7*AS38
+    NE168 = C7*NE178 + ZZ8*S7
+    NE268 = S7*NE178 - ZZ8*C7 - D7*AS18
+    NE368 = NE378 + D7*E268
+    NE318 = D6*AS18 - S6*NE168 - C6*NE268
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = NE321
-    A[1, 1] = NE322
-    A[0, 2] = A[2, 0] = E331
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = MY3R
     A[2, 2] = M3R + Ia3
-    A[0, 3] = A[3, 0] = N341
-    A[1, 3] = A[3, 1] = N342
-    A[2, 3] = A[3, 2] = N343
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE134
+    A[2, 3] = A[3, 2] = -AS14
     A[3, 3] = ZZ4R + Ia4
-    A[0, 4] = A[4, 0] = NE361
-    A[4, 4] = NE366
-    A[0, 5] = A[5, 0] = NE371
-    A[4, 5] = A[5, 4] = NE376
-    A[5, 5] = Ia7 + NE377
-    A[0, 6] = A[6, 0] = N381
-    A[4, 6] = A[6, 4] = N386
-    A[5, 6] = A[6, 5] = N387
+    A[0, 4] = A[4, 0] = NE316
+    A[4, 4] = JP336
+    A[0, 5] = A[5, 0] = NE317
+    A[4, 5] = A[5, 4] = NE367
+    A[5, 5] = Ia7 + JP337
+    A[0, 6] = A[6, 0] = NE318
+    A[4, 6] = A[6, 4] = NE368
+    A[5, 6] = A[6, 5] = NE378
     A[6, 6] = ZZ8 + Ia8
 
 

@@ -5,7 +5,7 @@
 # SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
 # FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
 # robot file.
-# sha256 of what follows: 654bbd3c22d7bdab489086a70006fe137b4c12be31a2a25e39b5cfb953e2649d
+# sha256 of what follows: 9caadd6b6ab7bdf227ba864c6d484d37dec32ebb477e00898fbbc09c64ec76d5
 """Stäubli TX40, 6 revolute joints, Table 1 as printed: base parameters, regressor, dynamics.
 
 GENERATED from tx40_table1.yaml, sha256 06118b19e6c7, by symgen 0.2.0.
@@ -57,6 +57,10 @@ Names       family, then component digits, then link: W12 is component 1 of link
     E    force transmitted to a link by its antecedent, in its frame
     NE   moment transmitted to a link by its antecedent, about the origin of its frame
     FDI  the transmitted force, in the antecedent's frame
+    JP   inertia tensor of a link with all that it carries, about the origin of its frame
+    MSP  first moments of a link with all that it carries, in its frame
+    AJA  the inertia tensor JP by the axes of the antecedent's frame
+    AS   the first moments MSP in the antecedent's frame
     GAM  joint torque or force
     DG   contribution of a base parameter to a joint torque
     DN   the part of DG that turns: axis times moment
@@ -65,9 +69,9 @@ Names       family, then component digits, then link: W12 is component 1 of link
 
 Cost per sample
     regressor          355 multiplications, 261 additions, 6 sin, 6 cos
-    inverse_dynamics   257 multiplications, 248 additions, 6 sin, 6 cos
-    inertia_matrix     259 multiplications, 193 additions, 6 sin, 6 cos
-    bias               244 multiplications, 219 additions, 6 sin, 6 cos
+    inverse_dynamics   257 multiplications, 243 additions, 6 sin, 6 cos
+    inertia_matrix     134 multiplications, 110 additions, 5 sin, 5 cos
+    bias               244 multiplications, 214 additions, 6 sin, 6 cos
     gravity            42 multiplications, 29 additions, 5 sin, 5 cos
     frame_poses        48 multiplications, 20 additions, 6 sin, 6 cos
 
@@ -1073,230 +1077,133 @@ def _inertia_matrix_block(q, A, X, D3, RL4):
     S2 = np.sin(q2)
     C3 = np.cos(q3)
     S3 = np.sin(q3)
-    th23 = q2 + q3
-    C23 = np.cos(th23)
-    S23 = np.sin(th23)
     C4 = np.cos(q4)
     S4 = np.sin(q4)
     C5 = np.cos(q5)
     S5 = np.sin(q5)
     C6 = np.cos(q6)
     S6 = np.sin(q6)
-    # Link 3
-    VSP331 = -D3*C2
-    # Link 4
-    S23C4 = S23*C4
-    S23S4 = S23*S4
-    VSP341 = VSP331 + RL4*S23
-    S4VSP341 = S4*VSP341
-    C4VSP341 = C4*VSP341
-    # Link 5
-    F361a = C5*S23C4 + C23*S5
-    F161a = C23*C5 - S5*S23C4
-    C5S4VSP341 = C5*S4VSP341
-    S5S4VSP341 = S5*S4VSP341
-    # Link 6
-    F361b = C6*F361a - S6*S23S4
-    F361c = C6*S23S4 + S6*F361a
-    VP161 = -C6*C5S4VSP341 - S6*C4VSP341
-    VP261 = S6*C5S4VSP341 - C6*C4VSP341
-    # Joint 6
-    F161 = -MY6*F161a
-    F261 = MX6*F161a
-    F361 = MX6*F361c + MY6*F361b
-    N161 = XX6R*F361b + XZ6*F161a + MY6*S5S4VSP341 - XY6*F361c
-    N261 = XY6*F361b + YZ6*F161a - MX6*S5S4VSP341
-    N361 = ZZ6*F161a + XZ6*F361b + MX6*VP261 - YZ6*F361c - MY6*VP161
-    FDI161 = C6*F161 - S6*F261
-    FDI361 = -S6*F161 - C6*F261
-    # Joint 5
-    F151 = -MY5R*S23S4
-    F251 = MX5*S23S4
-    F351 = MY5R*F361a - MX5*F161a
-    E151 = FDI161 + F151
-    E251 = F361 + F251
-    E351 = FDI361 + F351
-    N151 = XX5R*F361a + XZ5*S23S4 + XY5*F161a + MY5R*C4VSP341
-    N251 = XY5*F361a + YZ5*S23S4 - MX5*C4VSP341
-    N351 = ZZ5R*S23S4 + YZ5*F161a + XZ5*F361a + MX5*S5S4VSP341 + MY5R*C5S4VSP341
-    NE151 = C6*N161 + N151 - S6*N261
-    NE251 = N361 + N251
-    NE351 = N351 - S6*N161 - C6*N261
-    FDI151 = C5*E151 - S5*E251
-    FDI351 = S5*E151 + C5*E251
-    # Joint 4
-    F141 = -MY4R*C23
-    F241 = MX4*C23
-    F341 = MX4*S23S4 + MY4R*S23C4
-    E141 = FDI151 + F141
-    E241 = F241 - E351
-    E341 = FDI351 + F341
-    N141 = XX4R*S23C4 + XZ4*C23 - XY4*S23S4
-    N241 = XY4*S23C4 + YZ4*C23
-    N341 = ZZ4R*C23 + XZ4*S23C4 + MY4R*S4VSP341 - YZ4*S23S4 - MX4*C4VSP341
-    NE141 = C5*NE151 + N141 - S5*NE251
-    NE241 = N241 - NE351
-    NE341 = S5*NE151 + C5*NE251 + N341
-    FDI141 = C4*E141 - S4*E241
-    FDI341 = -S4*E141 - C4*E241
-    # Joint 3
-    F331 = MY3R*S23 - MX3*C23
-    E331 = FDI341 + F331
-    N331 = YZ3*C23 + XZ3*S23
-    N131 = XX3R*S23 + XY3*C23 + MY3R*VSP331
-    N231 = XY3*S23 - MX3*VSP331
-    NE131 = C4*NE141 + RL4*FDI341 + N131 - S4*NE241
-    NE231 = NE341 + N231
-    NE331 = N331 - S4*NE141 - C4*NE241 - RL4*FDI141
-    FDI231 = S3*FDI141 + C3*E341
-    # Joint 2
-    N121 = XX2R*S2 + XY2*C2
-    N221 = XY2*S2
-    N321 = YZ2*C2 + XZ2R*S2
-    NE121 = C3*NE131 + N121 - S3*NE231
-    NE221 = S3*NE131 + C3*NE231 + N221 - D3*E331
-    NE321 = NE331 + D3*FDI231 + N321
-    # Joint 1
-    NE311 = ZZ1R + S2*NE121 + C2*NE221
-    # Link 3
-    S3D3 = D3*S3
-    C3D3 = D3*C3
-    # Link 4
-    VSP142 = S3D3 - RL4
-    C4VSP142 = C4*VSP142
-    S4VSP142 = S4*VSP142
-    # Link 5
-    S4C5 = S4*C5
-    S4S5 = S4*S5
-    VP152 = C5*C4VSP142 + S5*C3D3
-    VP252 = C5*C3D3 - S5*C4VSP142
-    # Link 6
-    F362a = C6*S4C5 + C4*S6
-    F362b = C4*C6 - S6*S4C5
-    VP162 = C6*VP152 - S6*S4VSP142
-    VP262 = -C6*S4VSP142 - S6*VP152
-    # Joint 6
-    F162 = -MY6*S4S5
-    F262 = MX6*S4S5
-    F362 = MX6*F362b - MY6*F362a
-    N162a = XX6R*F362a + XY6*F362b - XZ6*S4S5
-    N262a = XY6*F362a - YZ6*S4S5
-    N362a = ZZ6*S4S5 - YZ6*F362b - XZ6*F362a
-    N162 = MY6*VP252 - N162a
-    N262 = -N262a - MX6*VP252
-    N362 = N362a + MX6*VP262 - MY6*VP162
-    FDI162 = C6*F162 - S6*F262
-    FDI362 = -S6*F162 - C6*F262
-    # Joint 5
-    F152 = -MY5R*C4
-    F252 = MX5*C4
-    F352 = -MX5*S4S5 - MY5R*S4C5
-    E152 = FDI162 + F152
-    E252 = F362 + F252
-    E352 = FDI362 + F352
-    N152a = XX5R*S4C5 - XZ5*C4 - XY5*S4S5
-    N252a = XY5*S4C5 - YZ5*C4
-    N352a = ZZ5R*C4 + YZ5*S4S5 - XZ5*S4C5
-    N152 = MY5R*S4VSP142 - N152a
-    N252 = -N252a - MX5*S4VSP142
-    N352 = N352a + MX5*VP252 - MY5R*VP152
-    NE152 = C6*N162 + N152 - S6*N262
-    NE252 = N362 + N252
-    NE352 = N352 - S6*N162 - C6*N262
-    FDI152 = C5*E152 - S5*E252
-    FDI352 = S5*E152 + C5*E252
-    # Joint 4
-    F342 = MX4*C4 - MY4R*S4
-    E342 = FDI352 + F342
-    N143 = -XX4R*S4 - XY4*C4
-    N243 = -XY4*S4
-    N342a = YZ4*C4 + XZ4*S4
-    N142 = N143 + MY4R*C3D3
-    N242 = N243 - MX4*C3D3
-    N342 = -N342a - MX4*S4VSP142 - MY4R*C4VSP142
-    NE142 = C5*NE152 + N142 - S5*NE252
-    NE242 = N242 - NE352
-    NE342 = S5*NE152 + C5*NE252 + N342
-    FDI142 = C4*FDI152 + S4*E352
-    RL4FDI142 = RL4*FDI142
-    # Joint 3
-    E132 = FDI142 - MY3R
-    E232 = MX3 + E342
-    N332 = ZZ3R + MX3*C3D3 - MY3R*S3D3
-    NE332 = N332 - S4*NE142 - C4*NE242 - RL4FDI142
-    FDI232 = S3*E132 + C3*E232
-    # Joint 2
-    NE322 = ZZ2R + NE332 + D3*FDI232
-    # Link 4
-    C4RL4 = RL4*C4
-    S4RL4 = RL4*S4
-    # Link 5
-    C5C4RL4 = C5*C4RL4
-    S5C4RL4 = S5*C4RL4
-    # Link 6
-    VP163 = S6*S4RL4 - C6*C5C4RL4
-    VP263 = C6*S4RL4 + S6*C5C4RL4
-    # Joint 6
-    N163 = MY6*S5C4RL4 - N162a
-    N263 = -N262a - MX6*S5C4RL4
-    N363 = N362a + MX6*VP263 - MY6*VP163
-    # Joint 5
-    N153 = -N152a - MY5R*S4RL4
-    N253 = MX5*S4RL4 - N252a
-    N353 = N352a + MX5*S5C4RL4 + MY5R*C5C4RL4
-    NE153 = C6*N163 + N153 - S6*N263
-    NE253 = N363 + N253
-    NE353 = N353 - S6*N163 - C6*N263
-    # Joint 4
-    N343 = MX4*S4RL4 + MY4R*C4RL4 - N342a
-    NE143 = N143 + C5*NE153 - S5*NE253
-    NE243 = N243 - NE353
-    NE343 = S5*NE153 + C5*NE253 + N343
-    # Joint 3
-    NE333 = ZZ3R - RL4FDI142 - S4*NE143 - C4*NE243
-    # Link 6
-    S5C6 = S5*C6
-    S5S6 = S5*S6
-    # Joint 6
-    N164 = XX6R*S5C6 + XZ6*C5 - XY6*S5S6
-    N264 = XY6*S5C6 + YZ6*C5
-    N364 = ZZ6*C5 + XZ6*S5C6 - YZ6*S5S6
-    # Joint 5
-    N154 = XX5R*S5 + XY5*C5
-    N254 = XY5*S5
-    N354 = YZ5*C5 + XZ5*S5
-    NE154 = C6*N164 + N154 - S6*N264
-    NE254 = N364 + N254
-    NE354 = N354 - S6*N164 - C6*N264
-    # Joint 4
-    NE344 = ZZ4R + S5*NE154 + C5*NE254
-    # Joint 6
-    N165 = -XX6R*S6 - XY6*C6
-    N265 = -XY6*S6
-    N365 = -YZ6*C6 - XZ6*S6
-    # Joint 5
-    NE355 = ZZ5R - S6*N165 - C6*N265
+    # Composite link 6
+    AS16 = MX6*C6 - MY6*S6
+    AS36 = -MX6*S6 - MY6*C6
+    C6C6 = C6**2
+    C6S6 = C6*S6
+    AJA116 = XX6R*C6C6 - XY6*2*C6S6
+    NE156 = XZ6*C6 - YZ6*S6
+    NE356 = -XZ6*S6 - YZ6*C6
+    JP115 = XX5R + AJA116
+    JP125 = XY5 + NE156
+    JP135 = XZ5 + XY6 - XX6R*C6S6 - XY6*2*C6C6
+    JP235 = YZ5 + NE356
+    JP335 = ZZ5R + XX6R - AJA116
+    MSP15 = MX5 + AS16
+    # Composite link 5
+    AS15 = C5*MSP15 - MY5R*S5
+    AS35 = S5*MSP15 + MY5R*C5
+    C5C5 = C5**2
+    C5S5 = C5*S5
+    JP114a = ZZ6 - JP115
+    JP114b = C5C5*JP114a + JP125*2*C5S5
+    NE145 = C5*JP135 - S5*JP235
+    NE345 = S5*JP135 + C5*JP235
+    JP114 = XX4R + ZZ6 - JP114b
+    JP124 = XY4 - NE145
+    JP134 = XZ4 + JP125*2*C5C5 - C5S5*JP114a - JP125
+    JP234 = YZ4 - NE345
+    JP334 = ZZ4R + JP115 + JP114b
+    MSP14 = MX4 + AS15
+    MSP24 = MY4R - AS36
+    # Composite link 4
+    AS14 = C4*MSP14 - S4*MSP24
+    AS34 = -S4*MSP14 - C4*MSP24
+    C4C4 = C4**2
+    C4S4 = C4*S4
+    JP113a = JP335 - JP114
+    JP113b = C4C4*JP113a + JP124*2*C4S4
+    JP113c = 2*RL4*AS35
+    JP113 = XX3R + JP335 + JP113c - JP113b
+    NE134 = C4*JP134 - S4*JP234 - RL4*AS14
+    JP123 = XY3 + NE134
+    JP133 = XZ3 + C4S4*JP113a + JP124 - JP124*2*C4C4
+    NE334 = -S4*JP134 - C4*JP234 - RL4*AS34
+    JP233 = YZ3 + NE334
+    JP333 = ZZ3R + JP114 + JP113b + JP113c
+    MSP13 = MX3 + AS14
+    MSP23 = MY3R + AS35
+    # Composite link 3
+    AS13 = C3*MSP13 - S3*MSP23
+    AS23 = S3*MSP13 + C3*MSP23
+    C3C3 = C3**2
+    C3S3 = C3*S3
+    JP112a = JP334 - JP113
+    JP112b = C3C3*JP112a + JP123*2*C3S3
+    NE123 = C3*JP133 - S3*JP233
+    NE223 = S3*JP133 + C3*JP233
+    D3AS13 = D3*AS13
+    JP222a = 2*D3AS13
+    JP112 = XX2R + JP334 - JP112b
+    JP122 = XY2 + JP123*2*C3C3 - C3S3*JP112a - JP123 - D3*AS23
+    JP132 = XZ2R + NE123 - D3*AS34
+    JP222 = JP113 + JP112b + JP222a
+    JP232 = YZ2 + NE223
+    JP332 = ZZ2R + JP333 + JP222a
+    # Composite link 2
+    NE312 = S2*JP132 + C2*JP232
+    JP331 = ZZ1R + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    # Unit acceleration of joint 3
+    NE323 = JP333 + D3AS13
+    NE313 = S2*NE123 + C2*NE223
+    # Unit acceleration of joint 4
+    E224 = S3*AS34
+    NE124 = C3*NE134 - S3*JP334
+    NE224 = S3*NE134 + C3*JP334 + D3*AS14
+    NE324 = NE334 + D3*E224
+    NE314 = S2*NE124 + C2*NE224
+    # Unit acceleration of joint 5
+    E135 = -C4*AS35
+    E335 = S4*AS35
+    NE135 = C4*NE145 + S4*JP335 + RL4*E335
+    NE335 = C4*JP335 - S4*NE145 - RL4*E135
+    E225 = S3*E135 + C3*AS15
+    NE125 = C3*NE135 - S3*NE345
+    NE225 = S3*NE135 + C3*NE345 - D3*E335
+    NE325 = NE335 + D3*E225
+    NE315 = S2*NE125 + C2*NE225
+    # Unit acceleration of joint 6
+    E146 = C5*AS36
+    E346 = S5*AS36
+    NE146 = C5*NE156 - ZZ6*S5
+    NE346 = S5*NE156 + ZZ6*C5
+    E136 = C4*E146 - S4*AS16
+    E336 = -S4*E146 - C4*AS16
+    NE136 = C4*NE146 + S4*NE356 + RL4*E336
+    NE336 = C4*NE356 - S4*NE146 - RL4*E136
+    E226 = S3*E136 + C3*E346
+    NE126 = C3*NE136 - S3*NE346
+    NE226 = S3*NE136 + C3*NE346 - D3*E336
+    NE326 = NE336 + D3*E226
+    NE316 = S2*NE126 + C2*NE226
     # Inertia matrix
-    A[0, 0] = NE311
-    A[0, 1] = A[1, 0] = NE321
-    A[1, 1] = NE322
-    A[0, 2] = A[2, 0] = NE331
-    A[1, 2] = A[2, 1] = NE332
-    A[2, 2] = Ia3 + NE333
-    A[0, 3] = A[3, 0] = NE341
-    A[1, 3] = A[3, 1] = NE342
-    A[2, 3] = A[3, 2] = NE343
-    A[3, 3] = Ia4 + NE344
-    A[0, 4] = A[4, 0] = NE351
-    A[1, 4] = A[4, 1] = NE352
-    A[2, 4] = A[4, 2] = NE353
-    A[3, 4] = A[4, 3] = NE354
-    A[4, 4] = Ia5 + NE355
-    A[0, 5] = A[5, 0] = N361
-    A[1, 5] = A[5, 1] = N362
-    A[2, 5] = A[5, 2] = N363
-    A[3, 5] = A[5, 3] = N364
-    A[4, 5] = A[5, 4] = N365
+    A[0, 0] = JP331
+    A[0, 1] = A[1, 0] = NE312
+    A[1, 1] = JP332
+    A[0, 2] = A[2, 0] = NE313
+    A[1, 2] = A[2, 1] = NE323
+    A[2, 2] = Ia3 + JP333
+    A[0, 3] = A[3, 0] = NE314
+    A[1, 3] = A[3, 1] = NE324
+    A[2, 3] = A[3, 2] = NE334
+    A[3, 3] = Ia4 + JP334
+    A[0, 4] = A[4, 0] = NE315
+    A[1, 4] = A[4, 1] = NE325
+    A[2, 4] = A[4, 2] = NE335
+    A[3, 4] = A[4, 3] = NE345
+    A[4, 4] = Ia5 + JP335
+    A[0, 5] = A[5, 0] = NE316
+    A[1, 5] = A[5, 1] = NE326
+    A[2, 5] = A[5, 2] = NE336
+    A[3, 5] = A[5, 3] = NE346
+    A[4, 5] = A[5, 4] = NE356
     A[5, 5] = ZZ6 + Ia6
 
 

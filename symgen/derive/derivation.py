@@ -17,6 +17,7 @@ from functools import lru_cache
 
 from symgen.derive.closure import Closure
 from symgen.derive.columns import columns, element_names
+from symgen.derive.composite import CompositeLinks
 from symgen.derive.elements import element_column
 from symgen.derive.geometry import Geometry
 from symgen.derive.graph_algebra import GraphAlgebra
@@ -50,6 +51,8 @@ class Derivation:
         Scalar of each standard parameter.
     torque : mapping
         Gamma by actuated joint, N m or N.
+    inertia : mapping
+        {(i, k): A_ik} of the actuated joints.
     columns : mapping
         {standard parameter: {actuated joint: D}}.
     poses : mapping
@@ -63,6 +66,7 @@ class Derivation:
     motion: Motion
     chi: Mapping[str, Scalar]
     torque: Mapping[int, Scalar]
+    inertia: Mapping[tuple[int, int], Scalar]
     columns: Mapping[str, Mapping[int, Scalar]]
     poses: Mapping[int, tuple[Matrix, Vector]]
 
@@ -95,6 +99,19 @@ def derived(robot: Robot, closure: Closure) -> Derivation:
     last = [name for name in robot.parameters if name.rstrip("0123456789") in ABSORBED]
     D = columns(motion, [*(name for name in robot.parameters if name not in last), *last])
     poses = frame_poses(geometry)
+    inertia = projected_twice(closure, algebra, CompositeLinks(geometry, chi).matrix())
     algebra.graph.seal()
     joints = {i: actuated.get(i, 0) for i in robot.joints}
-    return Derivation(robot, closure, algebra, geometry, motion, chi, joints, D, poses)
+    return Derivation(robot, closure, algebra, geometry, motion, chi, joints, inertia, D, poses)
+
+
+def projected_twice(
+    closure: Closure, algebra: GraphAlgebra, A: Mapping[tuple[int, int], Scalar]
+) -> dict[tuple[int, int], Scalar]:
+    """{(i, k): (G' A G)_ik} of the actuated joints, A that of all moving joints."""
+    robot = closure.robot
+    AG = {j: closure.project(algebra, {k: A[j, k] for k in robot.moving}) for j in robot.moving}
+    columns = {
+        k: closure.project(algebra, {j: AG[j][k] for j in robot.moving}) for k in robot.joints
+    }
+    return {(i, k): columns[k][i] for k in robot.joints for i in robot.joints}

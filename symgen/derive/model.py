@@ -91,6 +91,8 @@ class Model:
         What it is.
     cases : callable or None
         Its entries from a derivation; None for what is composed of others.
+    closed : callable or None
+        The same entries where they multiply out to fewer terms than those of `cases`.
     composed : str
         How its closed form is composed of others: "formulas", "determinant" or "quotient".
     instead : str
@@ -124,6 +126,7 @@ class Model:
     unit: str
     meaning: str
     cases: Callable[[Derivation, Request], Iterable[Case]] | None
+    closed: Callable[[Derivation, Request], Iterable[Case]] | None = None
     result: str = ""
     symbolic: bool = True
     of_frames: bool = False
@@ -161,14 +164,18 @@ class Model:
         d: Derivation,
         request: Request,
         rewrite: Rewrite | None = None,
+        *,
+        closed: bool = False,
     ) -> Values:
         """The entries that may differ from zero, rewritten with what the request gives; over the
-        graph of `rewrite`, of the same request, where several models share one.
+        graph of `rewrite`, of the same request, where several models share one. closed : to be
+        multiplied out.
         """
-        assert self.cases is not None
+        cases = (closed and self.closed) or self.cases
+        assert cases is not None
         rewrite = rewrite or rewriting(d, request)
         entries = []
-        for case in self.cases(d, request):
+        for case in cases(d, request):
             values = rewrite.copied([e.value for e in case.entries], case.inputs, case.tag)
             entries += [
                 Entry(e.place, value, e.heading, e.comment)

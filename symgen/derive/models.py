@@ -81,7 +81,13 @@ def _friction(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _inertia_matrix(d: Derivation, r: Request) -> Iterator[Case]:
-    """Column i: Gamma from rest, without gravity, for qdd_i = 1; tied joints accelerate by G."""
+    row = {j: k for k, j in enumerate(d.robot.joints)}
+    entries = [Entry((row[i], row[k]), x, "Inertia matrix") for (i, k), x in d.inertia.items()]
+    yield Case(entries)
+
+
+def _unit_accelerations(d: Derivation, r: Request) -> Iterator[Case]:
+    """Column i of A: Gamma from rest, without gravity, for qdd_i = 1; tied joints accelerate by G."""
     named, common = Names(len(d.robot.frames)), _still(d, "qd", "qdd") | _weightless(d)
     common |= _without(d, lambda e: e.kind == "inertia")
     for column, i in enumerate(d.robot.joints):
@@ -270,7 +276,7 @@ MODELS = {
             "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
             "A(q), actuators included: column i is Gamma for a unit acceleration of joint i from "
             "rest",
-            _inertia_matrix, result="A", symmetric=True, page=3,
+            _inertia_matrix, closed=_unit_accelerations, result="A", symmetric=True, page=3,
         ),
         Model(
             "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,

@@ -91,7 +91,8 @@ class Function:
         return [entry for entry in self.values.entries if isinstance(entry.value, Scalar)]
 
     def count(self, op: str) -> int:
-        return sum(node.op == op for node in self.nodes)
+        """Operations that depend on the sample; those of constants and parameters are none."""
+        return sum(node.op == op and not node.fixed for node in self.nodes)
 
     @property
     def operations(self) -> tuple[int, int]:

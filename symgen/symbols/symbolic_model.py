@@ -146,7 +146,7 @@ class SymbolicModel:
         d, request = self.source.derivation, request or self.request
         rewrite = rewriting(d, request)
         entries = [
-            {e.place: e.value for e in model.values(d, request, rewrite).entries}
+            {e.place: e.value for e in model.values(d, request, rewrite, closed=True).entries}
             for model in models
         ]
         Frames(d.geometry).register_angles(rewrite.algebra)

@@ -1,0 +1,144 @@
+"""The inertia matrix by composite links: a link with all that it carries, rigid (Walker and Orin 1982).
+
+From the tips to the base, the parameters of a composite link about the origin of its frame take in those of the links on it:
+
+    JP_i <- JP_i + iRj JP_j jRi + 2 (P . AS) E - P AS' - AS P' + MP_j ((P . P) E - P P')
+    MSP_i <- MSP_i + AS + MP_j P ,   MP_i <- MP_i + MP_j ,   AS = iRj MSP_j ,   P = P_ij
+
+Column k of A is the wrench by which composite link k resists a unit acceleration of joint k,
+
+    E = (-MSP_2, MSP_1, 0) ,   NE = (JP_13, JP_23, JP_33)      revolute
+    E = (0, 0, MP) ,           NE = (MSP_2, -MSP_1, 0)         prismatic
+
+carried inward to every joint before it. With base parameters YY = MZ = M = 0 of most links, and the terms in MP vanish.
+
+M. W. Walker, D. E. Orin, J. Dyn. Sys. Meas. Control 104, 1982; Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch. 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from symgen.derive.columns import element_names
+from symgen.derive.geometry import Geometry, Rotation
+from symgen.derive.names import Names
+from symgen.derive.scalar import Scalar, Vector, add, cross, dot, mul, scale, sub, vadd
+from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
+
+Tensor = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]  # 11, 12, 13, 22, 23, 33
+PLACES = ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3))
+Place = tuple[int, int]
+
+
+class CompositeLinks:
+    """Inertia tensor JP, first moments MSP and mass MP of every composite link, in its frame.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Rotations and positions of the frames.
+    chi : mapping
+        Scalar of each standard parameter.
+    """
+
+    def __init__(self, geometry: Geometry, chi: Mapping[str, Scalar]) -> None:
+        self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
+        self.named, self.chi = Names(len(self.robot.frames)), chi
+        self.JP: dict[int, Tensor] = {}
+        self.MSP: dict[int, Vector] = {}
+        self.MP: dict[int, Scalar] = {}
+        for f in self.robot.frames:
+            link = [chi[parameter(p, f.j)] if f.j in self.robot.links else 0 for p in INERTIAL]
+            XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = link
+            self.JP[f.j] = (XX, XY, XZ, YY, YZ, ZZ)
+            self.MSP[f.j] = (MX, MY, MZ)
+            self.MP[f.j] = M
+        for f in reversed(self.robot.frames):
+            self.algebra.section(f"Composite link {f.j}")
+            self._name(f.j)
+            if f.ant:
+                self._take(f.j, f.ant)
+
+    def _name(self, j: int) -> None:
+        """Call the parameters of a composite link by their names."""
+        for (k, m), x in zip(PLACES, self.JP[j], strict=True):
+            self.algebra.name(x, self.named("JP", k, m, j))
+        for k, x in enumerate(self.MSP[j], start=1):
+            self.algebra.name(x, self.named("MSP", k, j))
+        self.algebra.name(self.MP[j], self.named("MP", j))
+
+    def _take(self, j: int, i: int) -> None:
+        """Add composite link j to the frame i that carries it."""
+        R, P = self.geometry.rotation[j], self.geometry.P[j]
+        AS = R.up(self.MSP[j])
+        for k, x in enumerate(AS, start=1):
+            self.algebra.name(x, self.named("AS", k, j))
+        moved = vadd(AS, scale(self.MP[j], P))
+        AJA = turned(R, self.JP[j])
+        for (k, m), x in zip(PLACES, AJA, strict=True):
+            self.algebra.hint(x, self.named("AJA", k, m, j))
+        shifted = parallel(P, AS, moved)
+        JP = (add(a, add(b, c)) for a, b, c in zip(self.JP[i], AJA, shifted, strict=True))
+        self.JP[i] = tuple(JP)
+        self.MSP[i] = vadd(self.MSP[i], moved)
+        self.MP[i] = add(self.MP[i], self.MP[j])
+
+    def matrix(self) -> dict[Place, Scalar]:
+        """{(i, k): A_ik} of all moving joints of the open tree, elements included."""
+        moving = self.robot.moving
+        A: dict[Place, Scalar] = {(i, k): 0 for i in moving for k in moving}
+        for k in moving:
+            for i, x in self._column(k).items():
+                A[i, k] = x
+                A[k, i] = x
+        for name, (e, j) in element_names(self.robot).items():
+            if e.kind == "inertia":
+                row = e.along.get(j, {})
+                form = e.form.get(j) or {
+                    (i, k): a * b for i, a in row.items() for k, b in row.items()
+                }
+                for place, b in form.items():
+                    A[place] = add(A[place], mul(self.algebra.constant(b), self.chi[name]))
+        return A
+
+    def _column(self, k: int) -> dict[int, Scalar]:
+        """{i: A_ik} of the links, joint i on the path to joint k."""
+        x, y, _ = self.MSP[k]
+        E: Vector = (sub(0, y), x, 0)
+        NE: Vector = (self.JP[k][2], self.JP[k][4], self.JP[k][5])
+        if self.robot.frame(k).sigma == PRISMATIC:
+            E, NE = (0, 0, self.MP[k]), (y, sub(0, x), 0)
+        self.algebra.section(f"Unit acceleration of joint {k}")
+        column: dict[int, Scalar] = {}
+        for i in reversed(self.robot.path(k)):
+            frame = self.robot.frame(i)
+            for family, vector in (("E", E), ("NE", NE)):
+                for c, x in enumerate(vector, start=1):
+                    self.algebra.name(x, self.named(family, c, i, k))
+            if frame.sigma != FIXED:
+                column[i] = E[2] if frame.sigma == PRISMATIC else NE[2]
+            rotation = self.geometry.rotation[i]
+            FDI = rotation.up(E)
+            E, NE = FDI, vadd(rotation.up(NE), cross(self.geometry.P[i], FDI))
+        return column
+
+
+def turned(R: Rotation, J: Tensor) -> Tensor:
+    """iRj J jRi: about z by cos**2 and cos sin, then by the fixed part."""
+    XX, XY, XZ, YY, YZ, ZZ = J
+    cc, cs = mul(R.c, R.c), mul(R.c, R.s)
+    x = sub(mul(cc, sub(XX, YY)), mul(add(cs, cs), XY))
+    xy = add(mul(cs, sub(XX, YY)), sub(mul(add(cc, cc), XY), XY))
+    xz, yz = sub(mul(R.c, XZ), mul(R.s, YZ)), add(mul(R.s, XZ), mul(R.c, YZ))
+    rows = [(add(YY, x), xy, xz), (xy, sub(XX, x), yz), (xz, yz, ZZ)]
+    if R.A is not None:
+        half = [[dot(axis, column) for column in rows] for axis in R.A]
+        rows = [(dot(a, R.A[0]), dot(a, R.A[1]), dot(a, R.A[2])) for a in half]
+    return rows[0][0], rows[0][1], rows[0][2], rows[1][1], rows[1][2], rows[2][2]
+
+
+def parallel(P: Vector, AS: Vector, moved: Vector) -> Tensor:
+    """(P . AS + P . moved) E - P moved' - AS P', moved = AS + MP P: the terms of the parallel axes."""
+    trace = add(dot(P, AS), dot(P, moved))
+    outer = {(k, m): add(mul(P[k - 1], moved[m - 1]), mul(AS[k - 1], P[m - 1])) for k, m in PLACES}
+    return tuple(sub(trace if k == m else 0, x) for (k, m), x in outer.items())
