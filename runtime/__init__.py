@@ -18,8 +18,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from runtime.checks.delay import delay
-    from runtime.checks.plausibility import plausibility
     from runtime.errors import InputError
     from runtime.estimators.estimate import Estimate
     from runtime.excitation.poses import static_poses
@@ -29,6 +27,8 @@ if TYPE_CHECKING:
     from runtime.loop.methods import essential, estimate
     from runtime.loop.simulation import simulate
     from runtime.model.generated import load_model
+    from runtime.plausible.delay import delay
+    from runtime.plausible.plausibility import plausibility
     from runtime.records.reading import read_record
     from runtime.records.record import Record
     from runtime.records.resampling import resample
@@ -78,8 +78,8 @@ _MODULES = {
     "runtime.excitation.search": ("excite",),
     "runtime.identification.compare": ("compare",),
     "runtime.identification.identification": ("Identification", "identify"),
-    "runtime.checks.delay": ("delay",),
-    "runtime.checks.plausibility": ("plausibility",),
+    "runtime.plausible.delay": ("delay",),
+    "runtime.plausible.plausibility": ("plausibility",),
     "runtime.model.generated": ("load_model",),
     "runtime.loop.simulation": ("simulate",),
     "runtime.rows.observation": ("Observation",),

@@ -8,32 +8,10 @@ they are a status of the Estimate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from pydantic import ValidationError
+from collections.abc import Mapping
+from typing import Any
 
 LONGEST = 2000  # characters of a message: a file may hold names of any length
-
-EXPECTED = {  # by the type of an error of pydantic
-    "bool_type": "true or false",
-    "finite_number": "a finite number",
-    "float_type": "a number",
-    "greater_than": "more than {gt}",
-    "greater_than_equal": "at least {ge}",
-    "int_type": "an integer",
-    "less_than": "less than {lt}",
-    "less_than_equal": "at most {le}",
-    "list_type": "a list",
-    "mapping_type": "a mapping",
-    "dict_type": "a mapping",
-    "dataclass_type": "a mapping",
-    "model_attributes_type": "a mapping",
-    "union_tag_not_found": "a mapping with the key {discriminator}",
-    "string_type": "a text",
-    "tuple_type": "a list",
-}
 
 
 def printable(text: str) -> str:
@@ -138,85 +116,6 @@ class DataUnavailableError(InputError):
     def __init__(self, message: str, *, tried: tuple[str, ...] = ()) -> None:
         self.tried = tried
         super().__init__(message)
-
-
-def settings_error(
-    error: ValidationError, given: Any, path: tuple[str | int, ...] = ()
-) -> SettingsError:
-    """The first problem of a pydantic validation as one SettingsError.
-
-    Every member of a union has its own error. The member that took most of the value knows best;
-    members that took equally much
-    are named together.
-
-    Parameters
-    ----------
-    given : Any
-        Value that was validated.
-    path : tuple of str and int
-        Keys that lead to `given`.
-    """
-    problems = [_problem(one, given) for one in error.errors(include_url=False)]
-    first = problems[0][0]
-    alike = [(place, reason) for place, reason in problems if place[: len(first)] == first]
-    deepest = max((place for place, _ in alike), key=len)
-    reasons = [reason for place, reason in alike if place == deepest]
-    value, _, told = reasons[0].partition("; expected ")
-    others = [
-        reason.removeprefix(f"{value}; expected ")
-        for reason in reasons[1:]
-        if reason.startswith(f"{value}; expected ")
-    ]
-    return SettingsError(
-        " or ".join([reasons[0], *(other for other in dict.fromkeys(others) if other != told)]),
-        path=(*path, *deepest),
-    )
-
-
-def shown(value: Any) -> str:
-    """The first 80 characters of a value as Python writes it."""
-    return repr(value)[:80]
-
-
-def _problem(error: Mapping[str, Any], given: Any) -> tuple[tuple[str | int, ...], str]:
-    """Path and reason of one error of pydantic; `loc` also names members of unions, which are no
-    keys.
-    """
-    path: list[str | int] = []
-    for key in error["loc"]:
-        try:
-            given = (
-                given[key]
-                if isinstance(given, Mapping | Sequence) and not isinstance(given, str)
-                else getattr(given, key)
-            )
-            path.append(key)
-        except (LookupError, TypeError, AttributeError):
-            continue
-    kind, context = error["type"], error.get("ctx", {})
-    reason = f"{shown(error['input'])}; expected {EXPECTED.get(kind, '').format(**context)}"
-    if kind == "missing":
-        key = error["loc"][-1]
-        reason = (
-            f"no key {key}; add it"
-            if isinstance(key, str)
-            else f"{len(given)} values; expected at least {key + 1}"
-        )
-    elif kind == "union_tag_invalid":
-        path.append(context["discriminator"].strip("'"))
-        names = context["expected_tags"].replace("'", "")
-        reason = f"no {path[-1]} {context['tag']!r}; there are {names}"
-    elif kind == "too_long":
-        reason = f"{context['actual_length']} values; expected {context['max_length']}"
-    elif kind == "literal_error":
-        reason = f"{shown(error['input'])}; expected {context['expected'].replace(chr(39), '')}"
-    elif isinstance(cause := context.get("error"), SettingsError):
-        path, reason = [*path, *cause.path], cause.reason
-    elif isinstance(cause, InputError):
-        reason = cause.message
-    elif kind not in EXPECTED:
-        reason = error["msg"].removeprefix("Value error, ")
-    return tuple(path), reason
 
 
 def instant(t: float) -> str:

@@ -1,3 +1,1 @@
-"""Is the record, the robot file or the study wrong? Checks before and after the fit, each with a
-name, a number and a remedy.
-"""
+"""A question about a record, a study or a result, with its answer, its limit and its remedy."""

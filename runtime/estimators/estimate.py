@@ -22,26 +22,24 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.json_documents import (
+from runtime.json_documents import json_text
+from runtime.latex import parameter_table
+from runtime.markup import number
+from runtime.settings.documents import (
     InfIfNull,
     Matrix,
     NanIfNull,
     Vector,
     Whole,
     from_text,
-    json_text,
     read_text,
 )
-from runtime.latex import parameter_table
-from runtime.markup import number
 from runtime.table import Table, notebook
 
 Array = np.ndarray
 
 SCHEMA = "symgen-estimate/1"
-"""Kind and version of the JSON layout, published as runtime/schemas/estimate.schema.json (`symgen
-schema --of estimate`).
-"""
+"""Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""
 
 
 Status = Literal[

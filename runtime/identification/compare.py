@@ -26,9 +26,6 @@ from typing import Any
 import numpy as np
 
 from runtime.blas import single_threaded
-from runtime.checks.motion import low_speed_of_rest
-from runtime.checks.plausibility import plausibility
-from runtime.checks.samples import samples_of
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
 from runtime.identification.identification import identify
@@ -36,6 +33,9 @@ from runtime.identification.parameter_sets import ORDER, SetName, best_set
 from runtime.identification.result import Identification
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
+from runtime.plausible.motion import low_speed_of_rest
+from runtime.plausible.plausibility import plausibility
+from runtime.plausible.samples import samples_of
 from runtime.progress import at
 from runtime.records.law import require_found
 from runtime.records.reading import read_records

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from runtime.blas import single_threaded
-from runtime.checks.plausibility import plausibility
 from runtime.errors import InputError
 from runtime.identification.coupling import coupling_fits
 from runtime.identification.cutoff_errors import errors_text, other_studies, unseen_errors
@@ -38,6 +37,7 @@ from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import physical_model
 from runtime.parallel import Workers, started
+from runtime.plausible.plausibility import plausibility
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
 from runtime.records.reading_by_blocks import records_or_streams

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from runtime.checks.known import torque_unit_doubt
-from runtime.checks.plausibility import Plausibility
 from runtime.errors import InputError
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
@@ -49,6 +47,8 @@ from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel, joint_labels
+from runtime.plausible.known import torque_unit_doubt
+from runtime.plausible.plausibility import Plausibility
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
 from runtime.records.stream import Stream

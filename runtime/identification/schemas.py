@@ -1,5 +1,6 @@
-"""Layouts of estimate.json and cestac.json as types, the JSON Schemas made from them and from the
-settings, and the estimate in a file that a robot file or a program is given.
+"""Layouts of estimate.json and cestac.json as types, the JSON Schemas of these and of study files, and the estimate in a file that a robot file or a program is given.
+
+SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist is null. Readers leave out keys that they do not know; keys may be added under the same version.
 """
 
 from __future__ import annotations
@@ -9,24 +10,21 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import core_schema
+
 from runtime.errors import InputError
 from runtime.estimators.estimate import SCHEMA as ESTIMATE
 from runtime.estimators.estimate import Estimate, JointFit, load_estimate
 from runtime.identification.parameter_sets import SetName, whole_set
 from runtime.identification.validation import RecordError, WeakDirections
-from runtime.json_documents import NanIfNull, Vector, Whole, from_text, json_schema, read_text
 from runtime.model.drives import Coupling
 from runtime.resolution.result import SCHEMA as CESTAC
 from runtime.resolution.result import LevelResult, Verdict
 from runtime.resolution.runs import Run
+from runtime.settings.documents import NanIfNull, Vector, Whole, from_text, read_text
 from runtime.settings.study import Study
-
-RESULT = (
-    "SI units, rad, joint side. Equation numbers are those of the chapter. A number that "
-    "does "
-    "not exist is null. Readers leave out keys they do not know; keys may be added under the "
-    "same version."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,36 +274,33 @@ def load_whole_estimate(path: Path | str) -> Estimate:
     )
 
 
-def schemas() -> dict[str, str]:
-    """The JSON Schemas of study files, estimate.json and cestac.json, by kind."""
-    optional = {f.name for f in fields(IdentificationDocument)} - {f.name for f in fields(Estimate)}
-    study = (
-        "Everything about an experiment that is not the robot. SI units and rad; numbers may be "
-        "arithmetic texts such as 2*pi/10000, and one "
-        "value stands for a list of one."
-    )
+class ResultSchema(GenerateJsonSchema):
+    """JSON Schema of results, in which null stands for a number that does not exist."""
+
+    def float_schema(self, schema: core_schema.FloatSchema) -> dict[str, Any]:
+        """A number or null."""
+        return {"type": ["number", "null"]}
+
+
+def json_schema(of: str) -> dict[str, Any]:
+    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
+    if of == "study":
+        return TypeAdapter(Study).json_schema()
+    kind, schema = {
+        "estimate": (IdentificationDocument, ESTIMATE),
+        "cestac": (CestacDocument, CESTAC),
+    }[of]
+    made = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=ResultSchema)
+    properties = {"schema": {"const": schema}, **made["properties"]}
+    optional: set[str] = set()
+    if of == "estimate":
+        properties |= {"relative_sigma": properties["sigma"], "rows": properties["rank"]}
+        optional = {f.name for f in fields(IdentificationDocument)} - {
+            f.name for f in fields(Estimate)
+        }
     return {
-        "study": json_schema(Study, "symgen study file", study),
-        "estimate": json_schema(
-            IdentificationDocument,
-            ESTIMATE,
-            (
-                "Parameters of a robot with their uncertainty: Estimate.to_json, and estimate.json "
-                "of "
-                f"`symgen identify`. {RESULT}"
-            ),
-            const=ESTIMATE,
-            computed=("relative_sigma", "rows"),
-            optional=optional,
-        ),
-        "cestac": json_schema(
-            CestacDocument,
-            CESTAC,
-            (
-                "Resolution study of encoders and torques: Cestac.to_json, and cestac.json of "
-                "`symgen "
-                f"cestac`. {RESULT}"
-            ),
-            const=CESTAC,
-        ),
+        **made,
+        "title": schema,
+        "properties": properties,
+        "required": sorted({*properties} - optional),
     }

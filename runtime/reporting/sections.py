@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from runtime.checks.plausibility import Plausibility
 from runtime.identification.friction import FrictionCurve, law_tables
 from runtime.identification.result import Identification
 from runtime.markup import number
+from runtime.plausible.plausibility import Plausibility
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
 from runtime.reporting.parameters import correlation_section, parameter_section

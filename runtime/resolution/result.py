@@ -38,19 +38,18 @@ from scipy.special import stdtrit
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR
-from runtime.json_documents import Result, Vector
+from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.resolution.runs import Level, Runs
 from runtime.rows.observation import Observation
+from runtime.settings.documents import Vector
 from runtime.table import Table, notebook
 
 Array = np.ndarray
 
 SCHEMA = "symgen-cestac/1"
-"""Kind and version of the JSON layout, published as runtime/schemas/cestac.schema.json (`symgen
-schema --of cestac`).
-"""
+"""Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
 Verdict = Literal["unbiased", "doubtful", "biased"]
 
 

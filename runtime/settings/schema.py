@@ -13,6 +13,8 @@ stands for its text.
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, fields
 from functools import cache
@@ -31,14 +33,24 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs
 
-from runtime.errors import SettingsError, settings_error, shown
+from runtime.errors import SettingsError
 from runtime.json_documents import plain
 from runtime.settings.arithmetic import number
 from runtime.settings.gone import gone
+from runtime.settings.problems import settings_error, shown
 
 T = TypeVar("T")
 Path = tuple[str | int, ...]
 CONFIG = ConfigDict(extra="forbid", defer_build=True)  # built when the first instance is made
+
+
+LIMITS = {
+    "gt": "exclusiveMinimum",
+    "ge": "minimum",
+    "lt": "exclusiveMaximum",
+    "le": "maximum",
+}
+"""Names of pydantic, which it leaves beside a type of its users, and of JSON Schema."""
 
 
 class Written:
@@ -162,6 +174,20 @@ class Settings(metaclass=SettingsType):
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, config=CONFIG)(cls)
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
+        """That of pydantic, with what the docstring says of each key."""
+        made: dict[str, Any] = _with_limits(handler.resolve_ref_schema(handler(schema)))
+        text, _, attributes = inspect.getdoc(cls).partition("\n\nAttributes\n----------\n")  # type: ignore[union-attr]
+        made["description"] = " ".join(text.split())
+        entries = re.findall(r"^(\w[\w, ]*) : (.*)\n((?: +.*\n?)*)", attributes, re.MULTILINE)
+        for keys, form, meaning in entries:
+            unit = form.partition(", ")[2]
+            said = " ".join(meaning.split()) + (f" [{unit}]" if unit else "")
+            for key in keys.split(", "):
+                made["properties"][key] = {**made["properties"][key], "description": said}
+        return made
+
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, value: Any) -> Any:
@@ -180,6 +206,13 @@ class Settings(metaclass=SettingsType):
                 path=(unknown[0],),
             )
         return value
+
+
+def _with_limits(schema: Any) -> Any:
+    """A JSON Schema whose limits have the names of JSON Schema."""
+    if isinstance(schema, dict):
+        return {LIMITS.get(key, key): _with_limits(value) for key, value in schema.items()}
+    return [_with_limits(item) for item in schema] if isinstance(schema, list) else schema
 
 
 _adapter = cache(TypeAdapter)  # what checks mappings against a class of settings

@@ -1,61 +1,44 @@
 """YAML 1.2 to plain values with the line of every key, within limits.
 
-Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases,
-tags, merge keys, repeated keys and second
-documents are refused, so that a file means what it shows and no text grows in memory. The text is
-read event by event and left at the first
-thing that is too deep or too much.
+Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that a file means what it shows and no text grows in memory.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from io import StringIO
 from typing import Any
 
-from ruamel.yaml import YAML
+from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
 from ruamel.yaml.error import MarkedYAMLError
-from ruamel.yaml.events import (
-    AliasEvent,
-    DocumentStartEvent,
-    Event,
-    MappingEndEvent,
-    MappingStartEvent,
-    ScalarEvent,
-    SequenceEndEvent,
-    SequenceStartEvent,
-)
 
 from runtime.errors import InputError, SettingsError, first_line
 from runtime.limits import LIMIT
 
 Path = tuple[str | int, ...]
 
-
-_INTEGER = re.compile(r"[-+]?[0-9]{1,40}\Z")
-_DECIMAL = re.compile(
-    r"[-+]?(\.[0-9]{1,400}|[0-9]{1,400}(\.[0-9]{0,400})?)([eE][-+]?[0-9]{1,3})?\Z"
+NUMBER = re.compile(
+    r"(?P<whole>[-+]?[0-9]{1,40})|[-+]?(\.[0-9]{1,400}|[0-9]{1,400}(\.[0-9]{0,400})?)([eE][-+]?[0-9]{1,3})?"
 )
-_CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
-_CONSTANTS |= {
-    word: value
-    for value, words in ((True, "true True TRUE"), (False, "false False FALSE"))
-    for word in words.split()
+CONSTANTS: dict[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
 }
 
 
 def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
-    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of
-    every key path; SettingsError with file and line.
-    """
+    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of every key path; SettingsError with file and line."""
     if len(text) > LIMIT.YAML_CHARACTERS:
         raise InputError(
             f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
         )
-    reader = _Reader(YAML(typ="safe", pure=True).parse(text), file)
+    lines: dict[Path, int] = {}
     try:
-        return reader.document(), reader.lines
+        _require_plain(text, file)
+        node = YAML(typ="safe", pure=True).compose(text)
+        return (None if node is None else _value(node, (), lines, file)), lines
     except InputError:
         raise
     except MarkedYAMLError as e:
@@ -80,90 +63,66 @@ def yaml_text(mapping: Mapping[str, Any]) -> str:
     return stream.getvalue()
 
 
-class _Reader:
-    """Builds plain values from the events of one document."""
+def _require_plain(text: str, file: str) -> None:
+    """Raise SettingsError at the first thing that is not plain, too deep or too much, before anything is built of the text."""
+    depth = 0
+    documents = 0
+    for count, event in enumerate(YAML(typ="safe", pure=True).parse(text)):
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        documents += kind == "DocumentStartEvent"
+        refused = ""
+        if kind == "AliasEvent" or getattr(event, "anchor", None) is not None:
+            refused = "anchors and aliases (& and *) are not read; write the value out"
+        elif getattr(event, "tag", None) not in (None, "!"):
+            refused = "tags (!) are not read; write a plain value"
+        elif documents > 1:
+            refused = "a second document starts here; such a file holds one"
+        elif depth > LIMIT.YAML_LEVELS + 2 or count > LIMIT.YAML_VALUES:
+            refused = f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than {LIMIT.YAML_VALUES} keys and values"
+        if refused:
+            raise SettingsError(refused, file=file, line=event.start_mark.line + 1)
 
-    def __init__(self, events: Iterator[Event], file: str) -> None:
-        self.events, self.file, self.count = events, file, 0
-        self.lines: dict[Path, int] = {}
 
-    def refuse(self, message: str, event: Event, path: Path = ()) -> SettingsError:
-        return SettingsError(message, path=path, file=self.file, line=event.start_mark.line + 1)
-
-    def next(self) -> Event:
-        event: Event = next(self.events)
-        if isinstance(event, AliasEvent) or getattr(event, "anchor", None) is not None:
-            raise self.refuse(
-                "anchors and aliases (& and *) are not read; write the value out", event
+def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
+    """The plain value of a node; its line, and those of all in it, are put among the `lines`."""
+    lines.setdefault(path, node.start_mark.line + 1)
+    if isinstance(node, ScalarNode):
+        return node.value if node.style is not None else _scalar(node.value)
+    if not isinstance(node, MappingNode):
+        return [_value(item, (*path, k), lines, file) for k, item in enumerate(node.value)]
+    table: dict[str, Any] = {}
+    for key, item in node.value:
+        line = key.start_mark.line + 1
+        if not isinstance(key, ScalarNode) or key.value == "<<":
+            raise SettingsError(
+                "a key that is no name; merge keys (<<) and lists as keys are not read",
+                path=path,
+                file=file,
+                line=line,
             )
-        if getattr(event, "tag", None) not in (None, "!"):
-            raise self.refuse("tags (!) are not read; write a plain value", event)
-        return event
-
-    def document(self) -> Any:
-        self.next()  # start of the stream
-        if not isinstance(self.next(), DocumentStartEvent):
-            return None
-        value = self.value(self.next(), ())
-        self.next()  # end of the document
-        if isinstance(more := self.next(), DocumentStartEvent):
-            raise self.refuse("a second document starts here; such a file holds one", more)
-        return value
-
-    def value(self, event: Event, path: Path) -> Any:
-        self.count += 1
-        if len(path) > LIMIT.YAML_LEVELS or self.count > LIMIT.YAML_VALUES:
-            raise self.refuse(
-                (
-                    f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than "
-                    f"{LIMIT.YAML_VALUES} values"
-                ),
-                event,
+        name = str(key.value)
+        place = (*path, name)
+        if name in table:
+            raise SettingsError(
+                f"key {name!r:.60} is given twice (first on line {lines[place]}); keep one",
+                path=path,
+                file=file,
+                line=line,
             )
-        self.lines.setdefault(path, event.start_mark.line + 1)
-        if isinstance(event, MappingStartEvent):
-            return self.mapping(path)
-        if isinstance(event, SequenceStartEvent):
-            items: list[Any] = []
-            while not isinstance(item := self.next(), SequenceEndEvent):
-                items.append(self.value(item, (*path, len(items))))
-            return items
-        return _scalar(event)
-
-    def mapping(self, path: Path) -> dict[str, Any]:
-        table: dict[str, Any] = {}
-        while not isinstance(event := self.next(), MappingEndEvent):
-            if not isinstance(event, ScalarEvent) or event.value == "<<":
-                raise self.refuse(
-                    "a key that is no name; merge keys (<<) and lists as keys are not read",
-                    event,
-                    path,
-                )
-            key = str(event.value)
-            if key in table:
-                raise self.refuse(
-                    (
-                        f"key {key!r:.60} is given twice (first on line "
-                        f"{self.lines[(*path, key)]}); "
-                        "keep one"
-                    ),
-                    event,
-                    path,
-                )
-            self.lines[(*path, key)] = event.start_mark.line + 1
-            table[key] = self.value(self.next(), (*path, key))
-        return table
+        lines[place] = line
+        table[name] = _value(item, place, lines, file)
+    return table
 
 
-def _scalar(event: Any) -> Any:
-    """null, bool, int and float of the core schema when plain, else text."""
-    text: str = event.value
-    if event.style is not None:
+def _scalar(text: str) -> Any:
+    """null, bool, int and float of the core schema; any other word is a text."""
+    if text in CONSTANTS:
+        return CONSTANTS[text]
+    number = NUMBER.fullmatch(text)
+    if number is None:
         return text
-    if text in _CONSTANTS:
-        return _CONSTANTS[text]
-    if _INTEGER.match(text):
+    if number["whole"]:
         return int(text)
-    if _DECIMAL.match(text) and (number := float(text)) - number == 0:
-        return number
-    return text
+    value = float(text)
+    return value if value - value == 0 else text

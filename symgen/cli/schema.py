@@ -34,6 +34,7 @@ def schema(
 
         typer.echo(schema_text(), nl=False)
     else:
-        from runtime import json_documents
+        from runtime.identification.schemas import json_schema
+        from runtime.json_documents import json_text
 
-        typer.echo(json_documents.schema_text(of), nl=False)
+        typer.echo(json_text(json_schema(of)), nl=False)

@@ -117,6 +117,8 @@ class Model:
         Its place on the page of a robot, from 1; 0 where it is not shown there.
     option : str
         What asks targets for it (`symgen generate --with`); empty where they always have it.
+    latex : str
+        The letter in LaTeX; where left out, `letter` in bold.
     """
 
     name: str
@@ -139,6 +141,7 @@ class Model:
     up_to_a_constant: bool = False
     page: int = 0
     option: str = ""
+    latex: str = ""
 
     @property
     def summary(self) -> str:

@@ -270,7 +270,7 @@ MODELS = {
         Model(
             "inverse_dynamics", "GAM", ("q", "qd", "qdd", "X"), ("joints",), TORQUE,
             "joint torques Gamma = A qdd + C qd + Q + friction", _inverse_dynamics, result="GAM",
-            page=7,
+            page=7, latex=r"\Gamma",
         ),
         Model(
             "inertia_matrix", "A", ("q", "X"), ("joints", "joints"), INERTIA,
@@ -291,6 +291,7 @@ MODELS = {
         Model(
             "forward_dynamics", "QDP", ("q", "qd", "tau", "X"), ("joints",), "rad/s**2 | m/s**2",
             "qdd = A(q)**-1 (tau - bias)", None, result="qdd", composed="quotient",
+            latex=r"\det \mathbf{A} \; \ddot{q}",
             denominator="det A",
             instead="A qdd = Gamma - H, with the equations of inertia_matrix and bias",
         ),
@@ -313,12 +314,12 @@ MODELS = {
         Model(
             "determinant", "det J", ("q",), (), "m**3 for six hinges",
             "determinant of the Jacobian, where it is square", None, of_frames=True,
-            composed="determinant", instead="form closed, or the equations of jacobian",
+            composed="determinant", instead="form closed, or the equations of jacobian", latex=r"\det \mathbf{J}",
         ),
         Model(
             "jacobian_rate", "JPQP", ("q", "qd"), ("twist",), "m/s**2, rad/s**2",
             "Jd qd: acceleration of the origin of frame `of` and its angular acceleration at "
-            "qdd = 0, in frame `frame`", _jacobian_rate, of_frames=True,
+            "qdd = 0, in frame `frame`", _jacobian_rate, of_frames=True, latex=r"\dot{\mathbf{J}} \dot{q}",
         ),
         Model(
             "velocity", "V", ("q", "qd"), ("twist",), TWIST_UNIT,
@@ -328,7 +329,7 @@ MODELS = {
         Model(
             "acceleration", "VP", ("q", "qd", "qdd"), ("twist",), "m/s**2, rad/s**2",
             "acceleration of the origin of frame `of`, then its angular acceleration, "
-            "in frame `frame`", _acceleration, of_frames=True,
+            "in frame `frame`", _acceleration, of_frames=True, latex=r"\dot{\mathbf{V}}",
         ),
         Model(
             "coriolis", "C", ("q", "qd", "X"), ("joints", "joints"), "N*m*s/rad | N*s/m",

@@ -70,7 +70,7 @@ class Names:
 
 
 FAMILY = "|".join(sorted(FAMILIES, key=len, reverse=True))
-MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_mxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za-z]+\d+)[a-z]*_*\Z")
+MEMBER = re.compile(rf"(?:({FAMILY})\d[\d_moxb]*|(QP|DG|DN|DF)(?:\d[\d_]*)?[A-Za-z]+\d+)[a-z]*_*\Z")
 """W12, C23, Z132, QPFSM6, DG1ZZ2, a part N16a of N16, and C1_ where C1 is the user's."""
 
 

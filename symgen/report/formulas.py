@@ -30,9 +30,9 @@ def printed(regrouping: Regrouping, form: str, only: str | None = None) -> str:
     base = selected(regrouping, only)
     absorbing = [b for b in base if only or b.name != b.own]
     if form == "latex":
-        from symgen.symbols import latex
+        from symgen.symbols import documents
 
-        return latex.formulas({b.name: b.formula for b in absorbing})
+        return documents.formulas({b.name: b.formula for b in absorbing})
     width = max(len(b.name) for b in base)
     lines = [
         line

@@ -32,9 +32,9 @@ from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
 from symgen.report.effects import Effect, effects
 from symgen.report.figure import figure, passive_text
-from symgen.symbols import mathml, trees
-from symgen.symbols.markup import shown_models
-from symgen.symbols.mathml import MathML
+from symgen.symbols import expressions
+from symgen.symbols.documents import shown_models
+from symgen.symbols.printers import MathML, math, math_terms
 from symgen.version import VERSION
 
 SCRIPTS = ("kinematics.js", "drawing.js", "page.js")
@@ -73,7 +73,7 @@ def robot_page(regrouping: Regrouping) -> str:
         constants=[(_symbol(name), f"{value:.10g}") for name, value in robot.constants.items()],
         relations=[(_relation(closure, j), text) for j, text in sources.items()],
         elements=[_element_row(e) for e in robot.elements],
-        gravity=[mathml.math(trees.expression(e)) for e in robot.gravity],
+        gravity=[math(expressions.expression(e)) for e in robot.gravity],
         formulas=_formulas(spec),
         absorbed=[(_parameter(a.name), list(map(_parameter, a.base)), a) for a in absorbed],
         models=models,
@@ -86,11 +86,11 @@ def robot_page(regrouping: Regrouping) -> str:
 
 
 def _symbol(name: str) -> MathML:
-    return mathml.math(trees.symbol(name))
+    return math(expressions.symbol(name))
 
 
 def _parameter(name: str) -> MathML:
-    return mathml.math(trees.parameter(name))
+    return math(expressions.parameter(name))
 
 
 def embedded(value: Any) -> Markup:
@@ -121,7 +121,7 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
 
     def cell(value: Any) -> str:
         is_formula = isinstance(value, Expression)
-        return mathml.math(trees.expression(value)) if is_formula else str(value)
+        return math(expressions.expression(value)) if is_formula else str(value)
 
     rows = [
         {
@@ -136,10 +136,10 @@ def _frame_rows(robot: Robot) -> dict[str, Any]:
 
 def _relation(closure: Closure, j: int) -> MathML:
     """What holds for a passive joint: its formula, or its name where it is solved for."""
-    shown = trees.symbol(f"q{j}")
+    shown = expressions.symbol(f"q{j}")
     if j not in closure.tied:
-        shown = trees.equation(shown, trees.expression(closure.formula(j)))
-    return mathml.math(shown)
+        shown = expressions.equation(shown, expressions.expression(closure.formula(j)))
+    return math(shown)
 
 
 def _element_row(e: Element) -> dict[str, Any]:
@@ -154,7 +154,7 @@ def _element_row(e: Element) -> dict[str, Any]:
         return sum(terms, Expression())
 
     acts = [
-        (_parameter(f"{e.family}{j}"), mathml.math(trees.expression(coordinate(j)))) for j in e.keys
+        (_parameter(f"{e.family}{j}"), math(expressions.expression(coordinate(j)))) for j in e.keys
     ]
     return {"family": e.family, "kind": e.kind, "when": e.when, "acts": acts}
 
@@ -165,7 +165,7 @@ def _formulas(spec: ModuleSpec) -> list[dict[str, Any]]:
         {
             "name": b.name,
             "symbol": _parameter(b.name),
-            "terms": mathml.terms(trees.formula(b.formula)) if b.name != b.own else [],
+            "terms": math_terms(expressions.formula(b.formula)) if b.name != b.own else [],
             "text": str(b.formula),
             "unit": printed(unit(robot, b.own)),
             "joints": [

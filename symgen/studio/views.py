@@ -82,7 +82,8 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     from symgen.emit.spec import module_spec
     from symgen.report.effects import effects
     from symgen.report.page import printed
-    from symgen.symbols import mathml, trees
+    from symgen.symbols import expressions
+    from symgen.symbols.printers import math, math_terms
 
     regrouping = symgen.regrouping(symgen.load_robot(path))
     reasons = {a.name: f"{a.columns}: {a.rule}" for a in symgen.absorptions(regrouping)}
@@ -93,15 +94,15 @@ def formulas(path: str, before: str) -> dict[str, Any]:
         difference = str(symgen.base_difference(earlier, regrouping))
     base = [
         {
-            "symbol": mathml.math(trees.parameter(b.name)),
-            "terms": mathml.terms(trees.formula(b.formula)) if b.name != b.own else [],
+            "symbol": math(expressions.parameter(b.name)),
+            "terms": math_terms(expressions.formula(b.formula)) if b.name != b.own else [],
             "unit": printed(of[b.own].unit),
         }
         for b in regrouping.base
     ]
     parameters = [
         asdict(e)
-        | {"symbol": mathml.math(trees.parameter(e.name)), "unit": printed(e.unit)}
+        | {"symbol": math(expressions.parameter(e.name)), "unit": printed(e.unit)}
         | {"why": e.why or reasons.get(e.name, "identified in its own name")}
         for e in of.values()
     ]
@@ -212,7 +213,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """Checks of record, study and robot with their remedies, and the predicted deviation of every
     parameter, %.
     """
-    from runtime.checks.motion import unexcited_shares
+    from runtime.plausible.motion import unexcited_shares
 
     loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))

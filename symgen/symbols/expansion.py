@@ -25,10 +25,10 @@ from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.description.expression import Expression, call
 from symgen.errors import SymgenError
 from symgen.regroup.numbers import numbered, numbers_of
-from symgen.symbols import trees
+from symgen.symbols import expressions
+from symgen.symbols.expressions import Tree
 from symgen.symbols.factors import Factors
 from symgen.symbols.identities import Angle, Coefficient, Identities, forward, number
-from symgen.symbols.trees import Tree
 
 Polynomial = Any  # of the ring of the parameters
 CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of factors in a product
@@ -89,7 +89,7 @@ class Expansion:
         )
         used = {str(node.value) for node in nodes if node.op == "sym"}
         own = [name for name in parameters if name in used]
-        self.ring = PolyRing([trees.symbol(name) for name in own], self.K.to_domain(), lex)
+        self.ring = PolyRing([expressions.symbol(name) for name in own], self.K.to_domain(), lex)
         self.parameters = dict(zip(own, self.ring.gens, strict=True))
         self._value: dict[int, Polynomial] = {}
         for node in nodes:
@@ -109,7 +109,7 @@ class Expansion:
                 while {C, S} & taken:
                     C, S = f"{C}_", f"{S}_"
                 turn, rest, _ = forward(turn, rest)
-                names.setdefault((turn, rest), (trees.symbol(C), trees.symbol(S)))
+                names.setdefault((turn, rest), (expressions.symbol(C), expressions.symbol(S)))
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
@@ -119,11 +119,14 @@ class Expansion:
             case "sym":
                 stem, own = name.rstrip("0123456789_"), name in self.algebra.robot.constants
                 is_rate = stem in ("QP", "QDP", "G") and not own
-                yield trees.symbol(name), SLIDE if stem == "q" else RATE if is_rate else CONSTANT
+                yield (
+                    expressions.symbol(name),
+                    SLIDE if stem == "q" else RATE if is_rate else CONSTANT,
+                )
             case "cos" | "sin" | "sqrt":
                 for m in self._constant(node).terms:
                     for a, n in m:
-                        yield trees.power(a, 1 if n > 0 else -1), CONSTANT
+                        yield expressions.power(a, 1 if n > 0 else -1), CONSTANT
             case "inv":
                 yield (node.op, node.index), CONSTANT if node.fixed else RATE
             case op if op in ("sign", "pos", *OPAQUE):
@@ -143,7 +146,9 @@ class Expansion:
         match node.op:
             case "sym":
                 name = str(node.value)
-                return self.parameters.get(name) or self._lifted(self.generator[trees.symbol(name)])
+                return self.parameters.get(name) or self._lifted(
+                    self.generator[expressions.symbol(name)]
+                )
             case "const":
                 return self._lifted(self.K.one.mul_ground(number(node.value)))
             case "add":
@@ -159,7 +164,7 @@ class Expansion:
                     sum(
                         prod(
                             (
-                                self.generator[trees.power(a, 1 if n > 0 else -1)] ** abs(n)
+                                self.generator[expressions.power(a, 1 if n > 0 else -1)] ** abs(n)
                                 for a, n in m
                             ),
                             start=self.K.one.mul_ground(number(c)),
@@ -173,7 +178,7 @@ class Expansion:
             self.shown[k] = sympy.Pow(inside, -1, evaluate=False)
         elif node.op in OPAQUE:
             operands = [inside, *map(self.written, x[1:])]
-            self.shown[k] = trees.opaque(node.op, operands)
+            self.shown[k] = expressions.opaque(node.op, operands)
         elif node.op == "sign":
             self.shown[k] = sympy.sign(inside, evaluate=False)
         else:  # max(x, 0)
@@ -239,8 +244,10 @@ class Expansion:
                 sign = 1 if c.LC > 0 else -1
                 names = [x**n for x, n in zip(self.ring.symbols, monomial, strict=True)]
                 own = signs.setdefault(sign * c, sign)
-                shared.setdefault(sign * c, []).append(trees.product(Fraction(sign * own), names))
-        return trees.total(
+                shared.setdefault(sign * c, []).append(
+                    expressions.product(Fraction(sign * own), names)
+                )
+        return expressions.total(
             x for c, members in shared.items() for x in self.factors.terms(signs[c] * c, members)
         )
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import sympy
 
-from symgen.symbols import trees
+from symgen.symbols import expressions
+from symgen.symbols.expressions import Tree
 from symgen.symbols.identities import Coefficient
 from symgen.symbols.identities import number as whole
-from symgen.symbols.trees import Tree
 
 Powers = tuple[int, ...]  # of the generators of a ring
 
@@ -46,17 +46,20 @@ class Factors:
     def terms(self, c: Coefficient, members: Sequence[Tree]) -> Sequence[Tree]:
         """c times a sum of parameters, or of 1."""
         number, factors = self._shortest(c)
-        factors = [*factors, *sympy.Mul.make_args(trees.total(members))]
+        factors = [*factors, *sympy.Mul.make_args(expressions.total(members))]
         factors = [x for x in factors if x != 1]
         if abs(number) == 1 and len(factors) == 1:
-            return [x if number > 0 else trees.negative(x) for x in sympy.Add.make_args(factors[0])]
+            return [
+                x if number > 0 else expressions.negative(x)
+                for x in sympy.Add.make_args(factors[0])
+            ]
         return [self._product(number, factors)]
 
     def _product(self, c: Fraction, factors: Sequence[Tree]) -> Tree:
         """c times the factors."""
         if self.decimals and c.denominator > 1:
-            factors, c = [trees.product(abs(c), ()), *factors], Fraction(1 if c > 0 else -1)
-        return trees.product(c, factors)
+            factors, c = [expressions.product(abs(c), ()), *factors], Fraction(1 if c > 0 else -1)
+        return expressions.product(c, factors)
 
     def _shortest(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
         """(number, factors) of a coefficient: all in one bracket, or a bracket for each of its
@@ -81,9 +84,9 @@ class Factors:
 
     def _positive(self, number: Fraction, terms: Sequence[Tree]) -> tuple[Fraction, list[Tree]]:
         """(number, [sum of the terms]), the first one positive."""
-        if trees.is_negative(terms[0]):
-            number, terms = -number, [*map(trees.negative, terms)]
-        return number, [trees.total(terms)]
+        if expressions.is_negative(terms[0]):
+            number, terms = -number, [*map(expressions.negative, terms)]
+        return number, [expressions.total(terms)]
 
     def _bracketed(self, c: Coefficient) -> tuple[Fraction, list[Tree]]:
         """(number, factors) with the sum of all terms as the last factor, its first one

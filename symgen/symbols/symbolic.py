@@ -14,10 +14,10 @@ from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.errors import SymgenError
 from symgen.symbols.derivation import Source, source_of
-from symgen.symbols.printing import Formulas, printed
+from symgen.symbols.documents import Formulas, printed
+from symgen.symbols.expressions import symbol
 from symgen.symbols.symbolic_model import LARGEST, SymbolicModel
 from symgen.symbols.sympy_objects import of_listing, of_model
-from symgen.symbols.trees import symbol
 
 
 def symbolic(
@@ -100,13 +100,18 @@ class SymbolicRobot:
                 raise SymgenError(
                     f"frame {j} does not exist; {robot.name} has frames 0 to {robot.frames[-1].j}"
                 )
-        return SymbolicModel(
-            SYMBOLIC[name],
-            self.source,
-            self.source.request(of, frame),
-            None if rows is None else tuple(rows),
-            self.limit,
-        )
+        asked = (name, of, frame, None if rows is None else tuple(rows))
+        if asked not in self._models:
+            request = self.source.request(of, frame)
+            self._models[asked] = SymbolicModel(
+                SYMBOLIC[name], self.source, request, asked[-1], self.limit
+            )
+        return self._models[asked]
+
+    @cached_property
+    def _models(self) -> dict[tuple[Any, ...], SymbolicModel]:
+        """Models that were asked for: a second form of one is no second computation."""
+        return {}
 
     def equations(
         self, name: str, *, of: int | None = None, frame: int = 0

@@ -17,11 +17,11 @@ from symgen.derive.model import Model, Place, Request, labels, rewriting
 from symgen.derive.models import MODELS
 from symgen.description.expression import Expression
 from symgen.errors import SymgenError
-from symgen.symbols import trees
+from symgen.symbols import expressions
 from symgen.symbols.derivation import Source
 from symgen.symbols.expansion import Expansion, Polynomial, TooManyTermsError, length
+from symgen.symbols.expressions import Tree
 from symgen.symbols.listing import Listing
-from symgen.symbols.trees import Tree
 
 TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 LARGEST_DIRECT = 3  # joints of a direct model in closed form
@@ -42,7 +42,7 @@ class ClosedModel:
     def size(self) -> int:
         """Terms as they are written."""
         below = () if self.denominator is None else (self.denominator,)
-        return sum(map(trees.size, (*self.entries.values(), *below)))
+        return sum(map(expressions.size, (*self.entries.values(), *below)))
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class SymbolicModel:
 
     def _formulas(self) -> ClosedModel:
         formulas = self.source.formulas.values()
-        return ClosedModel({(k,): trees.formula(f) for k, f in enumerate(formulas)}, None, {})
+        return ClosedModel({(k,): expressions.formula(f) for k, f in enumerate(formulas)}, None, {})
 
     def _entries(self, *models: Model, request: Request | None = None) -> tuple[Any, ...]:
         """A graph whose angles are those of all pairs of frames, and the entries of each model."""
@@ -172,7 +172,7 @@ class SymbolicModel:
         denominator = None if below is None else expansion.written(below)
         used = {
             str(x)
-            for tree in (*entries.values(), denominator or trees.MINUS)
+            for tree in (*entries.values(), denominator or expressions.MINUS)
             for x in tree.free_symbols
         }
         angles = {

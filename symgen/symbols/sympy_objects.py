@@ -15,8 +15,8 @@ from typing import Any
 import sympy
 
 from symgen.derive.graph import OPAQUE, Node
+from symgen.symbols.expressions import angle, evaluated, opaque, rational, symbol
 from symgen.symbols.symbolic_model import SymbolicModel
-from symgen.symbols.trees import angle, evaluated, opaque, rational, symbol
 
 OF_SYMPY = re.compile(r"\b(?=[A-Za-z]\w*\(|pi\b)")  # before a name that is none of the robot
 RATIONAL = re.compile(r"(?<![\w*).])(\d+)/(\d+)\b")

@@ -20,12 +20,12 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.checks.alternatives import unchanged
-from runtime.checks.samples import samples_of
-from runtime.checks.trials import Problem, problem_of
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
+from runtime.plausible.alternatives import unchanged
+from runtime.plausible.samples import samples_of
+from runtime.plausible.trials import Problem, problem_of
 from runtime.settings.study import study_from_mapping
 from symgen.description.yaml import parse_robot
 from symgen.errors import SymgenError

@@ -20,7 +20,7 @@ from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
 from runtime.estimators.estimate import Estimate, load_estimate
-from runtime.json_documents import schema_text
+from runtime.identification.schemas import json_schema
 from runtime.latex import escaped, name_cell, number_cell, unit_cell
 from runtime.loop.methods import estimate_of
 from runtime.reporting.arrays import (
@@ -86,7 +86,7 @@ def hostile(fit: Estimate) -> Estimate:
 def test_schemas_hold_for_what_is_written(found, study):
     lost = estimate_of(observation(motion=one_joint_at_rest, noise=(0.1, 0.1)), WLS, model=planar)
     for kind, results in (("estimate", (found, lost, hostile(found))), ("cestac", (study,))):
-        schema = json.loads(schema_text(kind))
+        schema = json_schema(kind)
         jsonschema.Draft202012Validator.check_schema(schema)
         for result in results:
             data = json.loads(result.to_json())

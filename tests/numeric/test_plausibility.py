@@ -15,13 +15,13 @@ from campaign import campaign, sampled, some
 import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
-from runtime.checks.fits import Barrier, Grams, least_squares, physical_fit
-from runtime.checks.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
-from runtime.checks.samples import Samples, excerpts, samples_of
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of
 from runtime.model.inertia import physical_model
+from runtime.plausible.fits import Barrier, Grams, least_squares, physical_fit
+from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
+from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.records.reading_by_blocks import records_or_streams
 from runtime.records.stream import RecordStream
 from runtime.settings.study import Rows, Study, study_from_mapping

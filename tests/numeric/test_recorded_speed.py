@@ -12,7 +12,7 @@ import pytest
 from planar_data import TRUE, motion
 
 from runtime import identify
-from runtime.checks.plausibility import plausibility
+from runtime.plausible.plausibility import plausibility
 from runtime.records.record import Record
 from runtime.records.stream import RecordStream
 from runtime.rows.observe import observe

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 import runtime
 import symgen
-from runtime.checks.alternatives import alternatives
 from runtime.checks.check import Check
 from runtime.model.drives import Drives
+from runtime.plausible.alternatives import alternatives
 from runtime.records.likely_columns import likely_columns
 from runtime.settings.units import torque_unit
 from symgen.cli.main import app

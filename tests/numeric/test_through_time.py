@@ -11,7 +11,7 @@ import pytest
 
 import runtime
 import symgen
-from runtime.checks.plausibility import Plausibility
+from runtime.plausible.plausibility import Plausibility
 from symgen.description.yaml import parse_robot
 
 ARM = b"""\

@@ -1,4 +1,4 @@
-"""Formulas in every language: sympy reads the text as what `symbols.trees` makes of it; Python, LaTeX and
+"""Formulas in every language: sympy reads the text as what `symbols.expressions` makes of it; Python, LaTeX and
 MathML say the same terms.
 """
 
@@ -17,8 +17,8 @@ from symgen.description.grammar import parse
 from symgen.emit.printers import ARRAYS, NUMPY
 from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import regroup
-from symgen.symbols import mathml, trees
-from symgen.symbols.latex import latex
+from symgen.symbols import expressions
+from symgen.symbols.printers import latex, math_terms
 
 ROBOTS = [
     load_robot("tx40"),
@@ -34,7 +34,9 @@ def test_export_equals_text(robot) -> None:
         read = sympy.sympify(
             str(b.formula), locals=names, rational=True
         )  # our own text, not a user's
-        assert sympy.expand(read - trees.evaluated(trees.formula(b.formula), {})) == 0, b.name
+        assert (
+            sympy.expand(read - expressions.evaluated(expressions.formula(b.formula), {})) == 0
+        ), b.name
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
@@ -43,7 +45,7 @@ def test_sympy_text_is_read_back(robot) -> None:
     known = {*robot.parameters, *robot.constants}
     for b in regroup(robot).base:
         assert with_known_cosines(
-            parse(str(trees.evaluated(trees.formula(b.formula), {})), known)
+            parse(str(expressions.evaluated(expressions.formula(b.formula), {})), known)
         ) == with_known_cosines(parse(str(b.formula), known)), b.name
 
 
@@ -86,12 +88,12 @@ def test_every_printer_writes_every_piece() -> None:
     assert f"2*{cos}**2/3" in str(c)
     text = f.text(ARRAYS.expression)
     assert "xp.cos(zero + " in text and "xp.pi" in text
-    typeset = latex(trees.formula(f))
+    typeset = latex(expressions.formula(f))
     assert (
         r"\cos^{2}{\left(" in typeset
         and r"\sqrt{a}" in typeset
         and r"\frac{2" in typeset
         and typeset.startswith("ZZ_{1} + YY_{2} - XX_{2} + ")
     )
-    terms = mathml.terms(trees.formula(f))
+    terms = math_terms(expressions.formula(f))
     assert len(terms) == 5 and all(ElementTree.fromstring(term).tag == "math" for term in terms)

@@ -28,7 +28,8 @@ from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import regroup
 from symgen.report.effects import effects
 from symgen.report.page import embedded, robot_page
-from symgen.symbols import mathml, trees
+from symgen.symbols import expressions
+from symgen.symbols.printers import math, math_terms
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = sampled(("tx40", "haptic", "scara", "four_bar"), 0, always=("haptic", "scara", "four_bar"))
@@ -111,7 +112,7 @@ def test_formula_reads_as_the_text():
     b = regroup(load_robot("tx40")).base[0]
     text = "".join(
         "".join(ElementTree.fromstring(m).itertext())
-        for m in mathml.terms(trees.formula(b.formula))
+        for m in math_terms(expressions.formula(b.formula))
     )
     assert text.replace("\u2062", "") == "ZZ1+Ia1+YY2+YY3+D32(M3+M4+M5+M6)"
 
@@ -123,7 +124,7 @@ def test_formula_reads_as_the_text():
     ("sqrt(L1)", "<msqrt><msub><mi>L</mi><mn>1</mn></msub></msqrt>"),
 ])  # fmt: skip
 def test_expressions(text, expected):
-    assert mathml.math(trees.expression(parse(text))) == f"<math>{expected}</math>"
+    assert math(expressions.expression(parse(text))) == f"<math>{expected}</math>"
 
 
 def test_names_cannot_bring_in_markup():
@@ -132,8 +133,8 @@ def test_names_cannot_bring_in_markup():
         {((HOSTILE, 1), (Call("sin", Expression.symbol(HOSTILE)), 2)): parse("3").constant}
     )
     for made in (
-        mathml.math(trees.expression(bad)),
-        *mathml.terms(trees.formula(Formula({HOSTILE: parse("1"), HOSTILE + "2": bad}))),
+        math(expressions.expression(bad)),
+        *math_terms(expressions.formula(Formula({HOSTILE: parse("1"), HOSTILE + "2": bad}))),
     ):
         root = ElementTree.fromstring(made)
         assert {node.tag for node in root.iter()} <= {

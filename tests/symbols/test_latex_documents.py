@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 import symgen
-from symgen.symbols.latex import escaped
+from symgen.symbols.documents import escaped
 
 TITLES = (
     "机械臂 with ロボット, 로봇",

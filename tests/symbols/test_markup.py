@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import symgen
 from symgen.report.page import robot_page
-from symgen.symbols.markup import shown_models
+from symgen.symbols.documents import shown_models
 from symgen.symbols.symbolic import symbolic
 
 

@@ -11,7 +11,8 @@ import symgen
 from symgen.description.grammar import parse
 from symgen.report.formulas import printed
 from symgen.report.page import robot_page
-from symgen.symbols import latex, mathml, trees
+from symgen.symbols import expressions
+from symgen.symbols.printers import latex, math
 
 NUM = b"""
 symgen: 1
@@ -54,8 +55,8 @@ def test_models_hold_decimals(base, form: str, format: str) -> None:
 def test_numbers_alone_and_in_angles() -> None:
     assert str(parse("0.25")) == "0.25" and str(parse("0.25*pi")) == "pi/4"
     assert str(parse("1/3")) == "1/3" and str(parse("1.0000000000000004")) == "1.0000000000000004"
-    assert latex.latex(trees.expression(parse("D + 0.5"))) == "D + 0.5"
-    assert "0.5" in mathml.math(trees.expression(parse("0.5"))) and str(parse("-D/2")) == "-D/2"
+    assert latex(expressions.expression(parse("D + 0.5"))) == "D + 0.5"
+    assert "0.5" in math(expressions.expression(parse("0.5"))) and str(parse("-D/2")) == "-D/2"
 
 
 def test_energies_of_symbols_keep_their_half() -> None:

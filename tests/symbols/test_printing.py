@@ -18,8 +18,11 @@ from campaign import campaign
 import runtime
 import symgen
 from oracles.exact_zero import are_zero
-from symgen.symbols.breaking import lines
+from symgen.derive.names import families_of
+from symgen.symbols.documents import broken_lines as lines
+from symgen.symbols.printers import latex_symbol, letter
 from symgen.symbols.symbolic import symbolic
+from symgen.symbols.symbolic_model import SymbolicModel
 
 NAMES = """
 documentclass usepackage setlength oddsidemargin textwidth topmargin textheight parindent allowdisplaybreaks begin end section subsection par medskip hline
@@ -307,3 +310,20 @@ def test_help_and_formulas_as_text_need_no_sympy() -> None:
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == "[0, 0] False"
+
+
+def test_a_second_form_is_no_second_computation(monkeypatch) -> None:
+    made = []
+    closed = SymbolicModel._closed
+    monkeypatch.setattr(SymbolicModel, "_closed", lambda self: made.append(self) or closed(self))
+    models = symbolic("planar_2r")
+    for format in ("text", "latex", "latex-fragment", "sympy", "json"):
+        models.show("inertia_matrix", format=format)
+    models.inertia_matrix()
+    assert len(made) == 1
+
+
+def test_letters_of_angles_with_ratios() -> None:
+    assert letter("C2o5x2") == ("C", "2/5·2") and letter("th5m2b") == ("theta'", "5-2")
+    assert latex_symbol("S2o5x2") == r"S_{2/5 \cdot 2}"
+    assert {"th", "C"} <= {*families_of(["th2o5x2", "C2o5x2"])}

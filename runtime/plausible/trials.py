@@ -16,8 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from runtime.checks.alternatives import Alternative, alternatives, unchanged
-from runtime.checks.fits import (
+from runtime.estimators.physical import frame_origins
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, drives_of
+from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.plausible.alternatives import Alternative, alternatives, unchanged
+from runtime.plausible.fits import (
     Barrier,
     Fit,
     Grams,
@@ -26,11 +30,7 @@ from runtime.checks.fits import (
     physical_fit,
     quick_fit,
 )
-from runtime.checks.samples import Samples, moving
-from runtime.estimators.physical import frame_origins
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, drives_of
-from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.plausible.samples import Samples, moving
 
 Array = np.ndarray
 

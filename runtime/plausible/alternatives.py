@@ -9,7 +9,7 @@ What is wrong since an instant, or grows with time, is the share w(t) of the cha
 P(t) = I + w(t) (P - I), and so on.
 
 A robot of n joints has some 10 n^2 of them. Each is tried at the cost of the regressor
-(`runtime.checks.trials`).
+(`runtime.plausible.trials`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from runtime.checks.samples import Samples
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, drives_of, joint_labels, joint_units
+from runtime.plausible.samples import Samples
 from runtime.settings.units import torque_unit
 
 Array = np.ndarray

@@ -1,4 +1,4 @@
-"""The direction of gravity, fitted beside the model by the step of `runtime.checks.continuous`.
+"""The direction of gravity, fitted beside the model by the step of `runtime.plausible.continuous`.
 
 The direction of gravity, |g| fixed, is two such numbers, and tells the sign and the axis of the
 base. W is linear in gravity, W(g) = W_0 + sum_a g_a W_a. From the best of the given direction and
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.checks.alternatives import unchanged
-from runtime.checks.fits import Fit, Grams, solved
-from runtime.checks.trials import Problem
 from runtime.limits import LIMIT
+from runtime.plausible.alternatives import unchanged
+from runtime.plausible.fits import Fit, Grams, solved
+from runtime.plausible.trials import Problem
 
 Array = np.ndarray
 

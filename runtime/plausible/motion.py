@@ -17,13 +17,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State, named
-from runtime.checks.samples import Samples
 from runtime.errors import InputError
 from runtime.excitation.criteria import Weights, kept_correlation
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of
+from runtime.plausible.case import Case
+from runtime.plausible.samples import Samples
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
 from runtime.rows.selection import per_joint

@@ -2,7 +2,7 @@
 for each question.
 
     CHECKS       of the record and the robot file, then of the fit: a family of slips a file
-    EXPLAINED    of the alternatives (`runtime.checks.alternatives`), which are tried where
+    EXPLAINED    of the alternatives (`runtime.plausible.alternatives`), which are tried where
                  `variants`
                  is given, or where something else is doubtful
 
@@ -17,14 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from runtime.checks.case import Case
 from runtime.checks.check import WORST, Check, worst_of
-from runtime.checks.continuous import searched
-from runtime.checks.delay import Delay
-from runtime.checks.gravity import Gravity
-from runtime.checks.known import KnownValues
-from runtime.checks.motion import motion_excites, recorded_speeds, rest
-from runtime.checks.physics import (
+from runtime.errors import InputError
+from runtime.json_documents import Result
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, require_no_channels
+from runtime.plausible.case import Case
+from runtime.plausible.continuous import searched
+from runtime.plausible.delay import Delay
+from runtime.plausible.gravity import Gravity
+from runtime.plausible.known import KnownValues
+from runtime.plausible.motion import motion_excites, recorded_speeds, rest
+from runtime.plausible.physics import (
     better,
     delayed,
     direction,
@@ -36,8 +40,8 @@ from runtime.checks.physics import (
     size,
     values,
 )
-from runtime.checks.samples import excerpts, samples_of
-from runtime.checks.sizes import (
+from runtime.plausible.samples import excerpts, samples_of
+from runtime.plausible.sizes import (
     accelerations,
     inertias,
     lengths,
@@ -46,12 +50,8 @@ from runtime.checks.sizes import (
     times,
     torques,
 )
-from runtime.checks.through_time import change, cut_torques, jumps
-from runtime.checks.trials import Problem, Trial, decisive, tried
-from runtime.errors import InputError
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, require_no_channels
+from runtime.plausible.through_time import change, cut_torques, jumps
+from runtime.plausible.trials import Problem, Trial, decisive, tried
 from runtime.progress import at
 from runtime.records.stream import Stream
 from runtime.rows.prepared import Source, prepared, record_of

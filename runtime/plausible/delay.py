@@ -30,13 +30,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 from scipy.optimize import minimize_scalar
 
-from runtime.checks.fits import Grams, solved
-from runtime.checks.samples import lowpassed, usable
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, joint_labels
+from runtime.plausible.fits import Grams, solved
+from runtime.plausible.samples import lowpassed, usable
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study

@@ -8,16 +8,16 @@ from functools import cached_property
 
 import numpy as np
 
-from runtime.checks.delay import Delay, LatePositions, delays
-from runtime.checks.fits import Grams
-from runtime.checks.gravity import Gravity, gravity_direction
-from runtime.checks.known import KnownValues, known_values
-from runtime.checks.samples import Samples
-from runtime.checks.trials import Problem, problem_of
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.plausible.delay import Delay, LatePositions, delays
+from runtime.plausible.fits import Grams
+from runtime.plausible.gravity import Gravity, gravity_direction
+from runtime.plausible.known import KnownValues, known_values
+from runtime.plausible.samples import Samples
+from runtime.plausible.trials import Problem, problem_of
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe

@@ -1,4 +1,4 @@
-"""The numbers that `runtime.checks.continuous` fits beside the model: a factor of the torque or the
+"""The numbers that `runtime.plausible.continuous` fits beside the model: a factor of the torque or the
 position of a joint, its zero, a length, an angle, a constant torque, a spring, friction.
 
 A spring or counterbalance of a joint is a q + b sin q + c cos q, of a slide a q + b with a > 0,
@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from runtime.checks.alternatives import (
+from runtime.limits import LIMIT
+from runtime.model.generated import joint_labels, joint_units
+from runtime.plausible.alternatives import (
     Alternative,
     Maker,
     coupled,
@@ -25,10 +27,8 @@ from runtime.checks.alternatives import (
     unchanged,
     unmodelled_torques,
 )
-from runtime.checks.gravity import gauss_newton_step
-from runtime.checks.trials import Problem
-from runtime.limits import LIMIT
-from runtime.model.generated import joint_labels, joint_units
+from runtime.plausible.gravity import gauss_newton_step
+from runtime.plausible.trials import Problem
 
 Array = np.ndarray
 

@@ -1,4 +1,4 @@
-"""One number that the study takes as known (`runtime.checks.quantities`), fitted beside the model.
+"""One number that the study takes as known (`runtime.plausible.quantities`), fitted beside the model.
 
 Around the fit chi of a physical robot, with A the weighted normal matrix, B the curvature of
 barrier and values, J = d(W chi)/d xi the effect of
@@ -24,12 +24,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from runtime.checks.alternatives import unchanged
-from runtime.checks.fits import Grams, quick_fit, solved
-from runtime.checks.quantities import Quantity, explained_rows, quantities
-from runtime.checks.trials import Problem, Trial
 from runtime.errors import instant
 from runtime.limits import LIMIT
+from runtime.plausible.alternatives import unchanged
+from runtime.plausible.fits import Grams, quick_fit, solved
+from runtime.plausible.quantities import Quantity, explained_rows, quantities
+from runtime.plausible.trials import Problem, Trial
 
 Array = np.ndarray
 

@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State
-from runtime.checks.trials import reach
 from runtime.estimators.physical import frame_origins
 from runtime.limits import LIMIT
 from runtime.model.inertia import INERTIAL, PhysicalModel
+from runtime.plausible.case import Case
+from runtime.plausible.trials import reach
 from runtime.records.record import Record
 from runtime.records.stream import Stream
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question, State
-from runtime.checks.delay import Delay, LatePositions
-from runtime.checks.trials import Trial, reach
 from runtime.limits import LIMIT
 from runtime.model.generated import elements_of
+from runtime.plausible.case import Case
+from runtime.plausible.delay import Delay, LatePositions
+from runtime.plausible.trials import Trial, reach
 
 Array = np.ndarray
 

@@ -21,13 +21,13 @@ from itertools import combinations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from runtime.checks.case import Case
 from runtime.checks.check import Answer, Question
-from runtime.checks.fits import Grams, least_squares
-from runtime.checks.samples import moving as in_motion
 from runtime.errors import instant
 from runtime.limits import LIMIT
 from runtime.model.generated import drives_of
+from runtime.plausible.case import Case
+from runtime.plausible.fits import Grams, least_squares
+from runtime.plausible.samples import moving as in_motion
 from runtime.signals.filters import median_filtered
 
 Array = np.ndarray

@@ -26,12 +26,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.checks.trials import Problem
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.model.inertia import INERTIAL
+from runtime.plausible.trials import Problem
 from runtime.rows.observation import Observation
 from runtime.table import Table
 

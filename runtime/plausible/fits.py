@@ -9,7 +9,7 @@ likelihood with those weights profiled out, in nats,
 
 N the rows of a joint that count (residuals are coloured); a difference of 5 is a likelihood ratio
 of 150. Rows j are those of a torque as it was
-measured, whatever map of the torques is tried (`runtime.checks.trials`).
+measured, whatever map of the torques is tried (`runtime.plausible.trials`).
 `physical_fit` minimises half the weighted squares plus a barrier
 
     mu sum_links [tr(P P0^-1) - log det P - log(M R^2 - tr S)] + mu sum_elements [c/c0 - log c] +

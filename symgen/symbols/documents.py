@@ -1,0 +1,506 @@
+"""Models as documents: text, LaTeX, lines of SymPy, plain values for JSON, and the MathML of a
+robot's page; in closed form or as recursion.
+
+LaTeX uses amsmath alone; velocities are \\dot{q}, accelerations \\ddot{q}, torques \\Gamma;
+intermediates of a recursion keep the names of SYMORO. Long formulas are cut before + and -, outside
+of brackets first, inside where a term is wider than a line.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from symgen.derive.models import SYMBOLIC
+from symgen.derive.names import Names
+from symgen.description.expression import Expression
+from symgen.description.robot import Robot
+from symgen.emit.header import frame_table, informative_columns, wrapped
+from symgen.emit.render import WIDTH
+from symgen.errors import SymgenError
+from symgen.regroup.formula import Formula
+from symgen.regroup.regrouping import Regrouping
+from symgen.symbols import expressions
+from symgen.symbols.derivation import source_of
+from symgen.symbols.printers import MathML, latex, latex_symbol, math, math_terms
+from symgen.symbols.printers import text as plain
+from symgen.symbols.symbolic_model import SymbolicModel
+from symgen.symbols.sympy_objects import of_listing, of_model, operated, source_text
+
+FORMS = ("closed", "recursive")
+FORMATS = ("text", "latex", "latex-fragment", "sympy", "json")
+
+
+LATEX_WIDTH = 76  # characters of a line as they are printed
+HEADINGS = {
+    "ant": "a(j)",
+    "mu": r"\mu",
+    "sigma": r"\sigma",
+    "gamma": r"\gamma",
+    "alpha": r"\alpha",
+    "theta": r"\theta",
+}
+# Engines and scripts: letters beyond Latin and Greek by a font that has them
+PREAMBLE = (
+    r"\usepackage{iftex}",
+    r"\ifPDFTeX",
+    r"\usepackage[utf8]{inputenc}\usepackage[T1]{fontenc}",
+    r"\newcommand{\other}[2]{{\footnotesize U+#1}} % XeLaTeX and LuaLaTeX print the letter",
+    r"\else",
+    r"\usepackage{fontspec}",
+    r"""\newcommand{\other}[2]{{\otherfont\iffontchar\font"#1 #2\else U+#1\fi}}""",
+    *(
+        rf"\ifdefined\otherfont\else\IfFontExistsTF{{{font}}}"
+        rf"{{\newfontfamily{{\otherfont}}{{{font}}}}}{{}}\fi"
+        for font in ("Noto Serif CJK SC", "Noto Sans CJK SC", "SimSun", "DejaVu Serif")
+    ),
+    r"\providecommand{\otherfont}{}",
+    r"\fi",
+)
+_GREEK = """
+    alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho varsigma sigma
+    tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega
+"""
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{c: "\\" + c for c in "&%$#_{}"},
+    **{
+        c: rf"\ensuremath{{\{name}}}"
+        for c, name in zip(
+            "αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ",
+            _GREEK.split(),
+            strict=True,
+        )
+    },
+}
+
+
+READABLE = 150  # terms of a closed form on a page; longer ones are shown as recursion
+EXPANDED = 2000  # terms that are multiplied out to see
+
+
+def printed(model: SymbolicModel, form: str, language: str) -> str:
+    """A model as text, latex, sympy or json, in closed or recursive form. Raises SymgenError where
+    the form has too many terms or is none.
+    """
+    for what, given, known in (("form", form, FORMS), ("format", language, FORMATS)):
+        if given not in known:
+            raise SymgenError(f"{what} {given!r}; expected one of {', '.join(known)}")
+    writers = (text, latex_document, latex_fragment, sympy_lines, json_text)
+    return dict(zip(FORMATS, writers, strict=True))[language](model, form)
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """A model as formulas: text where it is printed, typeset in a notebook."""
+
+    model: SymbolicModel
+    form: str
+
+    def __str__(self) -> str:
+        return text(self.model, self.form)
+
+    def _repr_latex_(self) -> str:
+        sections = latex_lines(self.model, self.form)
+        lines = [x for title, lines in sections.items() if title != "Angles" for x in lines]
+        return f"$${aligned(lines, 'aligned')}$$"
+
+
+def closed_texts(model: SymbolicModel) -> dict[str, str]:
+    """{label: value} of the entries that are not zero; the numerators where the model has a
+    denominator.
+    """
+    entries = model.closed.entries
+    return {model.label(p): plain(entries[p]) for p in model.places if p in entries}
+
+
+# --- what stands beside a model ---
+
+
+def notes(model: SymbolicModel) -> list[str]:
+    """Sentences without which a model cannot be read: its parameters, what is left out, its passive
+    joints.
+    """
+    source = model.source
+    lines = []
+    if model.model.reads_X or "parameters" in model.model.axes:
+        lines.append(f"In {len(source.parameters)} {source.kind} parameters.")
+    if source.given:
+        lines.append("With " + ", ".join(f"{name} = {e}" for name, e in source.given.items()) + ".")
+    if model.model.axes:
+        symmetric = ", those below the diagonal are those above it" if model.model.symmetric else ""
+        lines.append(f"Entries that are not shown are zero{symmetric}.")
+    if model.model.denominator:
+        lines.append(f"Each entry is to be divided by {model.model.denominator}, the last line.")
+    return [*lines, *passive_notes(model)]
+
+
+def passive_notes(model: SymbolicModel) -> list[str]:
+    """Which passive joints are functions, which are symbols and where their equations are."""
+    source = model.source
+    robot, closure, relations = source.robot, source.closure, source.relations
+    lines = []
+    for j in robot.passive:
+        if j in relations.tied:
+            continue
+        lines.append(
+            f"Passive joint: q{j} = {relations.formula(j)}"
+            + (", kept as a symbol." if j in closure.tied else ".")
+        )
+    if relations.tied:
+        named = Names(len(robot.frames))
+        u, i = relations.tied[0], robot.joints[0]
+        tied = ", ".join(f"q{u}" for u in relations.tied)
+        lines.append(
+            f"Passive joints {tied} are symbols: the closure equations (model closure) give them, "
+            f"their derivatives the rates, {named('G', u, i)} = dq{u}/dq{i}."
+        )
+    return lines
+
+
+def angle_lines(angles: Mapping[str, Expression]) -> list[str]:
+    """C23 = cos(q2 + q3), S23 = sin(q2 + q3), ..."""
+    told = ", ".join(
+        f"{name} = {'cos' if name[0] == 'C' else 'sin'}({e})".replace(" ", "\0")
+        for name, e in angles.items()
+    )
+    return [line.replace("\0", " ") for line in wrapped(told, "", "")]
+
+
+# --- text ---
+
+
+def text(model: SymbolicModel, form: str) -> str:
+    """Title, conventions, then a line per entry, or per equation of the recursion."""
+    return "\n".join([model.title, model.summary, *notes(model), "", *text_lines(model, form)])
+
+
+def text_lines(model: SymbolicModel, form: str) -> list[str]:
+    """The angles and the entries of a closed form, or the equations of the recursion under their
+    headings.
+    """
+    if form == "closed":
+        closed = model.closed
+        texts = closed_texts(model)
+        if closed.denominator is not None:
+            texts[model.model.denominator] = plain(closed.denominator)
+        width = max(map(len, texts), default=0)
+        body = [
+            line
+            for label, value in texts.items()
+            for line in broken_lines(f"{label:<{width}} = ", value, WIDTH, " " * (width + 3))
+        ]
+        angles = angle_lines(closed.angles)
+        return [*angles, *([""] if angles else []), *(body or ["all entries are zero"])]
+    lines: list[str] = []
+    section = None
+    for equation in model.listing.lines:
+        if equation.section != section:
+            section = equation.section
+            lines += ["", section] if lines else [section]
+        lines += broken_lines(f"  {equation.name} = ", equation.expression, WIDTH, "      ")
+    return lines
+
+
+# --- long formulas ---
+
+
+def broken_lines(
+    head: str, formula: str, width: int, hanging: str, measure: Callable[[str], int] = len
+) -> list[str]:
+    """`head` with as much of the formula as fits, then lines that begin with `hanging`."""
+    done: list[str] = []
+    line, empty = head, True
+    for piece in pieces(formula, width, measure):
+        if not empty and measure(line) + 1 + measure(piece) > width:
+            done.append(line)
+            line, empty = hanging, True
+        line += piece if empty else f" {piece}"
+        empty = False
+    return [*done, line]
+
+
+def pieces(
+    formula: str, width: int, measure: Callable[[str], int] = len, depth: int = 0
+) -> Iterator[str]:
+    """The formula cut before every + and - at `depth` brackets, pieces that are wider than `width`
+    cut further in.
+    """
+    for piece in _cut(formula, depth):
+        if measure(piece) <= width or depth > 8:
+            yield piece
+        else:
+            yield from pieces(piece, width, measure, depth + 1)
+
+
+def _cut(text: str, deepest: int) -> Iterator[str]:
+    brackets = braces = start = 0
+    for k, c in enumerate(text):
+        brackets += (c == "(") - (c == ")")
+        braces += (c == "{") - (c == "}")
+        if c == " " and not braces and brackets <= deepest and text[k + 1 : k + 3] in ("+ ", "- "):
+            yield text[start:k]
+            start = k + 1
+    yield text[start:]
+
+
+# --- LaTeX ---
+
+
+def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
+    """{heading: lines `left &= right`}."""
+    if form == "closed":
+        closed = model.closed
+        values, listing = closed.entries, None
+        angles = [
+            rf"{latex_symbol(n)} &= {latex(expressions.angle(n[0], e))}"
+            for n, e in closed.angles.items()
+        ]
+        sections = {"Angles": angles} if angles else {}
+    else:
+        listing = model.listing
+        operate = partial(operated, number=partial(expressions.product, factors=()))
+        steps, outputs = listing.steps(operate, expressions.symbol)
+        values = dict(zip(listing.places, outputs, strict=True))
+        sections = {}
+        for equation in listing.lines:
+            if value := steps.get(equation.name):
+                line = f"{latex_symbol(equation.name)} &= {latex(value)}"
+                sections.setdefault(equation.section, []).append(line)
+    results = [
+        f"{latex_label(model, p)} &= {latex(values[p])}" for p in model.places if values.get(p)
+    ]
+    if listing is None and model.closed.denominator is not None:
+        results.append(rf"\det \mathbf{{A}} &= {latex(model.closed.denominator)}")
+    return sections | ({"Model" if listing is None else "Result": results} if results else {})
+
+
+def latex_label(model: SymbolicModel, place: Sequence[int]) -> str:
+    """The name of an entry."""
+    if model.model.axes == ("parameters",):
+        return latex_symbol(model.source.parameters[place[0]])
+    letter = model.model.latex or rf"\mathbf{{{model.model.letter}}}"
+    inside = ",".join(
+        latex_symbol(labels[k])
+        if axis == "parameters"
+        else labels[k].replace("v", "v_").replace("w", r"\omega_")
+        for axis, labels, k in zip(model.model.axes, model.axes, place, strict=True)
+    )
+    return f"{letter}_{{{inside}}}" if place else letter
+
+
+def latex_fragment(model: SymbolicModel, form: str) -> str:
+    """The formulas alone, for a document of one's own that has amsmath."""
+    return "\n".join(map(aligned, latex_lines(model, form).values()))
+
+
+def latex_document(model: SymbolicModel, form: str) -> str:
+    """A document that compiles: frame table, conventions, formulas."""
+    body = "\n".join(
+        rf"\subsection*{{{escaped(title)}}}" + "\n" + aligned(lines)
+        for title, lines in latex_lines(model, form).items()
+    )
+    return document(
+        model.title,
+        model.summary,
+        model.source.robot,
+        notes(model),
+        body or "All entries are zero.",
+    )
+
+
+def formulas(definitions: Mapping[str, Formula]) -> str:
+    r"""Regrouping formulas in an `aligned` environment: ZZ_{1R} &= ZZ_{1} + I_{a1} + ..."""
+    rows = (
+        f"{latex_symbol(name)} &= {latex(expressions.formula(f))}"
+        for name, f in definitions.items()
+    )
+    return aligned(rows, "aligned")
+
+
+def aligned(equations: Iterable[str], environment: str = "align*") -> str:
+    """An environment of equations `left &= right`, long ones broken."""
+    rows = [" \\\\\n".join(broken(line)) for line in equations]
+    return f"\\begin{{{environment}}}\n" + " \\\\\n".join(rows) + f"\n\\end{{{environment}}}"
+
+
+def broken(line: str) -> list[str]:
+    """`left &= right` on as many lines as it needs."""
+    left, _, right = line.partition(" &= ")
+    if width(line) > LATEX_WIDTH:  # brackets that grow cannot be broken
+        right = re.sub(r"\\(left|right)\b", "", right)
+    return broken_lines(f"{left} &= ", right, LATEX_WIDTH, r"&\quad ", width)
+
+
+def width(text: str) -> int:
+    """Characters as they are printed, about."""
+    return len(
+        re.sub(r"\\(mathbf|operatorname|dot|ddot|left|right|frac|quad|,)|[{}^_&\\]", "", text)
+    )
+
+
+def escaped(text: str) -> str:
+    """Plain text in LaTeX; what not every font of it has by \\other, which PREAMBLE defines."""
+    return "".join(_SPECIAL.get(c) or _written(c) for c in text)
+
+
+def _written(c: str) -> str:
+    """A letter as it is, or with its number beside it."""
+    common = (c < "\u0180" and c not in "ĦħĸĿŀŉŦŧſ") or c in "–—‘’“”„…•€"
+    return c if common else rf"\other{{{ord(c):04X}}}{{{c}}}"
+
+
+def document(title: str, summary: str, robot: Robot, notes: Sequence[str], body: str) -> str:
+    """A document that compiles by itself: the frame table, the conventions, then `body`."""
+    kept = informative_columns(robot)
+    head = " & ".join(f"${HEADINGS.get(c, c)}$" for c in kept)
+    rows = [" & ".join(f"${cell(getattr(f, c))}$" for c in kept) + r" \\" for f in robot.frames]
+    gravity = ",\\ ".join(map(cell, robot.gravity))
+    return "\n".join(
+        [
+            r"\documentclass[a4paper,10pt]{article}",
+            *PREAMBLE,
+            r"\usepackage{amsmath,graphicx}",
+            r"\setlength{\oddsidemargin}{-10mm}\setlength{\textwidth}{180mm}\setlength{\topmargin}{-20mm}\setlength{\textheight}{250mm}",
+            r"\setlength{\parindent}{0pt}\allowdisplaybreaks",
+            r"\begin{document}",
+            rf"\section*{{{escaped(title)}}}",
+            rf"{escaped(summary)}\par\medskip",
+            r"Modified Denavit-Hartenberg (Khalil and Kleinfinger 1986); SI and rad.\par\medskip",
+            rf"\sbox0{{\begin{{tabular}}{{{'r' * len(kept)}}}",
+            head + r" \\ \hline",
+            *rows,
+            r"\end{tabular}}",
+            r"\ifdim\wd0>\textwidth\resizebox{\textwidth}{!}{\usebox0}\else\usebox0\fi\par\medskip",
+            (
+                rf"Acceleration of gravity in frame 0: $({gravity})$. Torques $\Gamma$ are those "
+                r"of "
+                r"the actuators, so friction enters with a plus.\par"
+            ),
+            *(rf"{escaped(note)}\par" for note in notes),
+            body,
+            r"\end{document}",
+            "",
+        ]
+    )
+
+
+def cell(value: object) -> str:
+    """A cell of the frame table."""
+    return latex(expressions.expression(value)) if isinstance(value, Expression) else str(value)
+
+
+# --- lines of SymPy ---
+
+
+def sympy_lines(model: SymbolicModel, form: str) -> str:
+    """Python that makes the model with SymPy; symbols are real, numbers exact."""
+    if form == "closed":
+        steps: list[tuple[Any, Any]] = []
+        value = of_model(model)
+    else:
+        steps, value = of_listing(model)
+    return source_text(model.model.letter.replace(" ", "_"), steps, value)
+
+
+# --- JSON ---
+
+
+def json_text(model: SymbolicModel, form: str) -> str:
+    """Plain values: labels of the axes, entries or equations as text, what C and S stand for, what
+    is to be known of the passive joints.
+    """
+    robot = model.source.robot
+    values: dict[str, Any] = {
+        "name": robot.name,
+        "model": model.model.name,
+        "summary": model.model.meaning,
+        "form": form,
+        "parameters": model.source.kind,
+        **({"of": model.request.of, "frame": model.request.frame} if model.model.of_frames else {}),
+        "axes": [list(labels) for labels in model.axes],
+        "symmetric": model.model.symmetric,
+        "notes": notes(model),
+        "frames": frame_table(robot),
+    }
+    if form == "closed":
+        closed = model.closed
+        values["angles"] = {name: str(e) for name, e in closed.angles.items()}
+        values["entries"] = closed_texts(model)
+        if closed.denominator is not None:
+            values["denominator"] = plain(closed.denominator)
+        values["terms"] = closed.size
+    else:
+        values["equations"] = [vars(equation) for equation in model.listing.lines]
+    return json.dumps(values, indent=2, ensure_ascii=False)
+
+
+# --- MathML of a page ---
+
+
+@dataclass(frozen=True)
+class ShownModel:
+    """A model on a page: in closed form `entries` (label, terms), else the text of its recursion in
+    `lines`.
+    """
+
+    title: str
+    summary: str
+    size: str
+    entries: list[tuple[MathML, list[MathML]]]
+    angles: list[MathML]
+    lines: str
+
+
+def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
+    """The models of a robot's page, each in the form that can be read, and what is to be known of
+    its passive joints.
+    """
+    robot = regrouping.robot
+    source = source_of(robot, regrouping=regrouping)
+    request = source.request(robot.frames[-1].j, 0)
+    models = [
+        SymbolicModel(model, source, request, None, EXPANDED)
+        for model in sorted(SYMBOLIC.values(), key=lambda model: model.page)
+        if model.page
+    ]
+    return [*filter(None, map(_shown, models))], passive_notes(models[0])
+
+
+def _shown(model: SymbolicModel) -> ShownModel | None:
+    """None where the robot has neither form of the model."""
+    title = model.model.name.replace("_", " ")
+    try:
+        closed = model.closed
+    except SymgenError:
+        closed = None
+    if closed is None or closed.size > READABLE:
+        try:
+            listing = model.listing
+        except SymgenError:
+            return None
+        return ShownModel(
+            title,
+            model.summary,
+            f"{len(listing.lines)} equations",
+            [],
+            [],
+            "\n".join(text_lines(model, "recursive")),
+        )
+    entries = [
+        (math(expressions.symbol(model.label(place))), math_terms(closed.entries[place]))
+        for place in model.places
+        if place in closed.entries
+    ]
+    angles = [
+        math(expressions.equation(expressions.symbol(name), expressions.angle(name[0], e)))
+        for name, e in closed.angles.items()
+    ]
+    size = f"{closed.size} term{'s' * (closed.size != 1)}"
+    return ShownModel(title, model.summary, size, entries, angles, "")

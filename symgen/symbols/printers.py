@@ -1,0 +1,251 @@
+"""How expressions are written: SymPy's printers with the letters and the order of the literature.
+
+Sums and products stand in the order in which they were made, a minus and a fraction before their
+product, decimals as decimals. A name is a letter with a subscript: ZZ1R is ZZ with 1R, Ia1 is I
+with a1, FV2 is F with v2, QP1 is q with a dot and 1, C23 is C with 23.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from html import escape, unescape
+from typing import Any
+
+import sympy
+from sympy.printing.latex import LatexPrinter
+from sympy.printing.mathml import MathMLPresentationPrinter
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.str import StrPrinter
+
+from symgen.description.expression import decimal
+from symgen.symbols.expressions import Tree, is_negative, negative
+
+GREEK = {
+    "alpha": "α",
+    "beta": "β",
+    "gamma": "γ",
+    "delta": "δ",
+    "theta": "θ",
+    "phi": "φ",
+    "psi": "ψ",
+    "pi": "π",
+    "Gamma": "Γ",
+}
+FAMILIES = {
+    "Ia": ("I", "a"),
+    "FV": ("F", "v"),
+    "FS": ("F", "s"),
+    "FVM": ("F", "vm"),
+    "FSM": ("F", "sm"),
+    "GAM": ("Gamma", ""),
+    "th": ("theta", ""),
+}
+DOTS = {"QP": "dot", "QDP": "ddot"}
+ANGLE = re.compile(r"(C|S|th)(\d[\d_mox]*)(b*)")
+"""C23 of q2 + q3, C5m2 of q5 - q2, C2x3 of 2 q3, C2o5x3 of 2/5 q3; b with another constant."""
+ENTRY = re.compile(r"(\w+)\((.*)\)")  # A(1,2)
+INDEXED = re.compile(r"(.*?[^\d_])_?(\d*(?:_\d+)*)(R?)")
+
+
+def letter(name: str) -> tuple[str, str]:
+    """(letter, subscript) of a name; both may be printed as they are but for Greek letters."""
+    if not name[0].isidentifier():  # a number
+        return name, ""
+    if match := ENTRY.fullmatch(name):
+        return FAMILIES.get(match[1], (match[1], ""))[0], match[2]
+    if match := ANGLE.fullmatch(name):
+        index = match[2].translate(str.maketrans("m_ox", "-,/·"))
+        return FAMILIES.get(match[1], (match[1], ""))[0] + "'" * len(match[3]), index
+    match = INDEXED.fullmatch(name)
+    if match is None:
+        return name, ""
+    stem, index, regrouped = match.groups()
+    stem, prefix = FAMILIES.get(stem, (stem, "")) if index else (stem, "")
+    return stem, prefix + index.replace("_", ",") + regrouped
+
+
+def split_sign(x: Tree) -> tuple[Any, Tree]:
+    """(number, rest) of a product whose number stands before it: -1, or a fraction; else (1, x)."""
+    number, rest = x.as_coeff_Mul()
+    before = number == -1 or (not number.is_Integer and rest.free_symbols)
+    return (number, rest) if before else (sympy.S.One, x)
+
+
+class Ordered:
+    """Products with their minus and fraction before them, decimals as decimals.
+
+    A subclass says what stands between factors, and before one that begins with a digit.
+    """
+
+    times = visible = "*"
+
+    def _print_Mul(self, x: Tree) -> str:
+        number, rest = split_sign(x)
+        if number == 1:
+            return str(super()._print_Mul(x))  # type: ignore[misc]
+        inside = self.parenthesize(rest, PRECEDENCE["Mul"], strict=True)  # type: ignore[attr-defined]
+        if number == -1:
+            return f"-{inside}"
+        times = self.visible if inside[0].isdigit() else self.times
+        return f"{self._print_Rational(number)}{times}{inside}"
+
+    def _print_Rational(self, x: Tree) -> str:
+        text = decimal(Fraction(x.p, x.q))
+        return str(super()._print_Rational(x)) if "/" in text else text  # type: ignore[misc]
+
+
+class Grammar(Ordered, StrPrinter):  # type: ignore[misc]
+    """The grammar of robot files."""
+
+
+def text(x: Tree) -> str:
+    """An expression in the grammar of robot files."""
+    return str(GRAMMAR.doprint(x))
+
+
+# --- LaTeX ---
+
+
+class Latex(Ordered, LatexPrinter):  # type: ignore[misc]
+    """SymPy's LaTeX with the subscripts of the literature."""
+
+    times, visible = r"\,", r" \cdot "
+
+    def _print_Symbol(self, x: Tree) -> str:
+        return latex_symbol(x.name)
+
+
+def latex(x: Tree) -> str:
+    """An expression."""
+    return str(LATEX.doprint(x))
+
+
+def latex_symbol(name: str) -> str:
+    """A name with its subscript."""
+    stem, subscript = letter(name)
+    if stem in DOTS:
+        symbol = rf"\{DOTS[stem]}{{q}}"
+    else:
+        base, primes = stem.rstrip("'"), "'" * stem.count("'")
+        word = base.replace("_", r"\_")
+        is_word = len(base) > 2 and base[0].isidentifier()
+        plain = rf"\mathit{{{word}}}" if is_word else word
+        symbol = (rf"\{base}" if base in GREEK else plain) + primes
+    subscript = subscript.replace("·", r" \cdot ")
+    return f"{symbol}_{{{subscript}}}" if subscript else symbol
+
+
+# --- MathML ---
+
+MINUS_SIGN = "−"
+DOT = {"dot": "˙", "ddot": "¨"}
+ENTITY = re.compile(r"&(?!amp;|lt;|gt;|quot;|apos;)\w+;")  # which XML does not know
+
+
+class MathML(str):
+    """Markup that is complete and escaped; templates leave it as it is."""
+
+    __slots__ = ()
+
+    def __html__(self) -> str:
+        return self
+
+
+class Presentation(MathMLPresentationPrinter):  # type: ignore[misc]
+    """SymPy's presentation MathML with the subscripts of the literature; every name is escaped: none
+    can bring in markup.
+    """
+
+    def element(self, tag: str, *children: Any, **attributes: str) -> Any:
+        """A node; texts among its children, and the values of attributes, are escaped."""
+        made = self.dom.createElement(tag)
+        for name, value in attributes.items():
+            made.setAttribute(name, value)
+        for x in children:
+            made.appendChild(self.dom.createTextNode(escape(x)) if isinstance(x, str) else x)
+        return made
+
+    def _l_paren(self) -> Any:
+        return self.element("mo", "(", stretchy="false")
+
+    def _r_paren(self) -> Any:
+        return self.element("mo", ")", stretchy="false")
+
+    def row(self, *parts: Any) -> Any:
+        """The parts side by side."""
+        return parts[0] if len(parts) == 1 else self.element("mrow", *parts)
+
+    def term(self, x: Tree, *, first: bool = True) -> Any:
+        """A term of a sum with its sign; none before a first one that is added."""
+        minus = is_negative(x)
+        inside = self._print(negative(x) if minus else x)
+        if first and not minus:
+            return inside
+        form = "prefix" if first else "infix"
+        return self.row(self.element("mo", MINUS_SIGN if minus else "+", form=form), inside)
+
+    def _print_Add(self, x: Tree, order: str | None = None) -> Any:
+        return self.row(*(self.term(y, first=not k) for k, y in enumerate(x.args)))
+
+    def _print_Mul(self, x: Tree) -> Any:
+        if is_negative(x):
+            return self.term(x)
+        number, _ = split_sign(x)
+        if number == 1 and not all(y.is_Integer or y.free_symbols for y in x.args):
+            return self.row(*super()._print_Mul(x).childNodes)  # pi/2
+        parts: list[Any] = []
+        for y in x.args:
+            times = [self.element("mo", "\u2062"), self.element("mspace", width="0.14em")]
+            if text(y)[0].isdigit():
+                times = [self.element("mo", "·")]
+            parts += [
+                *(times if parts else ()),
+                self.parenthesize(y, PRECEDENCE["Mul"], strict=True),
+            ]
+        return self.row(*parts)
+
+    def _print_Symbol(self, x: Tree, **attributes: str) -> Any:
+        stem, subscript = letter(x.name)
+        if stem in DOTS:
+            dots = self.element("mo", DOT[DOTS[stem]])
+            base = self.element("mover", self.element("mi", "q"), dots, accent="true")
+        else:
+            shown = GREEK.get(stem, stem.replace("'", "\u2032"))
+            base = self.element("mn" if stem[0].isdigit() else "mi", shown)
+        if subscript:
+            pieces = re.findall(rf"\d[\d,{MINUS_SIGN}]*|[^\d]+", subscript.replace("-", MINUS_SIGN))
+            below = [self.element("mn" if p[0].isdigit() else "mi", p) for p in pieces]
+            base = self.element("msub", base, self.row(*below))
+        for name, value in attributes.items():
+            base.setAttribute(name, value)
+        return base
+
+    def _print_Parameter(self, x: Tree) -> Any:
+        return self._print_Symbol(x, **{"data-p": x.name})
+
+    def _print_Rational(self, x: Tree) -> Any:
+        digits = text(x)
+        return super()._print_Rational(x) if "/" in digits else self.element("mn", digits)
+
+
+def math(x: Tree) -> MathML:
+    """An expression on its own."""
+    return _markup(MATHML._print(x))
+
+
+def math_terms(x: Tree) -> list[MathML]:
+    """The terms of an expression in their order, one <math> each with its sign, so that a browser
+    may break the line between them.
+    """
+    return [_markup(MATHML.term(y, first=not k)) for k, y in enumerate(sympy.Add.make_args(x))]
+
+
+def _markup(node: Any) -> MathML:
+    inside = ENTITY.sub(lambda match: unescape(match[0]), node.toxml())
+    return MathML(f"<math>{inside}</math>")
+
+
+GRAMMAR = Grammar({"order": "none"})
+LATEX = Latex({"order": "none", "mul_symbol": Latex.times})
+MATHML = Presentation({"order": "none"})
