@@ -210,6 +210,9 @@ class Robot:
     sha256: Annotated[str, *UNWRITTEN] = ""
 
     def __post_init__(self) -> None:
+        if "q" in self.limits:  # one number: to either side
+            q = ((-x, x) if isinstance(x, int | float) else x for x in self.limits["q"])
+            object.__setattr__(self, "limits", {**self.limits, "q": tuple(q)})
         for name in ("constants", "constraints", "limits", "values", "labels"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, kind in (
