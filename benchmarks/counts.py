@@ -62,10 +62,6 @@ Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 STEPS = (5000, 2000, 1000, 500, 250, 100)  # counts per turn of the joint
 RATES = (5000, 1000, 500, 250)
-LINE_MODES: Mapping[str, Literal["detected", "estimated"]] = {
-    "counts": "detected",
-    "estimated": "estimated",
-}
 PROTOTYPE = {
     5000: 1.4,
     2000: 1.7,
@@ -132,11 +128,7 @@ def estimated(record: Record, q: Array, step: float, reader: str) -> dict[str, A
     """
     model, study, _, names, _ = measured()
     by_counts = reader != "lowpass"
-    signals = (
-        study.signals
-        if not by_counts
-        else replace(study.signals, reader="counts", step=step, lines=LINE_MODES[reader])
-    )
+    signals = study.signals if not by_counts else replace(study.signals, reader="counts", step=step)
     begun = time.process_time()
     states = observed_states(q, record.rate, signals)
     spent = time.process_time() - begun
@@ -187,7 +179,7 @@ def run(key: Mapping[str, Any]) -> dict[str, Any]:
     step = 2 * np.pi / key["per_turn"]
     q = quantised(record.q, step, key["seed"], key["lines"])
     row: dict[str, Any] = dict(key)
-    for reader in ("lowpass", "counts", *(["estimated"] if key["lines"] else [])):
+    for reader in ("lowpass", "counts"):
         row |= estimated(record, q, step, reader)
     return row
 
@@ -251,19 +243,6 @@ def table(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
             percent(group, "counts", "counts_alike"),
         )
         lines.append((*map(str, key), str(len(group)), *(text for e in errors for text in line(e))))
-        if "estimated" in group[0]:
-            errors = (
-                percent(group, "lowpass"),
-                percent(group, "estimated"),
-                percent(group, "estimated", "estimated_alike"),
-            )
-            lines.append(
-                (
-                    f"{key[0]}, estimated",
-                    str(len(group)),
-                    *(text for e in errors for text in line(e)),
-                )
-            )
     return aligned(lines)
 
 

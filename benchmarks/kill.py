@@ -4,7 +4,7 @@ run, does a rerun end as if nothing had been?
     python benchmarks/kill.py [VERB...] [--kills 50] [--seed 1]
 
 Every verb that writes over what stands there: generate, convert, identify, cestac, report,
-simulate, excite, compare, fleet, apply, show, check, demo (the others print, or, as `new`, never
+simulate, excite, compare, apply, show, check, demo (the others print, or, as `new`, never
 replace a file).
 
 Each command runs over a folder that holds the results of an earlier one (other robot constants,
@@ -57,7 +57,6 @@ record: {files: [../FIRST.csv]}
 estimate: {method: feasible}
 validate: {record: {files: [../SECOND.csv]}}
 """
-FLEET = "symgen: 1\njobs: [{name: arm, robot: planar_2r, record: ../FIRST.csv}]\n"
 LOOP = """symgen: 1
 signals: {lowpass: {cutoff: 100, on: [q]}}
 controller:
@@ -156,7 +155,7 @@ def jobs(folder: Path) -> dict[str, Job]:
         (folder / which).mkdir()
         (folder / which / "arm.yaml").write_text(text.replace("9.81", gravity), encoding="utf-8")
         first, second = (which, "new" if which == "old" else "old")
-        for name, text_of in (("study.yaml", STUDY), ("fleet.yaml", FLEET)):
+        for name, text_of in (("study.yaml", STUDY),):
             settings = text_of.replace("FIRST", first).replace("SECOND", second)
             (folder / which / name).write_text(settings, encoding="utf-8")
         (folder / which / "loop.yaml").write_text(
@@ -187,7 +186,6 @@ def jobs(folder: Path) -> dict[str, Job]:
         for which in pairs
     }
     studies = {which: [ROBOT, f"{which}/study.yaml", *out] for which in pairs}
-    fleets = {which: [f"{which}/fleet.yaml", *out] for which in pairs}
     pages = {which: [f"{which}/arm.yaml", "--html", "-o", "OUT/page.html"] for which in pairs}
     claims = {which: [f"{which}/arm.yaml", "--certificate", "OUT/claim.json"] for which in pairs}
     return {
@@ -199,7 +197,6 @@ def jobs(folder: Path) -> dict[str, Job]:
         "simulate": Job(folder, "simulate", **loops),
         "excite": Job(folder, "excite", **search),
         "compare": Job(folder, "compare", **studies),
-        "fleet": Job(folder, "fleet", **fleets),
         "apply": Job(folder, "apply", **changed),
         "show": Job(folder, "show", **pages),
         "check": Job(folder, "check", **claims),
@@ -217,9 +214,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def judged(folder: Path, old: dict[str, str], new: dict[str, str]) -> str:
-    """What a killed run left: "old", "new", "to complete", or, of a fleet, whose jobs are sets of
-    their own, "old and new"; RuntimeError where it is anything else.
-    """
+    """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything else."""
     if (folder / "notes.txt").read_text() != NOTE:
         raise RuntimeError("the user's file changed")
     found = digests(folder)

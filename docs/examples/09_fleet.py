@@ -1,38 +1,49 @@
-"""Many robots at once: one table; a job that fails has its reason there and the others go on."""
+"""Many records at once, on all cores or on a cluster: a record that cannot be read has its reason in the table and the others go on."""
 
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
+import runtime
 import symgen
-from runtime.identification.fleet import identify_fleet
+from runtime.errors import InputError
 
-folder = Path(tempfile.mkdtemp())
-model = symgen.model("planar_2r")
 
-t = np.arange(0, 20, 0.005)
-w, a = (
-    np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]]),
-    np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]]),
-)
-phase = t[:, None, None] * w
-q = (a * np.sin(phase)).sum(axis=1)
-qd, qdd = (a * w * np.cos(phase)).sum(axis=1), (-a * w**2 * np.sin(phase)).sum(axis=1)
-jobs = []
-for number, mass in enumerate((2.0, 2.5, 3.0)):
-    X = model.base_parameters({**model.VALUES, "M2": mass})
-    tau = model.inverse_dynamics(q, qd, qdd, X) + np.random.default_rng(number).normal(
-        0, 0.2, q.shape
-    )
-    np.savetxt(
-        folder / f"arm{number}.csv",
-        np.column_stack([t, q, tau]),
-        delimiter=",",
-        header="t,q1,q2,tau1,tau2",
-        comments="",
-    )
-    jobs.append(f"  - {{name: arm {number}, robot: planar_2r, record: arm{number}.csv}}\n")
-jobs.append("  - {name: missing, robot: planar_2r, record: arm9.csv}\n")
-(folder / "fleet.yaml").write_text("symgen: 1\njobs:\n" + "".join(jobs))
-print(identify_fleet(folder / "fleet.yaml", load=symgen.model))
+def identified(file: Path) -> str:
+    """One line of the table. A process of its own runs it."""
+    try:
+        model = symgen.model("planar_2r")
+        result = runtime.identify(model, runtime.read_record(file, model))
+    except InputError as error:
+        return f"{file.stem}: failed. {error}"
+    return f"{file.stem}: {result.model_estimate.relative_error:.1f} %, {result.checklist.answer}"
+
+
+def simulated(folder: Path) -> list[Path]:
+    """Files of three arms that carry different tools, and the name of one that does not exist."""
+    model = symgen.model("planar_2r")
+    t = np.arange(0, 20, 0.005)
+    w = np.array([[0.9, 1.3], [2.3, 3.1], [4.7, 6.1]])
+    a = np.array([[0.8, 0.6], [0.3, 0.4], [0.15, 0.2]])
+    phase = t[:, None, None] * w
+    q = (a * np.sin(phase)).sum(axis=1)
+    qd = (a * w * np.cos(phase)).sum(axis=1)
+    qdd = (-a * w**2 * np.sin(phase)).sum(axis=1)
+    for number, mass in enumerate((2.0, 2.5, 3.0)):
+        X = model.base_parameters({**model.VALUES, "M2": mass})
+        noise = np.random.default_rng(number).normal(0, 0.2, q.shape)
+        columns = np.column_stack([t, q, model.inverse_dynamics(q, qd, qdd, X) + noise])
+        header = "t,q1,q2,tau1,tau2"
+        np.savetxt(folder / f"arm{number}.csv", columns, delimiter=",", header=header, comments="")
+    return [folder / f"arm{number}.csv" for number in range(4)]
+
+
+if __name__ == "__main__":
+    files = simulated(Path(tempfile.mkdtemp()))
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        print(*pool.map(identified, files), sep="\n")
+    # on a cluster: client = dask.distributed.Client("tcp://10.0.0.1:8786")
+    #               print(*client.gather(client.map(identified, files)), sep="\n")

@@ -3,7 +3,7 @@ it.
 
 model, records, study -> Y = W X + rho -> all parameters, eqs. (7)-(11), and the essential ones
                       -> measured beside predicted torques, windows of the records against each
-                      other, parameters that trade, coupling
+                      other, parameters that trade
                       -> where they are asked for: a load, feasibility, friction curves
 """
 
@@ -18,8 +18,6 @@ import numpy as np
 
 from runtime.blas import single_threaded
 from runtime.errors import InputError
-from runtime.identification.coupling import coupling_fits
-from runtime.identification.cutoff_errors import errors_text, other_studies, unseen_errors
 from runtime.identification.elastic import elasticity
 from runtime.identification.fits import agreement, fitted, validated
 from runtime.identification.friction import friction_curves
@@ -157,8 +155,6 @@ def identify(
         observe = partial(method_observation, model, study=study, workers=processes)
         observation = observe(measured, simulator=simulator)
         observation = _with_findings(observation, law.text if law else "", load, statement)
-        if lowpass and (plausible or study.signals.reader == "counts"):
-            provenance["lowpass"] += _other_cutoffs(model, measured, study, asked_study)
         fits = fitted(observation, study, model, provenance)
         doubt = gain_doubt(model, study, measured, fits.estimate.relative_error)
         observation = _with_findings(observation, doubt)
@@ -186,9 +182,6 @@ def identify(
             homogeneity=agreement(fits, observation, fitted_names, unseen, study, model),
             missing=missing,
             correlations=weak_directions(observation, study.estimate),
-            coupling=coupling_fits(
-                model, measured, study, observation, fits.estimate, partial(observe, windows=())
-            ),
             uncertainty=uncertainty(observation, study.estimate, fits.reduced, comparison),
             laws=laws,
         )
@@ -236,23 +229,6 @@ def _with_findings(observation: Observation, *sentences: str) -> Observation:
     if not any(sentences):
         return observation
     return replace(observation, findings=(*observation.findings, *filter(None, sentences)))
-
-
-def _other_cutoffs(
-    model: GeneratedModel, measured: Measured, study: Study, asked_study: Study
-) -> str:
-    """What other cut-offs than an automatic one would give, or another reader than that of counts,
-    a sentence; "" where the cut-off was given or the records are long.
-    """
-    records, asked = [one for one in measured if isinstance(one, Prepared)], asked_study.signals
-    short = sum(len(one.record) for one in records) <= LIMIT.CUTOFF_SAMPLES
-    low, counts = study.signals.lowpass, study.signals.reader == "counts"
-    automatic = asked.lowpass is not None and asked.lowpass.cutoff == "auto"
-    if low is None or not automatic or not short or len(records) < len(measured):
-        return ""
-    at("other cut-offs")
-    errors = unseen_errors(model, records, other_studies(records, study))
-    return errors_text(errors, "counts" if counts else f"{low.hertz:g}")
 
 
 def _with_elasticity(result: Identification) -> Identification:

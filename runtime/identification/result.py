@@ -19,7 +19,6 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import LINEAR
 from runtime.estimators.physical import negative_elements
 from runtime.identification.checklist import Checklist, checklist_of, lost_joints
-from runtime.identification.cutoff_errors import BETTER
 from runtime.identification.expected_error import Expected, expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
@@ -45,7 +44,6 @@ from runtime.identification.validation import (
 from runtime.json_documents import json_text
 from runtime.limits import LIMIT
 from runtime.markup import number
-from runtime.model.drives import Coupling
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.plausible.known import torque_unit_doubt
 from runtime.plausible.plausibility import Plausibility
@@ -94,9 +92,6 @@ class Identification:
         the other four (`parameter_sets`), then further records.
     correlations : WeakDirections
         Parameters that trade against each other.
-    coupling : mapping of Coupling to Estimate
-        All parameters with the off-diagonal part of the drives used for "both", "position",
-        "torque" or "none"; empty where there is none.
     uncertainty : Uncertainty
         Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
     payload : PayloadStudy or None
@@ -131,7 +126,6 @@ class Identification:
     comparison: tuple[JointComparison, ...]
     validation: tuple[CrossValidation, ...]
     correlations: WeakDirections
-    coupling: Mapping[Coupling, Estimate]
     uncertainty: Uncertainty
     payload: PayloadStudy | None = None
     feasibility: Feasibility | None = None
@@ -418,9 +412,7 @@ class Identification:
         by_joint = ", ".join(
             f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint if one.rows
         )
-        cutoff = self.estimate.provenance.get("lowpass", "")
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
-        notes += [cutoff] if BETTER in cutoff else []
         if len(notes) > LIMIT.NOTES_PRINTED:
             more = len(notes) - LIMIT.NOTES_PRINTED + 1
             notes = [*notes[:-more], f"{more} more by --verbose"]
@@ -450,7 +442,7 @@ class Identification:
         return notebook([self.verdict, *self.warnings], parameters, joints)
 
     def to_text(self) -> str:
-        """Parameters, trail, validation, parameters that trade, uncertainty, coupling, what was
+        """Parameters, trail, validation, parameters that trade, uncertainty, what was
         asked for besides, then the verdict: all that `brief` leaves out.
         """
         fit = self.model_estimate if self.determined else self.estimate
@@ -467,11 +459,6 @@ class Identification:
             for d in self.correlations.directions
         ]
         head = "directions that W sees least (singular value over the largest, unit columns)"
-        coupled = [
-            f"coupling of the drives in {key}: {own.relative_error:.2f} % in total, per joint "
-            + _percents(tuple(joint.relative_error for joint in own.per_joint))
-            for key, own in self.coupling.items()
-        ]
         tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
         last: tuple[Any, ...] = (self.laws, self.payload, *self.friction)
         parts = [
@@ -483,7 +470,6 @@ class Identification:
             self.homogeneity.text if self.homogeneity else "",
             self.motion_table().to_text() if self.motion_table().rows else "",
             self.uncertainty.to_text(),
-            "\n".join(coupled),
             self.eigenvalue_table().to_text() if self.feasible else "",
             f"The parameters are {self.feasibility.text}." if self.feasibility else "",
             *(table.to_table() for table in last if table is not None),
@@ -569,10 +555,6 @@ class Identification:
             },
             "warnings": self.warnings,
             "trust": self.uncertainty,
-            "coupling": {
-                key: {"relative_error": e.relative_error, "per_joint": e.per_joint}
-                for key, e in self.coupling.items()
-            },
             **({"by_record": self.record_errors} if self.record_errors else {}),
             "verdict": self.verdict,
             "checklist": self.checklist,

@@ -19,7 +19,6 @@ from runtime.estimators.estimate import SCHEMA as ESTIMATE
 from runtime.estimators.estimate import Estimate, JointFit, load_estimate
 from runtime.identification.parameter_sets import SetName, whole_set
 from runtime.identification.validation import RecordError, WeakDirections
-from runtime.model.drives import Coupling
 from runtime.resolution.result import SCHEMA as CESTAC
 from runtime.resolution.result import LevelResult, Verdict
 from runtime.resolution.runs import Run
@@ -62,22 +61,6 @@ class EssentialDocument:
     per_joint: tuple[JointFit, ...]
     threshold: float
     trail: tuple[dict[str, Any], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class CouplingDocument:
-    """Fit with a part of the coupling of the drives.
-
-    Attributes
-    ----------
-    relative_error : float, %
-        100 ||Y - W X|| / ||Y||.
-    per_joint : tuple of JointFit
-        Fit by joint.
-    """
-
-    relative_error: float
-    per_joint: tuple[JointFit, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +134,6 @@ class IdentificationDocument(SetsDocument):
         Sentences to read before the values are used.
     trust : mapping
         Deviations by blocks, whiteness, F-tests.
-    coupling : mapping of CouplingDocument
-        Fit with the coupling of the drives in both directions, one or none.
     by_record : tuple of RecordError
         Of several records, the error of each, with the parameters that stand for the robot.
     verdict : str
@@ -178,7 +159,6 @@ class IdentificationDocument(SetsDocument):
     weak_directions: WeakDirections
     warnings: tuple[str, ...]
     trust: dict[str, Any]
-    coupling: dict[Coupling, CouplingDocument]
     by_record: tuple[RecordError, ...]
     verdict: str
     checklist: dict[str, Any]

@@ -1,4 +1,4 @@
-"""What a name on a command line or in a fleet file means: a dataset, a study file, or a measured
+"""What a name on a command line means: a dataset, a study file, or a measured
 file.
 """
 

@@ -15,7 +15,6 @@ import numpy as np
 from runtime.excitation.poses import StaticPoses
 from runtime.excitation.result import Excitation
 from runtime.identification.compare import Ranking
-from runtime.identification.fleet import Fleet
 from runtime.identification.result import Identification
 from runtime.json_documents import json_text
 from runtime.limits import LIMIT
@@ -40,14 +39,7 @@ RECORD = "simulated.csv"
 
 
 def report(
-    result: Identification
-    | Ranking
-    | Cestac
-    | Advice
-    | Simulation
-    | Excitation
-    | StaticPoses
-    | Fleet,
+    result: Identification | Ranking | Cestac | Advice | Simulation | Excitation | StaticPoses,
     folder: str | Path | Results,
     *,
     study: Study | None = None,
@@ -56,7 +48,7 @@ def report(
 
     Parameters
     ----------
-    result : Identification, Ranking, Cestac, Advice, Simulation, Excitation, StaticPoses or Fleet
+    result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses
     folder : str, Path or Results
         Made where it is missing; or one that this process keeps for itself
         (`runtime.result_files.reserved`).
@@ -84,7 +76,7 @@ def files_of(result: object, folder: Path, study: Study) -> Files:
     """Contents of `folder` by file name; TypeError for a result without files."""
     raise TypeError(
         f"{type(result).__name__} is no result that is written; expected an Identification, "
-        "Ranking, Cestac, Advice, Simulation, Excitation, StaticPoses or Fleet"
+        "Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses"
     )
 
 
@@ -188,15 +180,6 @@ def _(result: StaticPoses, folder: Path, study: Study) -> Files:
     t = np.arange(1.0, len(result.poses) + 1)
     texts = {"excitation.json": result.to_json(), "poses.csv": csv_text(t, q=result.poses)}
     return page_files(page) | texts
-
-
-@files_of.register
-def _(result: Fleet, folder: Path, study: Study) -> Files:
-    return {
-        "summary.txt": f"{result}\n",
-        "summary.csv": result.to_csv(),
-        "summary.json": result.to_json(),
-    }
 
 
 def page_files(page: Page) -> Files:

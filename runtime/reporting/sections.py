@@ -17,18 +17,9 @@ from runtime.reporting.series import series
 from runtime.signals.decimation import CUTOFF
 from runtime.table import Table
 
-MEANING = {
-    "both": "position and torque (used where the settings say so)",
-    "position": "position alone",
-    "torque": "torque alone",
-    "none": "none",
-}
-
 
 def identification_sections(result: Identification) -> list[Section]:
-    """Parameters, torques, errors per joint, residuals, weak directions, trust, trail, validation,
-    coupling.
-    """
+    """Parameters, torques, errors per joint, residuals, weak directions, trust, trail, validation."""
     unit = result.torque_unit
     return [
         parameter_section(result),
@@ -48,7 +39,6 @@ def identification_sections(result: Identification) -> list[Section]:
         ),
         trail_section(result),
         validation_section(result),
-        *([coupling_section(result)] if result.coupling else []),
     ]
 
 
@@ -220,30 +210,6 @@ def validation_section(result: Identification) -> Section:
         result.ranking,
     )
     return Section("Cross-validation", text, tables=tables)
-
-
-def coupling_section(result: Identification) -> Section:
-    """The fit with the coupling of the drives taken into account, or not."""
-    joints = [joint.joint for joint in result.estimate.per_joint]
-    rows = [
-        (
-            MEANING[coupling],
-            number(fit.relative_error, ".2f"),
-            *(number(joint.relative_error, ".2f") for joint in fit.per_joint),
-        )
-        for coupling, fit in result.coupling.items()
-    ]
-    text = (
-        "The drives are coupled: one motor also turns with another joint. Leaving the coupling out "
-        "changes the total little, it may even look "
-        "better; the joints concerned tell.",
-    )
-    table = Table(
-        "Relative error of all parameters, %",
-        ("coupling used in", "total", *(f"joint {j}" for j in joints)),
-        rows,
-    )
-    return Section("With and without the coupling of the drives", text, tables=[table])
 
 
 def residual_section(result: Identification, unit: str = "N m") -> Section:

@@ -170,7 +170,7 @@ def perturbation(
     constants : values in place of the robot file's.
     """
     signals = replace(study.signals, median=study.cestac.median)
-    positions = replace(signals, reader="lowpass", step=None, side="joint", lines="detected")
+    positions = replace(signals, reader="lowpass", step=None, side="joint")
     own = prepared(model, record, replace(study, signals=positions))
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of steps on them", own.record.file)

@@ -7,6 +7,7 @@ from typing import Any
 
 WENT: Mapping[str, str] = {
     "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",
+    "signals.lines": "lines of uneven encoders are no longer estimated; leave the key out: bounds are widened by their deviation",
     "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
 }
 """By the key, "stream", or by the key and its value, "estimate.method: tls"; keys of lists have no

@@ -58,7 +58,7 @@ LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 
 def version(number: int) -> int:
-    """The version of a study file or fleet file; SettingsError where it is not SCHEMA."""
+    """The version of a study file; SettingsError where it is not SCHEMA."""
     require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
     return number
 
@@ -142,9 +142,6 @@ class Signals(Settings):
         Where record.columns.qd are velocities that were recorded: from which frequency on they
         stand for differences of q; auto: where the noise of both is alike, and not where they
         disagree with the positions; differences: they are not used. For reader lowpass.
-    lines : str
-        Lines of the encoders at unequal distances, for counts: detected widens the bounds by their
-        deviation; estimated finds them with the motion.
     torque_median : int or str
         Window of the median filter on torques; auto: as on positions, but none where it would take
         torque that goes with the motion, as from a controller that answers every count
@@ -159,14 +156,12 @@ class Signals(Settings):
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
-    lines: Literal["detected", "estimated"] = "detected"
     torque_median: OddWindow | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
         for key, given in (
             ("step", self.step is not None),
             ("side", self.side != "joint"),
-            ("lines", self.lines != "detected"),
         ):
             require(
                 self.reader == "counts" or not given,

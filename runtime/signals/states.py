@@ -75,7 +75,7 @@ def observed_states(
     position = encoder_position(q, drives, missing)
     if counts is not None:
         return _joint_states(*counts.read(position), rate, signals, drives)
-    reading = read_counts(position, rate, signals.step, lines=signals.lines, name=name)
+    reading = read_counts(position, rate, signals.step, name=name)
     states = _joint_states(*reading.motion, rate, signals, drives)
     return replace(states, findings=sentences(reading.findings, name))
 

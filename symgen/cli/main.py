@@ -22,7 +22,6 @@ VERBS = {
     "cestac": "Judge whether the encoder resolves enough for an identification.",
     "compare": "Find which treatment of the records predicts best.",
     "report": "Everything one record says about a robot, judged, on one page.",
-    "fleet": "Identify many robots from their records, with one table.",
     "excite": "Search a motion that excites the parameters within the limits.",
     "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows.",
@@ -33,6 +32,11 @@ VERBS = {
     "studio": "Serve a local page where one works: robot, record, check, solve, results.",
     "demo": "The main job end to end, with a report.",
 }
+
+WENT = {
+    "fleet": "symgen fleet went; docs/examples/09_fleet.py is a loop over files on several cores or a cluster",
+}
+"""Verbs of earlier versions, with the sentence that names what to use instead."""
 
 
 class Verbs(TyperGroup):
@@ -46,6 +50,9 @@ class Verbs(TyperGroup):
         return list(VERBS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name in WENT:
+            typer.echo(f"error: {WENT[cmd_name]}", err=True)
+            raise typer.Exit(2)
         if cmd_name not in VERBS:
             return None
         if self.listing:

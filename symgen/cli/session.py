@@ -204,19 +204,6 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
     return [a.text for a in assumptions_asked(free, fit, sorted(described.assume))]
 
 
-def model_of_job(robot: str, *, trust: bool = False, exact: bool = False) -> GeneratedModel:
-    """The model of a job of a fleet: what is wrong with its robot file is an error of that job
-    alone.
-    """
-    from runtime.errors import InputError
-    from symgen.errors import SymgenError
-
-    try:
-        return model_of(robot, trust=trust, exact=exact)
-    except SymgenError as e:
-        raise InputError(str(e)) from e
-
-
 def _source(robot: str, exact: bool) -> Path:
     """The C file of a ROBOT argument: emitted, or beside the module."""
     from symgen.certify.modules import c_file

@@ -131,8 +131,6 @@ def test_what_is_no_robot(kind):
         for verb in ("identify", "cestac", "report", "simulate"):
             refused(verb, kind + ending, "study.yaml", "-o", "out", named=kind)
         refused("excite", kind + ending, "-o", "out", named=kind)
-    for ending in ("", ".yaml", ".json"):
-        refused("fleet", kind + ending, "-o", "out", named=kind + ending)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "empty", "binary", "loop", "missing"])
@@ -156,7 +154,7 @@ def test_names(name):
     named = (
         "" if len(name) > 200 or "\udce9" in name else spelled(name).rpartition("\\x202e")[2]
     )  # which is also spelled \u202e
-    for verb in ("show", "generate", "check", "fleet"):
+    for verb in ("show", "generate", "check"):
         refused(verb, "--", name, named=named)
     refused("convert", "--", name, "out.yaml", named=named)
     refused("identify", "--", name, "record.csv", named=named)
@@ -168,20 +166,9 @@ def test_names(name):
 def test_results_replace_no_file_by_a_folder(target):
     for command in (
         ("generate", "emps"), ("identify", "model.py", "record.csv"), ("cestac", "model.py", "record.csv", "--delta", "0.001"),
-        ("report", "model.py", "record.csv"), ("excite", "model.py"), ("simulate", "model.py", "study.yaml"), ("fleet", "fleet.yaml"), ("demo", "--quick"),
+        ("report", "model.py", "record.csv"), ("excite", "model.py"), ("simulate", "model.py", "study.yaml"), ("demo", "--quick"),
     ):  # fmt: skip
-        if command[0] == "fleet":
-            Path("fleet.yaml").write_text(
-                "symgen: 1\njobs: [{robot: model.py, record: record.csv}]\n"
-            )
-        refused(
-            *command,
-            "-o",
-            target,
-            named="fleet.yaml"
-            if command[0] == "fleet" and "limits" in answered(*command, "-o", target)[1]
-            else target,
-        )
+        refused(*command, "-o", target, named=target)
 
 
 @pytest.mark.parametrize("target", ["pipe", "folder", "folder.yaml", "pipe.yaml"])
@@ -221,11 +208,10 @@ def test_usage(arguments):
 
 
 ELSEWHERE = (
-    "fleet",
     "checkpoint",
     "settings",
     "parquet",
-)  # many jobs, folders of runs, processes of their own: tests/fuzz reads them
+)  # folders of runs, processes of their own: tests/fuzz reads them
 
 
 @pytest.mark.parametrize(

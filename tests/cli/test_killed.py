@@ -167,7 +167,6 @@ LONG = {  # whose results take long: arguments before the folder
     "report": ["planar_2r", "run.csv"],
     "excite": ["planar_2r"],
     "simulate": ["emps", "loop.yaml"],
-    "fleet": ["fleet.yaml"],
     "demo": [],
 }
 

@@ -29,8 +29,7 @@ from campaign import campaign, some
 from ruamel.yaml import YAML
 from typer.main import get_command
 
-from runtime.identification.fleet import FleetSettings
-from runtime.settings.files import settings_from_text, study_from_text
+from runtime.settings.files import study_from_text
 from symgen.cli.main import app
 from symgen.description.schema import json_schema
 
@@ -224,11 +223,9 @@ def test_yaml_blocks_are_what_the_program_reads() -> None:
 
 
 def read(text: str, name: str) -> None:
-    """A robot file, some sections of one, a fleet, or a study."""
+    """A robot file, some sections of one, or a study."""
     keys = set(YAML(typ="safe", pure=True).load(text))
-    if "jobs" in keys:
-        settings_from_text(FleetSettings, text, file=name)
-    elif "frames" in keys or keys <= set(json_schema()["properties"]) - {"symgen"}:
+    if "frames" in keys or keys <= set(json_schema()["properties"]) - {"symgen"}:
         sections = json.loads(json.dumps(YAML(typ="safe", pure=True).load(text)))
         jsonschema.validate(
             {"symgen": 1, "name": "arm", "gravity": [0, 0, 0], "frames": {}} | sections,

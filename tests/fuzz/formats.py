@@ -35,7 +35,6 @@ FORMATS: dict[str, Format] = {
     "urdf": Format("urdf", making.make_urdf, reading.read_robot, 100),
     "mjcf": Format("xml", making.make_mjcf, reading.read_robot, 70),
     "study": Format("yaml", making.make_study, reading.read_study, 100),
-    "fleet": Format("yaml", making.make_fleet, reading.read_fleet, 20),
     "motion": Format("yaml", making.make_motion, reading.read_motion, 20, ("case", "reference")),
     "csv": Format("csv", making.make_csv, reading.read_record, 70),
     "csv.gz": Format("csv.gz", making.make_csv_gz, reading.read_record, 20),

@@ -116,7 +116,6 @@ def serve(pipe, folder: Path) -> None:
         "runtime.records.reading_by_blocks",
         "runtime.estimators.estimate",
         "runtime.model.generated",
-        "runtime.identification.fleet",
     ):
         __import__(module)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

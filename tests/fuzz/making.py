@@ -157,16 +157,6 @@ def make_study(rng: random.Random) -> bytes:
     )
 
 
-def make_fleet(rng: random.Random) -> bytes:
-    sound = tuple(texts.yaml_text(table).encode() for table in seeds.FLEETS)
-    return either(
-        rng,
-        sound,
-        lambda rng: texts.structured(rng.choice(seeds.FLEETS), rng, ("pi",), seeds.study_tables()),
-        tokens=texts.TOKENS,
-    )
-
-
 def make_motion(rng: random.Random) -> bytes:
     table = {
         "controller": {"rate": 500, "reference": {"motion": seeds.MOTION}},

@@ -51,12 +51,6 @@ def read_study(path: Path) -> object:
     return study_text(located(study, path.parent), path.parent)
 
 
-def read_fleet(path: Path) -> object:
-    from runtime.identification.fleet import jobs_of
-
-    return jobs_of(path)
-
-
 def read_motion(path: Path) -> object:
     from runtime.loop.reference import reference_of
     from runtime.settings.files import load_study

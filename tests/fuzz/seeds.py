@@ -251,15 +251,6 @@ def study_tables() -> tuple[dict, ...]:
     )
 
 
-FLEETS = (
-    {
-        "symgen": 1,
-        "jobs": [
-            {"robot": "tx40", "record": "tx40"},
-            {"name": "left", "robot": "a.yaml", "record": "b.csv"},
-        ],
-    },
-)
 MOTION = {
     "parts": [
         {"family": "fourier", "period": 10.0, "harmonics": 2, "p": [[0.1] * 5] * 2},

@@ -59,7 +59,7 @@ YAML = {
 }
 
 
-@pytest.mark.parametrize("format", ["robot", "study", "fleet"])
+@pytest.mark.parametrize("format", ["robot", "study"])
 @pytest.mark.parametrize("name", YAML)
 def test_yaml(reader, format, name):
     text, said = YAML[name]

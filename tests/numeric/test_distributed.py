@@ -11,15 +11,12 @@ from pathlib import Path
 import distributed as dask
 import planar_2r_model as planar
 import pytest
-import typer
 from planar_data import record
-from typer.testing import CliRunner
 
 from runtime.errors import InputError
 from runtime.parallel import results
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
-from symgen.cli.fleet import fleet
 
 RECORD = record(N=3000)
 STUDY = Study(
@@ -118,21 +115,6 @@ def test_a_dead_worker_loses_nothing(cluster, tmp_path):
 def test_a_failing_task_is_the_callers_error(cluster):
     with pytest.raises(ValueError, match="key 2"):
         list(results(failing, 2, range(5), scheduler=cluster.scheduler_address))
-
-
-@pytest.mark.campaign
-def test_fleet(cluster, emps_data, tmp_path):
-    (tmp_path / "fleet.yaml").write_text(
-        "jobs: [{robot: emps, record: emps}, {robot: emps, record: missing.csv}]"
-    )
-    app = typer.Typer()
-    app.command()(fleet)
-    here, there = (
-        CliRunner().invoke(app, [str(tmp_path / "fleet.yaml"), "--json", *options])
-        for options in ([], ["--scheduler", cluster.scheduler_address])
-    )
-    assert there.exit_code == here.exit_code == 1
-    assert there.stdout == here.stdout and '"status": "ok"' in here.stdout
 
 
 def test_no_scheduler():

@@ -8,7 +8,6 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from campaign import sampled, some
-from scipy.signal import butter, sosfiltfilt
 from typer.testing import CliRunner
 
 import runtime
@@ -471,33 +470,6 @@ def test_values_in_g_mm_are_told_of_links_with_fewer_than_ten(given, link) -> No
     assert check.state == ("doubtful" if link else "good")
     assert f"The values of link {link} put its mass" in check.finding or not link
     assert "not g and mm" in check.remedy or not link
-
-
-def test_other_cut_offs_are_shown_beside_the_automatic_one() -> None:
-    """Positions shake between 2 and 6 Hz where no torque does (a flexible mount): the automatic
-    cut-off takes it for motion, 49 % of the unseen half where 1.7 Hz leaves 26. It is told, and is
-    nearer to the truth; without the shaking nothing is.
-    """
-    model = symgen.model("planar_2r")
-    t, q, tau = motion(model, low=0.2)
-    band = butter(2, [2 / 100, 6 / 100], "band", output="sos")
-    x = sosfiltfilt(band, np.random.default_rng(0).standard_normal(q.shape), axis=0)
-    texts = []
-    for shake in (0.0, 1e-2):
-        record = runtime.Record(t, q + shake * x / x.std(), tau, name="run")
-        result = runtime.identify(model, record, plausible=True)
-        texts.append(result.estimate.provenance["lowpass"])
-        assert texts[-1] in result.time_stamps and "Unseen half by cut-off: " in texts[-1]
-        assert ("set signals.lowpass.cutoff" in result.brief()) == (shake > 0), texts[-1]
-    automatic = float(texts[1].split(" at ")[1].split(" Hz")[0])
-    told = float(texts[1].split("set signals.lowpass.cutoff: ")[1].split(" and")[0])
-    assert told < 4 < automatic
-    truth = model.base_parameters(model.VALUES)
-    far = []
-    for hertz in (automatic, told):
-        study = runtime.Study(signals={"lowpass": {"cutoff": hertz}})
-        far.append(np.abs(runtime.identify(model, record, study).estimate.X - truth)[:3].max())
-    assert far[1] < far[0]
 
 
 def test_a_cut_off_that_is_given_is_left_alone() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from runtime.errors import InputError, SettingsError
+from runtime.loop.methods import METHODS
 from runtime.records.datasets import DATASETS, dataset_study
 from runtime.records.named import study_of
 from runtime.settings import gone
@@ -100,7 +101,6 @@ def test_written_settings_read_back(study):
         "reader",
         "step",
         "side",
-        "lines",
         "torque_median",
     }  # complete, defaults filled
 
@@ -192,7 +192,9 @@ def test_a_setting_that_went_names_what_to_use_instead():
         for part in reversed(key.split(".")):
             mapping = {part: mapping}
         with pytest.raises(SettingsError) as e:
-            study_from_mapping(mapping)
+            study = study_from_mapping(mapping)
+            settings = replace(study.estimate, method="feasible")  # the method reads its options
+            METHODS["feasible"].checked(settings)
         assert (e.value.path, e.value.reason) == (tuple(key.split(".")), said)
 
 

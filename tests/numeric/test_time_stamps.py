@@ -4,7 +4,6 @@ analytic signal, never across a gap.
 
 from copy import copy
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import planar_2r_model as planar
@@ -15,8 +14,6 @@ from hypothesis import strategies as st
 
 from runtime import estimate, observe, read_record, resample
 from runtime.errors import InputError
-from runtime.identification.coupling import coupling_fits, recoupled
-from runtime.model.drives import Drives
 from runtime.records.reading import read_records
 from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
@@ -352,32 +349,6 @@ def test_resampled_record_identifies_as_the_regular_one(tmp_path):
     scale = np.abs(one).max(axis=0)
     smooth = [i for i, name in enumerate(planar.BASE_PARAMETERS) if not name.startswith("FS")]
     np.testing.assert_allclose((other / scale)[:, smooth], (one / scale)[:, smooth], atol=1e-3)
-
-
-def test_coupling_of_a_split_record(tmp_path):
-    """The fits with and without coupling cover all pieces."""
-    t = np.arange(3000) / RATE
-    t = t + 0.5 * (np.arange(3000) >= 1600)
-    write(tmp_path, t)
-    asked = study(side="motor", resample={"gaps": "split"})
-
-    drives = {
-        "ratio": [[10.0, 0.0], [5.0, 10.0]],
-        "offset": [0.0, 0.0],
-        "torque_constant": [1.0, 1.0],
-    }
-    model = SimpleNamespace(**{**vars(planar), "DRIVES": drives})
-    records = read_records(asked.record, model, folder=tmp_path)
-    observation = observe(model, records, asked)
-    fit, used = estimate(model, observation, asked), Drives.from_mapping(drives)
-    fits = coupling_fits(
-        model, records, asked, observation, fit, lambda changed: observe(model, changed, asked)
-    )
-    assert len(records) == 2
-    assert set(fits) == {"both", "position", "torque", "none"} and fits["both"] is fit
-    for coupling in fits:
-        changed = [recoupled(record, used, used.decoupled(coupling)) for record in records]
-        np.testing.assert_allclose(fits[coupling].X, estimate(model, changed, asked).X, rtol=1e-9)
 
 
 # --- remedies

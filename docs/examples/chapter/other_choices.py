@@ -23,9 +23,10 @@ from dataclasses import replace
 from time import process_time
 from typing import Any
 
+from couplings import recoupled
+
 import runtime
 from runtime import Cestac, Record, Study
-from runtime.identification.coupling import recoupled
 from runtime.markup import number
 from runtime.model.drives import Drives
 from runtime.settings.study import CestacSettings, Lowpass, Signals

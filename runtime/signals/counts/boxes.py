@@ -19,7 +19,7 @@ evidence; docs/theory/counts.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -235,11 +235,6 @@ class Boxes:
         boxes = replace(self, low=self.low + moved, high=self.high + moved)
         nu = read.nu + read.tau * moved
         return boxes, boxes.posterior(read.errors, read.c, read.density, read.tau, nu)
-
-    def shifted(self, shift: Callable[[Array], Array]) -> Boxes:
-        """Bounds at lines that are shifted, by their number."""
-        number = np.round(self.y[self.sites]).astype(int)
-        return replace(self, low=self.low + shift(number - 1), high=self.high + shift(number))
 
     def _tilted(self, m: Array, v: Array, e2: Array) -> tuple[Array, Array, Array]:
         """Log of the mass of every tilted law, and the site that goes with it."""

@@ -68,7 +68,7 @@ class CountStage:
         name: str,
         start: CountStart | None = None,
     ) -> None:
-        self.rate, self.step, self.lines, self.name = rate, signals.step, signals.lines, name
+        self.rate, self.step, self.name = rate, signals.step, name
         self.stretches = stretches
         self.start, self.offset = deepcopy(start), 0 if start is None else start.unwrapping.begin
         self.starts: dict[int, CountStart] = {}
@@ -95,9 +95,7 @@ class CountStage:
         """
         q, s = [], []
         for (begin, first, stop, end), counts, ahead in self._passed(lambda a, b: position[a:b]):
-            part, states, unknown = read_stretch(
-                counts, self.rate, self.lines, ahead.gaps.rest(counts)
-            )
+            part, states, unknown = read_stretch(counts, self.rate, None, ahead.gaps.rest(counts))
             self.said.update(dict.fromkeys(part.findings if part else ()))
             own = slice(first - begin, stop - begin)
             ahead.gaps.take(counts[own], unknown[own])

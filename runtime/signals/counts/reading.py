@@ -26,7 +26,7 @@ from runtime.signals.counts.lattice import (
     to_and_fro,
     unwrapped_counts,
 )
-from runtime.signals.counts.sites import Lines, SearchStart, Smoothed, smoothed
+from runtime.signals.counts.sites import SearchStart, Smoothed, smoothed
 
 Array = np.ndarray
 # By the first sample of a stretch, and the encoder, from 0.
@@ -146,7 +146,7 @@ def read_counts(
     rate: float,
     step: Array | Sequence[float] | float | None = None,
     *,
-    lines: Lines = "detected",
+    uneven: float | None = None,
     name: str = "record",
     starts: Starts | None = None,
 ) -> Reading:
@@ -160,10 +160,8 @@ def read_counts(
         Sampling rate.
     step : float or ndarray, shape (n,), rad or m, optional
         Step of the encoders; default: from the record.
-    lines : "detected", "estimated" or float
-        Lines at unequal distances: their deviation is detected, and bounds are widened by it; lines
-        are estimated with the motion; or their
-        deviation is known, steps.
+    uneven : float, optional, steps
+        Deviation of lines at unequal distances, by which bounds are widened; default: as detected.
     name : str
         What errors call the record.
     starts : mapping, optional
@@ -182,14 +180,14 @@ def read_counts(
         lattice; counts that jump.
     """
     known, counts, unwrapping = unwrapped_counts(position, step, name=name)
-    return _reading(counts, rate, known, lines, unwrapping.findings, starts or {})
+    return _reading(counts, rate, known, uneven, unwrapping.findings, starts or {})
 
 
 def _reading(
     counts: Array,
     rate: float,
     known: Lattice,
-    lines: Lines,
+    uneven: float | None,
     said: Sequence[str],
     starts: Starts,
 ) -> Reading:
@@ -199,7 +197,7 @@ def _reading(
     for begin, first, stop, end in stretches(N):
         kept = slice(first - begin, stop - begin)
         ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
-        part, read, left = read_stretch(counts[begin:end], rate, lines, gaps.rest(counts), ahead)
+        part, read, left = read_stretch(counts[begin:end], rate, uneven, gaps.rest(counts), ahead)
         unknown[first:stop] = left[kept]
         gaps.take(counts[first:stop], left[kept])
         for x, own in zip(states, read, strict=True):
@@ -223,7 +221,7 @@ def _reading(
 def read_stretch(
     counts: Array,
     rate: float,
-    lines: Lines,
+    uneven: float | None,
     rest: Array,
     starts: Mapping[int, SearchStart] | None = None,
 ) -> tuple[Part | None, list[Array], Array]:
@@ -241,7 +239,7 @@ def read_stretch(
     moving = np.flatnonzero(most > least)
     states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
     states[0][:] = np.where(np.isfinite(least), least, rest)
-    part = _moved(k, moving, states, rate, lines, starts or {}) if len(moving) else None
+    part = _moved(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
     missing = np.isnan(counts)
     unknown = missing & (states[3] > UNKNOWN)
     for j in np.flatnonzero(missing.any(axis=0)):
@@ -259,7 +257,7 @@ def _moved(
     moving: Array,
     states: Sequence[Array],
     rate: float,
-    lines: Lines,
+    uneven: float | None,
     starts: Mapping[int, SearchStart],
 ) -> Part:
     """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the
@@ -268,11 +266,11 @@ def _moved(
     N = k.shape[1]
     known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
     shaken = (
-        isinstance(lines, str)
+        uneven is None
         and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
     )
-    lines = ANYWHERE if shaken else lines
-    channels = tuple(smoothed(k[j], 1 / rate, lines=lines, start=starts.get(j)) for j in moving)
+    uneven = ANYWHERE if shaken else uneven
+    channels = tuple(smoothed(k[j], 1 / rate, uneven=uneven, start=starts.get(j)) for j in moving)
     part = Part(channels, 0, 0, N, moving)
     for order in range(3):
         for j, each in zip(moving, channels, strict=True):

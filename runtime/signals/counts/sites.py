@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,11 +32,9 @@ from runtime.signals.counts.boxes import (
     jerk_density,
     of_most_evidence,
 )
-from runtime.signals.counts.lines import estimated_lines
 from runtime.signals.counts.spline import Basis, Factor, next_density
 
 Array = np.ndarray
-Lines = Literal["detected", "estimated"] | float
 
 KNOTS, RESOLVED, FARTHEST = 2e-3, 0.1, 0.064
 """Least distance of knots, s, or of samples where that is larger; the distance in units of the time
@@ -119,12 +117,11 @@ class Smoothed:
 
 
 def smoothed(
-    counts: Array, Ts: float, *, lines: Lines = "detected", start: SearchStart | None = None
+    counts: Array, Ts: float, *, uneven: float | None = None, start: SearchStart | None = None
 ) -> Smoothed:
     """Posterior of the counts of one encoder, shape (N,); nan: a sample that is missing.
 
-    lines : whether errors of the lines are "detected", and bounds widened, or "estimated"; or their
-    deviation in steps, less than which is not taken.
+    uneven : deviation of the lines in steps, less than which is not taken; None: it is detected.
     start : what the same motion told at another phase; default: all is sought.
 
     InputError where no motion goes with the counts.
@@ -137,8 +134,8 @@ def smoothed(
     rest[known] = 0
     given = Counts(y, known, rest, Ts)
     sizes: tuple[float, ...] = COUNT_ERRORS
-    if not isinstance(lines, str):
-        sizes = (max(lines, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > lines))
+    if uneven is not None:
+        sizes = (max(uneven, COUNT_ERRORS[0]), *(x for x in COUNT_ERRORS if x > uneven))
     jumps = given.leaps()
     for leap in jumps:
         given = given.without(*leap)
@@ -151,15 +148,7 @@ def smoothed(
         f"counts jump by {by} at {at * Ts:.4g} s, as if some were lost; taken out"
         for at, by in jumps
     ]
-    if lines == "estimated" and read.errors.count > COUNT_ERRORS[0]:
-        of_lines = estimated_lines(
-            boxes.basis, boxes.y, known, boxes.rest, read.c, read.density, read.errors.count
-        )
-        boxes, errors = boxes.shifted(of_lines.of), replace(read.errors, count=of_lines.left)
-        read = boxes.again(errors, read)
-        said.append(of_lines.finding)
-    else:
-        said += _told(read.errors, sizes[0], len(boxes.sites))
+    said += _told(read.errors, sizes[0], len(boxes.sites))
     return Smoothed(boxes.basis, read, origin, "; ".join(said))
 
 
@@ -351,8 +340,7 @@ def _told(errors: Errors, least: float, sites: int) -> list[str]:
     if errors.count > least and sites > FEWEST:
         said.append(
             f"counts are off by {errors.count:g} steps (rms) beside their rounding, by uneven "
-            "lines or noise; bounds and stated deviations are widened, lines: estimated asks for "
-            "the places of the lines"
+            "lines or noise; bounds and stated deviations are widened"
         )
     if errors.time > CLOCK_ERRORS[0] and sites > FEWEST:
         said.append(
