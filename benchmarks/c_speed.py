@@ -27,8 +27,8 @@ import numpy as np
 from rounds import interleave, processor, ratio
 
 from runtime import load_model
-from runtime.model.compile_cache import FallbackWarning, compiler
-from runtime.model.compiled import compiled_model
+from runtime.compiled.cache import FallbackWarning, compiler
+from runtime.compiled.model import compiled_model
 from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files

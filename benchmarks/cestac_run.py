@@ -1,5 +1,5 @@
-"""One run of a resolution study: the plain pipeline, the NumPy path and the fused C path, and C on
-two workers against one.
+"""One run of a resolution study: the plain pipeline, the path of NumPy and that with the regressor
+in C, and two workers against one.
 
     python benchmarks/cestac_run.py [--rounds 7] [--runs 2000]
 
@@ -14,7 +14,7 @@ One process pinned to one core, one BLAS thread, CPU time, contenders in rotated
 round, ratios per round as median [range]. X of the
 three is compared before timing. Workers: processes, the one that asks among them, wall time of a
 whole study with its start, with the load of the
-machine. Goals: NumPy 10, C 60 times faster than plain; two workers 1.6 times faster than one.
+machine. Goal: two workers 1.6 times faster than one.
 """
 
 # ruff: noqa: E402 (the number of BLAS threads is set before numpy is loaded)
@@ -41,19 +41,15 @@ import scipy
 from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
+from runtime.compiled.cache import FallbackWarning, compiler
+from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
-from runtime.estimators.solution import solve
-from runtime.model.compile_cache import FallbackWarning, compiler
-from runtime.model.compiled import compiled_model
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
-from runtime.resolution.c import kernels
-from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.cestac import cestac, levels_of
 from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
-from runtime.resolution.rounding import packed_bits, stream
 from runtime.resolution.run import one_run
 from runtime.rows.observe import observe
 from runtime.rows.prepared import prepared
@@ -114,13 +110,13 @@ def measure(
         task_of(compiled_model(module), record, study, names),
     )
     part = task.records[0]
-    compiled = CompiledWorkspace(in_c, in_c.model)
+    columns, columns_in_c = task.columns, in_c.columns
     N, K = part.selection.samples.stop - part.selection.samples.start, len(part.selection.kept)
     print(f"\n{title}: {len(record.q)} samples, {N} of them used, {K} kept, {len(names)} columns")
     X = plain_run(task, KEY)
     for label, found in (
-        ("NumPy", one_run(task, KEY).X),
-        ("C", compiled.fit(task.levels[0], KEY).X),
+        ("NumPy", one_run(columns, task, KEY).X),
+        ("C", one_run(columns_in_c, in_c, KEY).X),
     ):
         print(
             f"    {label:6} largest difference from plain "
@@ -128,35 +124,14 @@ def measure(
         )
     contenders: dict[str, Callable[[], object]] = {
         "plain": lambda: plain_run(task, KEY),
-        "NumPy": lambda: one_run(task, KEY),
-        "C": lambda: compiled.fit(task.levels[0], KEY),
-        **stages(in_c, compiled),
+        "NumPy": lambda: one_run(columns, task, KEY),
+        "C": lambda: one_run(columns_in_c, in_c, KEY),
     }
     times = interleave(contenders, rounds)
     for name, row in times.items():
         print(f"    {name:24} {1e3 * statistics.median(row):8.2f} ms")
-    for below, goal in (("NumPy", 10), ("C", 60)):
-        print(f"    plain / {below:16} {ratio(times, 'plain', below)}   goal {goal}")
-
-
-def stages(task: Task, work: CompiledWorkspace) -> dict[str, Callable[[], object]]:
-    """The stages of a run in C, each on the arrays of the one before."""
-    (part, measured, room), chosen = work.records[0], task.records[0].selection
-    states = kernels.FilteredStates(measured, part.rate, chosen.signals, room)
-    arguments = chosen.samples, chosen.factor, chosen.signals.decimate, work.constants, room
-    y = kernels.decimated(work.entries, states, *arguments)
-
-    def draw_and_filter() -> kernels.FilteredStates:
-        up = packed_bits(part.q.size, stream(task.settings.seed, *KEY))
-        return kernels.FilteredStates(
-            measured, part.rate, chosen.signals, room, up=up, step=task.levels[0].delta
-        )
-
-    return {
-        "  C: draw, filters": draw_and_filter,
-        "  C: signals, decimation": lambda: kernels.decimated(work.entries, states, *arguments),
-        "  least squares": lambda: solve(work.entries.factor([(y, part.torque, chosen.mask)])),
-    }
+    for below in ("NumPy", "C"):
+        print(f"    plain / {below:16} {ratio(times, 'plain', below)}")
 
 
 def workers(model: GeneratedModel, record: Record, study: Study, runs: int, rounds: int) -> None:

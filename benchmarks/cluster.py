@@ -37,8 +37,8 @@ import numpy as np
 from c_speed import processor
 
 from runtime import Record, Study, load_model, observe
+from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
-from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records

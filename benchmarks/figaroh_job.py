@@ -44,10 +44,10 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
+from runtime.compiled.model import compiled_model
 from runtime.estimators.estimate import Estimate
 from runtime.files import read_bytes
 from runtime.loop.methods import estimate_of
-from runtime.model.compiled import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records

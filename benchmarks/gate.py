@@ -39,13 +39,12 @@ from cestac_run import KEY, plain_run, task_of
 from rounds import Clock, Times, interleave, user_time
 
 from runtime import identify, load_model
+from runtime.compiled.model import compiled_model, target_of
 from runtime.estimators.essential import essential_of
 from runtime.files import read_bytes
-from runtime.model.compiled import compiled_model, target_of
 from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
-from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.run import one_run
 from runtime.rows.observe import observe
 from runtime.settings.study import Study, study_from_mapping
@@ -165,6 +164,7 @@ def ratios(folder: Path) -> list[Ratio]:
     record = read_records(stepped.record, model)[0]
     names = essential_of(observe(model, record, stepped), stepped.essential, stepped.estimate).names
     task, in_c = (task_of(m, record, stepped, names) for m in (model, compiled))
+    columns = task.columns
 
     def timed(
         ours: Callable[[], object], peer: Callable[[], object], clock: Clock = time.process_time
@@ -198,7 +198,7 @@ def ratios(folder: Path) -> list[Ratio]:
         Ratio(
             "resolution run, essential columns, NumPy",
             "plain NumPy and SciPy",
-            timed(lambda: one_run(task, KEY), lambda: plain_run(task, KEY)),
+            timed(lambda: one_run(columns, task, KEY), lambda: plain_run(task, KEY)),
         ),
         *(
             Ratio(
@@ -232,7 +232,7 @@ def ratios(folder: Path) -> list[Ratio]:
         ),
     ]
     if target_of(compiled) == "c":
-        in_c_work = CompiledWorkspace(in_c, in_c.model)
+        columns_in_c = in_c.columns
         lines += [
             Ratio(
                 "C regressor, TX40, 7103 samples",
@@ -242,7 +242,7 @@ def ratios(folder: Path) -> list[Ratio]:
             Ratio(
                 "resolution run, essential columns, C",
                 "plain NumPy and SciPy",
-                timed(lambda: in_c_work.fit(in_c.levels[0], KEY), lambda: plain_run(task, KEY)),
+                timed(lambda: one_run(columns_in_c, in_c, KEY), lambda: plain_run(task, KEY)),
             ),
         ]
     return lines

@@ -36,12 +36,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from memory import BLOCK, identified, write_npz
 
-from runtime.model.compile_cache import FallbackWarning
-from runtime.model.compiled import compiled_model
+from runtime.compiled.cache import FallbackWarning
+from runtime.compiled.model import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
-from runtime.rows.regressor import decimated_signals, distinct_entries
+from runtime.rows.regressor import Columns
 from runtime.settings.study import CestacSettings, Decimate, Study
 from runtime.signals.filters import States, decimation_plan
 from symgen.description import load_robot, parse_robot
@@ -94,10 +94,11 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
         for N in samples:
             states = motion(N, len(model.JOINTS))
             found.setdefault(f"regressor, {label}", []).append((N, evaluation(model, states)))
-            entries = distinct_entries(model, {})
+            columns = Columns(model)
+            columns.entries  # noqa: B018 (found once)
             plan = decimation_plan(N, 40, Decimate(factor=40))
             found.setdefault(f"decimated signals, {label}", []).append(
-                (N, least(lambda: decimated_signals(model, entries, {}, plan, states)))  # noqa: B023
+                (N, least(lambda: columns.signals(states, plan)))  # noqa: B023
             )
     return found
 

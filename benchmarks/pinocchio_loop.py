@@ -56,8 +56,8 @@ import pinocchio as pin
 from oracles.pinocchio_model import PinocchioModel, placement
 from oracles.random_robots import random_state
 from runtime import load_model
-from runtime.model.compile_cache import FallbackWarning, compiler
-from runtime.model.compiled import compiled_model
+from runtime.compiled.cache import FallbackWarning, compiler
+from runtime.compiled.model import compiled_model
 from runtime.model.generated import GeneratedModel
 from symgen.description import load_robot
 from symgen.description.robot import PRISMATIC, Robot

@@ -29,10 +29,10 @@ import numpy as np
 from rounds import interleave, processor, ratio
 
 from runtime import load_model
+from runtime.compiled.cache import FallbackWarning, compiler
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import reference_of
 from runtime.loop.simulation import Simulator
-from runtime.model.compile_cache import FallbackWarning, compiler
 from runtime.settings.controller import Controller
 from runtime.settings.schema import structure
 

@@ -34,6 +34,7 @@ ROOMS = {
         "settings",
         "model",
         "records",
+        "compiled",
         "signals",
         "rows",
         "estimators",

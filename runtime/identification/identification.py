@@ -278,7 +278,6 @@ def assess(
     encoder: Sequence[float] = (),
     simulator: Simulator | None = None,
     variants: GeneratedModel | None = None,
-    runs: Callable[[], GeneratedModel] | None = None,
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
@@ -290,9 +289,6 @@ def assess(
     model, records, study, simulator, variants, provenance : as for `identify`
     encoder : sequence of float
         Steps of the encoders in use, rad or m; judged like every other check.
-    runs : function, optional
-        Gives the same model for the runs of the resolution study, such as one in C; asked for
-        records of LIMIT.LONG_RECORD samples and more. Default: `model`.
     progress : function of str
         Called with the name of each part before it is computed.
 
@@ -319,7 +315,7 @@ def assess(
         return replace(result, missing=(*result.missing, reason))
     missing = list(result.missing)
     if len(result.model.JOINTS) > len(model.JOINTS):  # with force sensors
-        model, runs = result.model, None
+        model = result.model
 
     def attempt(part: str, compute: Callable[[], T]) -> T | None:
         progress(part)
@@ -338,17 +334,12 @@ def assess(
         return replace(result, missing=tuple(missing))
     study, names = result.study, result.essential.names
     columns = names if study.cestac.columns == "essential" else None
-    sampled = (
-        runs()
-        if runs is not None and sum(len(own.record) for own in whole) >= LIMIT.LONG_RECORD
-        else model
-    )
     curves = attempt("friction", lambda: friction_curves(model, whole, study, result.estimate))
     advice = attempt(
         "resolution advice",
-        lambda: advise(sampled, whole, study, columns=names, asked=tuple(encoder)),
+        lambda: advise(model, whole, study, columns=names, asked=tuple(encoder)),
     )
-    resolution = attempt("resolution study", lambda: cestac(sampled, whole, study, columns=columns))
+    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns))
     return replace(
         result, friction=curves or (), advice=advice, resolution=resolution, missing=tuple(missing)
     )

@@ -25,16 +25,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from runtime.compiled.cache import (
+    FallbackWarning,
+    NotCompiledError,
+    shared_object,
+)
 from runtime.limits import LIMIT
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction
 from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
 from runtime.model.casadi import SymbolicModel
-from runtime.model.compile_cache import (
-    FallbackWarning,
-    NotCompiledError,
-    shared_object,
-)
 from runtime.model.loading import cache_folder
 
 Array = np.ndarray

@@ -1,3 +1,3 @@
-"""An emitted module at the border: loaded, checked, compiled; its drives, inertial parameters and
+"""An emitted module at the border: loaded and checked; its drives, inertial parameters and
 what is mounted on it.
 """

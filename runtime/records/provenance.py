@@ -4,7 +4,9 @@ measured.
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from runtime.records.record import Record
@@ -44,3 +46,18 @@ def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
         **{key: texts for key, texts in said.items() if texts},
         **note,
     }
+
+
+def processor() -> str:
+    """Machine and name of the processor, as far as the system tells: what results depend on in
+    their last bits.
+    """
+    name = cpuinfo("model name").partition(":")[2].strip() or platform.processor()
+    return f"{platform.machine()} {name}".strip()
+
+
+def cpuinfo(*starts: str) -> str:
+    """First line about the processor that starts so; empty where the system has none."""
+    info = Path("/proc/cpuinfo")
+    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
+    return next((line for line in text.splitlines() if line.startswith(starts)), "")

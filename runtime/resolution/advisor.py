@@ -43,7 +43,7 @@ from runtime.estimators.linear import assemble
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, joint_labels, joint_units
+from runtime.model.generated import GeneratedModel, joint_labels, joint_units, require_no_channels
 from runtime.records.provenance import origin
 from runtime.records.record import Record
 from runtime.resolution.advice import (
@@ -56,13 +56,11 @@ from runtime.resolution.advice import (
     confirmed,
     limits_of,
 )
-from runtime.resolution.c.workspace import usable
 from runtime.resolution.coarse_encoders import READERS, CoarseEncoders, Reader
 from runtime.resolution.perturbed import study_columns
 from runtime.resolution.readers import reader_advice
 from runtime.resolution.result import deciding_names
 from runtime.resolution.rounding import VARIANCE, Mode
-from runtime.resolution.run import forget
 from runtime.rows.observation import stack
 from runtime.rows.position_errors import Perturbation, perturbation, solution
 from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
@@ -135,7 +133,7 @@ def advise(
     Parameters
     ----------
     model : GeneratedModel
-        Emitted module, or the same in C (`runtime.model.compiled`).
+        Emitted module, or the same in C (`runtime.compiled.model`).
     records : Record, Prepared, or a sequence of them
     study : Study, optional
         Default: Study().
@@ -167,7 +165,8 @@ def advise(
     """
     several = records if isinstance(records, Sequence) else (records,)
     model, several, study, _ = with_wrench(model, several, study or Study())
-    study, model = resolved(study, several)[0], usable(model)
+    require_no_channels(model, "a study of encoders")
+    study = resolved(study, several)[0]
     study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
     as_measured = [prepared(model, record, study) for record in several]
     whole = [own.record for own in as_measured]
@@ -213,29 +212,26 @@ def advise(
     start = float(np.sqrt(LIMITS[0] / fastest)) if np.isfinite(fastest) and fastest > 0 else np.inf
     by_reader: list[ReaderAdvice] = []
     advices = []
-    try:
-        for reader in readers:
-            by_reader.append(
-                reader_advice(
-                    coarse("phase", reader),
-                    reference,
-                    selections,
-                    units,
-                    start,
-                    asked=asked,
-                    confirm=confirm,
-                    progress=advance,
-                )
+    for reader in readers:
+        by_reader.append(
+            reader_advice(
+                coarse("phase", reader),
+                reference,
+                selections,
+                units,
+                start,
+                asked=asked,
+                confirm=confirm,
+                progress=advance,
             )
-        runs = coarse(law, "lowpass") if confirm and law != "phase" else None
-        for label, own in selections.items() if law != "phase" else ():
-            advice = _advice(predictor, label, own, reference, units[label])
-            if runs is not None:
-                advice = confirmed(advice, reference, partial(runs.sampled, own))
-            advices.append(advice)
-            advance()
-    finally:
-        forget()
+        )
+    runs = coarse(law, "lowpass") if confirm and law != "phase" else None
+    for label, own in selections.items() if law != "phase" else ():
+        advice = _advice(predictor, label, own, reference, units[label])
+        if runs is not None:
+            advice = confirmed(advice, reference, partial(runs.sampled, own))
+        advices.append(advice)
+        advance()
     steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(
         len(asked), len(names)
     )

@@ -29,19 +29,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from runtime.compiled.model import target_of
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of, method_of
-from runtime.model.compile_cache import processor
-from runtime.model.compiled import target_of
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
+from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.parallel import results
 from runtime.records.law import require_found
-from runtime.records.provenance import origin
+from runtime.records.provenance import origin, processor
 from runtime.records.record import Record
-from runtime.resolution.c.workspace import usable
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.loop import Loop, loop_of, without_loop_options
 from runtime.resolution.perturbed import (
@@ -54,7 +52,7 @@ from runtime.resolution.perturbed import (
     with_deviation,
 )
 from runtime.resolution.result import Cestac, level_result
-from runtime.resolution.run import USABLE, forget, run_block
+from runtime.resolution.run import USABLE, run_block
 from runtime.resolution.runs import Level, Runs
 from runtime.rows.prepared import Prepared, common_drives, prepared, record_of, resolved
 from runtime.rows.wrench import with_wrench
@@ -88,7 +86,7 @@ def cestac(
     Parameters
     ----------
     model : GeneratedModel
-        Emitted module, or the same in C (`runtime.model.compiled`).
+        Emitted module, or the same in C (`runtime.compiled.model`).
     records : Record, Prepared, or a sequence of them
         One record of the robot, or several that are stacked.
     study : Study, optional
@@ -130,7 +128,8 @@ def cestac(
     model, several, study, _ = with_wrench(model, several, study or Study())
     study = resolved(study, several)[0]
     require_found(study.record, (record_of(one).measured for one in several))
-    settings, model = study.cestac, usable(model)
+    require_no_channels(model, "a study of encoders")
+    settings = study.cestac
     as_measured = [prepared(model, record, study) for record in several]
     drives = drives or common_drives(model, as_measured)
     if settings.side == "motor" and drives is None:
@@ -177,7 +176,10 @@ def cestac(
     )
     if method_of(study.estimate).position_error is not None:
         task = replace(task, errors=column_errors(model, as_measured, study, task.names))
-    measured, whole = perturbed(model, task, Level(0.0), ()), [own.record for own in as_measured]
+    measured, whole = (
+        perturbed(task.columns, task, Level(0.0), ()),
+        [own.record for own in as_measured],
+    )
     origins = {**origin(whole), **(provenance or {})}
     reference = estimate_of(
         *with_deviation(measured, task, Level(0.0)), model=model, provenance=origins
@@ -316,7 +318,6 @@ def _all_runs(
             if progress is not None:
                 progress(done, total)
     finally:  # also when Ctrl-C or an error ends the study
-        forget()
         if checkpoint is not None:
             checkpoint.flush()
     return Runs.joined(parts, b)

@@ -27,17 +27,14 @@ import numpy as np
 
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
-from runtime.model.compiled import CompiledSignals
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.missing import require_positions
 from runtime.resolution.advice import Sampled, sampled
-from runtime.resolution.c.workspace import CompiledWorkspace
 from runtime.resolution.perturbed import PreparedRecord, Task, prepared_record
 from runtime.resolution.rounding import Mode, counted, rounded, stream
-from runtime.resolution.run import plain, workspace
 from runtime.rows.observation import stack
-from runtime.rows.prepared import Prepared, observation_from_states
+from runtime.rows.prepared import Prepared, observation_of
 from runtime.rows.selection import certain_rows
 from runtime.settings.study import Study
 from runtime.signals.counts.reading import Starts, read_counts
@@ -120,11 +117,7 @@ class CoarseEncoders:
             drives,
             dict(constants),
         )
-        self.in_c = (
-            CompiledWorkspace(self.task, model)
-            if isinstance(model, CompiledSignals) and plain(self.task)
-            else None
-        )
+        self.columns = self.task.columns
         self.exact = [(part.states, part.record.selection.mask) for part in self.parts]
         self.reference = self._solved(self.exact)
 
@@ -278,17 +271,13 @@ class CoarseEncoders:
 
     def _solved(self, parts: Sequence[tuple[States, Array]]) -> Array:
         """X of the states of every record in these rows, bool, shape (n, K), of theirs."""
-        if self.in_c is not None:
-            return self.in_c.fit_of(parts).X
         rows = [
-            observation_from_states(
-                workspace(self.task)[0],
+            observation_of(
+                self.columns,
                 states,
                 record.torque,
                 replace(record.selection, mask=mask),
                 files=record.files,
-                columns=self.task.names,
-                constants=self.task.constants,
             )
             for (states, mask), record in zip(parts, self.task.records, strict=True)
         ]

@@ -30,7 +30,8 @@ from runtime.resolution.own_encoder import OwnEncoder, own_encoder
 from runtime.resolution.rounding import VARIANCE, rounded, stream
 from runtime.resolution.runs import Level
 from runtime.rows.observation import Observation, stack
-from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states
+from runtime.rows.prepared import Prepared, decimated_torque, observation_of
+from runtime.rows.regressor import Columns
 from runtime.rows.selection import Selection, select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
 from runtime.signals.filters import States, filtered_states
@@ -110,6 +111,11 @@ class Task:
     loop: Loop | None = None
     errors: Array | None = None
 
+    @property
+    def columns(self) -> Columns:
+        """Its columns of W, for some runs one after the other."""
+        return Columns(self.model, self.names, self.constants)
+
 
 def prepared_record(
     own: Prepared, study: Study, drives: Drives | None = None, part: LoopPart | None = None
@@ -148,7 +154,7 @@ def prepared_record(
         selection = select_rows(record, speeds, signals, study.rows)
         torque = decimated_torque(record.torque, selection)
     return PreparedRecord(
-        record.q,
+        np.asfortranarray(record.q),  # one signal after the other, as filters read them
         record.torque,
         record.rate,
         dict(record.files),
@@ -268,9 +274,7 @@ def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[
     )
 
 
-def perturbed(
-    model: GeneratedModel, task: Task, level: Level, draw: tuple[int, ...]
-) -> Observation:
+def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
     """The system with perturbed measurements; that of the measurements themselves at a level
     without steps.
     """
@@ -284,7 +288,7 @@ def perturbed(
     torques = [
         torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)
     ]
-    observation = system_of(model, task, positions, torques, level)
+    observation = system_of(columns, task, positions, torques, level)
     return observation if loop is None else loop.perturbed(observation, positions)
 
 
@@ -298,9 +302,7 @@ def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence
     return perturbed_position(q, level, task.settings, task.drives, key)
 
 
-def run_states(
-    model: GeneratedModel, task: Task, record: PreparedRecord, q: Array, level: Level
-) -> States:
+def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
     """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps
     of the level but not their phase.
     """
@@ -317,7 +319,7 @@ def run_states(
 
 
 def system_of(
-    model: GeneratedModel,
+    columns: Columns,
     task: Task,
     positions: Sequence[Array],
     torques: Sequence[Array],
@@ -329,14 +331,12 @@ def system_of(
     level : steps that the reader of counts is told; default: none, positions as they are.
     """
     observations = [
-        observation_from_states(
-            model,
-            run_states(model, task, record, q, level or Level(0.0)),
+        observation_of(
+            columns,
+            run_states(task, record, q, level or Level(0.0)),
             torque,
             record.selection,
             files=record.files,
-            columns=task.names,
-            constants=task.constants,
         )
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]

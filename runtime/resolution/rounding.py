@@ -100,7 +100,7 @@ def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """+1.0 or -1.0 with probability 1/2, one random bit each; columns are contiguous, as filters
     want them.
     """
-    return np.asarray(2.0 * np.ascontiguousarray(bits(shape, rng).T) - 1.0).T
+    return np.take([-1.0, 1.0], np.ascontiguousarray(bits(shape, rng).T)).T
 
 
 def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:

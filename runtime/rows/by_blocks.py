@@ -23,6 +23,7 @@ from runtime.records.stream import PieceReader, Stream
 from runtime.rows.observation import Observation
 from runtime.rows.pieces import Piece, chunks
 from runtime.rows.prepared import certain, decimated_rows, rows_of
+from runtime.rows.regressor import Columns
 from runtime.rows.segments import Cuts, Segment
 from runtime.rows.selection import selected
 from runtime.settings.study import Study
@@ -168,7 +169,7 @@ def piece_rows(
         own = states[samples]
         selection = selected(at, t[samples], own.qd, rate, study.signals, study.rows)
         torque = decimated_rows(tau[samples], selection)
-        part = rows_of(task.model, own, torque, selection, constants=task.constants)
+        part = rows_of(Columns(task.model, constants=task.constants), own, torque, selection)
         if task.cuts is not None:
             segments += part.cut(number, task.cuts[number], task.columns)
             first = selection.t[: max(SHOWN - at.number, 0)]

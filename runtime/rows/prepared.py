@@ -27,8 +27,8 @@ from runtime.model.generated import GeneratedModel, check_states, drives_of
 from runtime.records.missing import COUNTS, require_positions
 from runtime.records.record import JOINT_CHANNELS, Record
 from runtime.records.stream import PieceReader, Stream
-from runtime.rows.observation import Observation, column_numbers
-from runtime.rows.regressor import decimated_columns
+from runtime.rows.observation import Observation
+from runtime.rows.regressor import Columns
 from runtime.rows.selection import (
     Selection,
     certain_rows,
@@ -36,7 +36,7 @@ from runtime.rows.selection import (
     select_rows,
     window_of,
 )
-from runtime.settings.study import Rows, Signals, Study, to_mapping
+from runtime.settings.study import Study
 from runtime.signals.cutoff import EXCERPT, cutoff
 from runtime.signals.decimation import decimate
 from runtime.signals.filters import States, filtered_states, median_filtered
@@ -250,14 +250,27 @@ def observation_from_states(
     """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated
     before.
 
-    Where errors of the velocities are known, rows in which missing positions leave the state
-    unknown ("missing") or the direction of dry friction is
-    uncertain ("direction") are left out as well.
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
-    observation = rows_of(
-        model, states, torque, selection, files=files, columns=columns, constants=constants
-    )
+    wanted = Columns(model, columns, constants)
+    return observation_of(wanted, states, torque, selection, files=files)
+
+
+def observation_of(
+    columns: Columns,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+) -> Observation:
+    """The same by columns that many records share.
+
+    Where errors of the velocities are known, rows in which missing positions leave the state
+    unknown ("missing") or the direction of dry friction is uncertain ("direction") are left out as
+    well.
+    """
+    observation = rows_of(columns, states, torque, selection, files=files)
     if not any(observation.rows):
         left_out = nothing_left(observation.dropped, selection.mask.shape[1])
         raise InputError(left_out, file=", ".join(files or ()) or None)
@@ -265,16 +278,15 @@ def observation_from_states(
 
 
 def rows_of(
-    model: GeneratedModel,
+    columns: Columns,
     states: States,
     torque: Array,
     selection: Selection,
     *,
     files: Mapping[str, str] | None = None,
-    columns: Sequence[str] | None = None,
-    constants: Mapping[str, float] | None = None,
 ) -> Observation:
     """The same of a part of a record, which may be without rows."""
+    model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
     n, K = selection.mask.shape
     if torque.shape != (n, K) or len(model.JOINTS) != n:
@@ -282,25 +294,23 @@ def rows_of(
             f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected "
             f"{(n, K)} and {n} joints"
         )
-    names = tuple(model.BASE_PARAMETERS) if columns is None else tuple(columns)
-    numbers = column_numbers(names, model.BASE_PARAMETERS)
     window = states[selection.samples]
     used = np.flatnonzero(selection.mask.any(axis=0))
     inside = slice(used[0], used[-1] + 1) if len(used) else slice(0)
-    store = decimated_columns(model, window, selection.plan, constants or {}, numbers, inside)
-    selection = certain(model, states, selection, constants)
+    store = columns.decimated(window, selection.plan, inside)
+    selection = certain(model, states, selection, columns.constants)
     mask = selection.mask[:, inside].ravel()
-    rows = store.reshape(len(names), len(mask))
+    rows = store.reshape(len(columns.names), len(mask))
     return Observation(
         W=(rows if mask.all() else np.compress(mask, rows, axis=1)).T,
         Y=torque[:, inside].ravel()[mask],
         rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
-        names=names,
+        names=columns.names,
         t=np.tile(selection.t[inside], n)[mask],
         record=np.zeros(int(mask.sum()), dtype=int),
         rate=selection.rate,
         dropped=selection.dropped,
-        settings=settings_of(selection.signals, selection.rows, selection.factor),
+        settings=selection.settings,
         files=dict(files or {}),
         findings=states.findings,
     )
@@ -324,8 +334,3 @@ def certain(
         left_out = before.sum(axis=1) - after.sum(axis=1) + np.array(dropped.get(reason, 0))
         dropped[reason] = tuple(left_out.tolist())
     return replace(selection, mask=mask, dropped=dropped)
-
-
-def settings_of(signals: Signals, rows: Rows, factor: int) -> dict[str, Any]:
-    """Signals and rows, complete, with the factor that "auto" became."""
-    return {"signals": to_mapping(signals), "rows": to_mapping(rows), "factor": factor}

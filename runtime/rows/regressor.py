@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.model.compiled import CompiledSignals
 from runtime.model.generated import GeneratedModel, channels_of
+from runtime.rows.observation import column_numbers
 from runtime.signals.decimation import PIECE, Plan, decimated_pieces
 from runtime.signals.filters import States
 
@@ -33,8 +33,7 @@ class Entries:
     first met at entry source[s].
 
     row : row of each entry in the wanted store; row = k where every column is wanted.
-    place : row of each signal in what the model evaluates: its store, shape (b n, N), or the
-        signals of a compiled one.
+    place : row of each signal in the store, shape (b n, N).
     """
 
     row: Array
@@ -46,81 +45,80 @@ class Entries:
     place: Array
 
 
-def decimated_columns(
-    model: GeneratedModel,
-    states: States,
-    plan: Plan | None,
-    constants: Mapping[str, float],
-    columns: Sequence[int] | None = None,
-    instants: slice = slice(None),
-) -> Array:
-    """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of the
-    window.
+class Columns:
+    """Columns of W of one model; what does not change from record to record is made once.
 
-    plan : of the decimation; None keeps every sample.
-    columns : numbers of the columns wanted, in the order wanted; default: all b. Others are not
-    filtered.
-    instants : those of the K that are stored.
+    Parameters
+    ----------
+    model : GeneratedModel
+    names : sequence of str, optional
+        Base parameters of the columns wanted, in the order wanted; default: all b. Others are not
+        filtered.
+    constants : mapping, optional
+        Values in place of the robot file's.
     """
-    wanted = (
-        np.arange(len(model.BASE_PARAMETERS)) if columns is None else np.asarray(columns, dtype=int)
-    )
-    entries = distinct_entries(model, constants, wanted)
-    signals = decimated_signals(model, entries, constants, plan, states)[:, instants]
-    store = np.zeros((len(wanted), len(model.JOINTS), signals.shape[-1]))
-    store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
-    return store
 
+    def __init__(
+        self,
+        model: GeneratedModel,
+        names: Sequence[str] | None = None,
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
+        self.model = model
+        self.names = tuple(model.BASE_PARAMETERS) if names is None else tuple(names)
+        self.constants = dict(constants or {})
+        self._rooms: dict[int, tuple[Array, Array]] = {}
 
-def decimated_signals(
-    model: GeneratedModel,
-    entries: Entries,
-    constants: Mapping[str, float],
-    plan: Plan | None,
-    states: States,
-) -> Array:
-    """The distinct signals of the states (N, n) of the window, decimated, shape (S, K).
+    @cached_property
+    def entries(self) -> Entries:
+        """Where the distinct signals of these columns stand."""
+        numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
+        return distinct_entries(self.model, self.constants, numbers)
 
-    plan : None keeps every sample.
-    """
-    signals, N = partial(_signals, model, entries, constants, {}), len(states)
-    if plan is None:
-        blocks = [signals(states[t0 : t0 + PIECE]).copy() for t0 in range(0, N, PIECE)]
-        return np.concatenate(blocks, axis=1)
-    return decimated_pieces(lambda t0, t1: signals(states[t0:t1]), len(entries.source), plan)
+    def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
+        """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of
+        the window.
 
+        plan : of the decimation; None keeps every sample.
+        instants : those of the K that are stored.
+        """
+        signals = self.signals(states, plan)[:, instants]
+        entries = self.entries
+        store = np.zeros((len(self.names), len(self.model.JOINTS), signals.shape[-1]))
+        store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
+        return store
 
-def _signals(
-    model: GeneratedModel,
-    entries: Entries,
-    constants: Mapping[str, float],
-    room: dict[int, tuple[Array, Array]],
-    states: States,
-) -> Array:
-    """Distinct signals of the states (B, n), shape (S, B).
+    def signals(self, states: States, plan: Plan | None) -> Array:
+        """The distinct signals of the states (N, n) of the window, decimated, shape (S, K).
 
-    room : what the model evaluates and the signals, by B, which the next call uses again.
-    """
-    B, compiled = len(states), model if isinstance(model, CompiledSignals) else None
-    if B not in room:
-        values = model.store(B) if compiled is None else np.empty((compiled.signals.count, B))
-        room[B] = values, np.empty((len(entries.place), B))
-    values, signals = room[B]
-    if compiled is not None:  # without a store
-        compiled.signal_rows(states.q, states.qd, states.qdd, values, **constants)
-        if np.array_equal(entries.place, np.arange(len(values))):
-            return values
-    else:
-        timed = in_time(model, states)
+        plan : None keeps every sample.
+        """
+        N = len(states)
+        if plan is None:
+            pieces = [self._evaluated(states[t0 : t0 + PIECE]).copy() for t0 in range(0, N, PIECE)]
+            return np.concatenate(pieces, axis=1)
+        return decimated_pieces(
+            lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.source), plan
+        )
+
+    def _evaluated(self, states: States) -> Array:
+        """Distinct signals of the states (B, n), shape (S, B), until the next call."""
+        B = len(states)
+        if B not in self._rooms:
+            self._rooms[B] = self.model.store(B), np.empty((len(self.entries.place), B))
+        store, signals = self._rooms[B]
+        timed = in_time(self.model, states)
         try:
-            D = model.regressor(states.q, states.qd, states.qdd, out=values, **constants, **timed)
+            D = self.model.regressor(
+                states.q, states.qd, states.qdd, out=store, **self.constants, **timed
+            )
         except ValueError as e:  # what an emitted module of a general loop raises
             raise InputError(
-                f"{model.NAME}: {e}; look at units and zeros of the positions, and at the "
+                f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the "
                 "lengths of the robot file"
             ) from None
-        values = D.transpose(2, 1, 0).reshape(-1, B)
-    return np.take(values, entries.place, axis=0, out=signals, mode="clip")
+        rows = D.transpose(2, 1, 0).reshape(-1, B)
+        return np.take(rows, self.entries.place, axis=0, out=signals, mode="clip")
 
 
 def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
@@ -149,8 +147,6 @@ def distinct_entries(
     states are out of reach (loops that do not close), every entry stands for itself.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
-    if isinstance(model, CompiledSignals):
-        return _entries_in_c(model, columns)
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
     place = k * len(model.JOINTS) + j
@@ -164,24 +160,6 @@ def distinct_entries(
     )
     which = which.reshape(-1)
     return Entries(row, k, j, which, sign * sign[source][which], source, place[source])
-
-
-def _entries_in_c(model: CompiledSignals, columns: Array) -> Entries:
-    """The same of a compiled model, whose C file says which entries are equal."""
-    table = model.signals
-    order = np.argsort(columns)
-    place = np.searchsorted(columns[order], table.column).clip(max=len(columns) - 1)
-    wanted = np.flatnonzero(columns[order][place] == table.column)
-    _, source, which = np.unique(table.signal[wanted], return_index=True, return_inverse=True)
-    return Entries(
-        order[place[wanted]],
-        table.column[wanted],
-        table.row[wanted],
-        which.reshape(-1),
-        table.sign[wanted].astype(float),
-        source,
-        table.signal[wanted][source],
-    )
 
 
 def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:

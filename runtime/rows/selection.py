@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.rows.sign_errors import switches
-from runtime.settings.study import Rows, Signals
+from runtime.settings.study import Rows, Signals, to_mapping
 from runtime.signals.decimation import Plan
 from runtime.signals.filters import States, decimation_factor, decimation_plan, kept_samples
 
@@ -61,6 +63,12 @@ class Selection:
     signals: Signals
     rows: Rows
     dropped: Mapping[str, tuple[int, ...]]
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """Signals and rows, complete, with the factor that "auto" became."""
+        signals, rows = to_mapping(self.signals), to_mapping(self.rows)
+        return {"signals": signals, "rows": rows, "factor": self.factor}
 
     @property
     def plan(self) -> Plan | None:

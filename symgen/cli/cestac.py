@@ -80,11 +80,6 @@ def cestac(
         if study.cestac.place == "record":
             session.require_record(study, record[0])
         records = read_records(study.record, model, missing=study.signals.admits_missing)
-        model = (
-            session.model_of_runs(model, robot, exact=exact)
-            if advise and sum(map(len, records)) >= runtime.limits.LIMIT.LONG_RECORD
-            else model
-        )
         checkpoint = None if output is None or advise else Checkpoint(output)
         result: runtime.Cestac | runtime.Advice
         try:

@@ -77,8 +77,8 @@ def identify(
         Workers(workers) as processes,
     ):
         import runtime
-        from runtime.model.compile_cache import processor
-        from runtime.model.compiled import target_of
+        from runtime.compiled.model import target_of
+        from runtime.records.provenance import processor
         from runtime.records.reading_by_blocks import is_stream, records_or_streams
 
         model = session.model_of(robot, target, trust=trust, exact=exact, records=record)

@@ -4,7 +4,6 @@ page.
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -55,7 +54,6 @@ def report(
             study,
             encoder=asked if encoder else (),
             variants=session.variants_of(robot, exact=exact),
-            runs=partial(session.model_of_runs, model, robot, exact=exact),
             progress=session.say,
         )
         runtime.report(result, results)

@@ -216,27 +216,17 @@ def _source(robot: str, exact: bool) -> Path:
 
 
 def _in_c(model: GeneratedModel, robot: str, exact: bool) -> GeneratedModel:
-    """The model of a ROBOT argument with its functions in C."""
+    """The model of a ROBOT argument with its regressor in C."""
     import warnings
 
-    from runtime.model.compiled import compiled_model
-    from runtime.resolution.c.workspace import usable
+    from runtime.compiled.model import compiled_model
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        compiled = usable(compiled_model(model, source=_source(robot, exact)))
+        compiled = compiled_model(model, source=_source(robot, exact))
     for warning in caught:
         typer.echo(str(warning.message), err=True)
     return compiled
-
-
-def model_of_runs(model: GeneratedModel, robot: str, *, exact: bool = False) -> GeneratedModel:
-    """The model for the runs of a resolution study: with its signals in C where there is a
-    compiler.
-    """
-    from runtime.resolution.c import workspace
-
-    return workspace.model_of_runs(model, _source(robot, exact))
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:

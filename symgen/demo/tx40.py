@@ -24,10 +24,8 @@ from runtime import Cestac, Record, Study
 from runtime.errors import DataUnavailableError
 from runtime.loop.reference import point_to_point
 from runtime.records.datasets import dataset_study
-from runtime.resolution.c.workspace import model_of_runs
 from runtime.settings.controller import Points
 from runtime.settings.study import CestacSettings, study_from_mapping
-from symgen.certify.modules import c_file
 from symgen.demo import tx40_tables as chapter
 from symgen.demo.simulated_record import Prepared, simulated_record
 from symgen.demo.tx40_page import Demonstration
@@ -66,14 +64,13 @@ def demonstrate(
     result = runtime.identify(model, record, study, physical=True)
     names = result.essential.names
     progress("encoder of the record")
-    compiled = model_of_runs(model, c_file(DATASET))
     asked = (recorded_step(record),)
-    advice = runtime.advise(compiled, record, study, columns=names, asked=asked)
+    advice = runtime.advise(model, record, study, columns=names, asked=asked)
     result = replace(result, advice=advice)
 
     def resolution(**settings: Any) -> Cestac:
         other = changed(study, "cestac", **settings)
-        return runtime.cestac(compiled, record, other, columns=names)
+        return runtime.cestac(model, record, other, columns=names)
 
     progress("encoder resolution")
     main = resolution()

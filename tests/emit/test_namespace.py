@@ -19,7 +19,7 @@ import pytest
 from campaign import sampled, some
 
 from runtime import load_model
-from runtime.model.compiled import compiled_model
+from runtime.compiled.model import compiled_model
 from symgen.description import Robot, load_robot, parse_robot
 from symgen.description.naming import LAYOUT, check_families
 from symgen.emit.c_printer import RESERVED

@@ -10,7 +10,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 import warnings
 from pathlib import Path
 
@@ -18,15 +17,14 @@ import numpy as np
 import pytest
 
 from runtime import load_model
+from runtime.compiled.model import CompiledModel, FallbackWarning, compiled_model
 from runtime.errors import InputError
-from runtime.model.compiled import CompiledModel, FallbackWarning, compiled_model
 from runtime.model.generated import GeneratedModel
 from runtime.model.loading import cache_folder
-from runtime.resolution.c.kernels import SignalEntries
-from runtime.rows.regressor import decimated_columns
+from runtime.rows.regressor import Columns
 from runtime.settings.study import Decimate
 from runtime.signals.filters import States, decimation_plan
-from symgen.description import load_robot, parse_robot
+from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 
 NAME = "planar_2r"
@@ -143,134 +141,23 @@ def test_shapes_are_checked_before_c_reads(
     c, (q, qd, _) = in_c(model, warm), states(70)
     with pytest.raises(InputError, match="expected"):
         c.regressor(q, qd, wrong)
-    with pytest.raises(InputError, match="X has shape"):
-        c.gravity(q, np.zeros(3))
-
-
-OPPOSED = b"""
-symgen: 1
-name: opposed
-gravity: [0, -g, 0]
-constants: {D2: 0.5, g: 9.81}
-frames:
-  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
-  2: {ant: 1, sigma: 0, alpha: pi, d: D2, theta: q2, r: 0}
-elements:
-  OFFSET: {kind: offset, along: all}
-"""
-
-
-@needs_compiler
-def test_signals(tmp_path: Path) -> None:
-    """Each row once, whatever its sign: link 2 turns about opposite axes at its two joints, so its
-    rows are equal up to sign.
-    """
-    for name, text in generate_files(
-        parse_robot(OPPOSED, "opposed.yaml"), targets=("numpy", "c")
-    ).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    model = load_model("opposed", folder=tmp_path, trust=True)
-    c = in_c(model, tmp_path)
-    signals, constants = c.signals, np.array([*model.CONSTANTS.values()])
-    assert set(signals.sign) == {-1, 1} and signals.count < len(signals.row) == np.sum(
-        model.STRUCTURE
-    )
-    assert {
-        (model.BASE_PARAMETERS[k], j)
-        for k, j in zip(
-            signals.column[signals.constant], signals.row[signals.constant], strict=True
-        )
-    } == {
-        ("OFFSET1", 0),
-        ("OFFSET2", 1),
-    }
-    pointer, integer = ctypes.c_void_p, ctypes.c_int64
-    fill = ctypes.CFUNCTYPE(
-        ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer
-    )(signals.address)
-    for m in (0, 1, signals.tile, 3 * signals.tile + 5):
-        rows, U = (
-            np.random.default_rng(m).uniform(-2, 2, (3, 2, m + 3)),
-            np.full((signals.count, m + 2), np.nan),
-        )
-        addresses = [x.ctypes.data for x in (*rows, constants, U)]
-        assert fill(m, *addresses[:3], m + 3, *addresses[3:], m + 2) == 0
-        assert np.isnan(U[:, m:]).all()
-        S = model.store(m).view(np.ndarray)
-        S[:] = 0.0
-        S[signals.column, signals.row] = signals.sign[:, None] * U[signals.signal, :m]
-        states = [x[:, :m].T for x in rows]
-        np.testing.assert_allclose(
-            S.transpose(2, 1, 0), model.regressor(*states), rtol=1e-12, atol=1e-12
-        )
-        np.testing.assert_array_equal(S.transpose(2, 1, 0), c.regressor(*states))
-        assert (
-            fill(m, *addresses[:3], m + 3, *addresses[3:], m - 1) == 1
-            and fill(-1, *addresses[:3], 9, *addresses[3:], 9) == 1
-        )
-
-
-@needs_compiler
-def test_signals_alone(model: GeneratedModel, warm: Path, tmp_path: Path) -> None:
-    """Some signals: the bits of all of them; the rows of the others are left as they were."""
-    c = in_c(model, shutil.copytree(warm, tmp_path / "cache"))
-    wanted = list(range(0, c.signals.count, 3))
-    pointer, integer = ctypes.c_void_p, ctypes.c_int64
-    rows, constants = (
-        states(c.signals.tile).transpose(0, 2, 1).copy(),
-        np.array([*model.CONSTANTS.values()]),
-    )
-    results = []
-    for table in (c.signals, c.signals_alone(wanted)):
-        U = np.full((table.count, table.tile), np.nan)
-        fill = ctypes.CFUNCTYPE(
-            ctypes.c_int32, integer, pointer, pointer, pointer, integer, pointer, pointer, integer
-        )(table.address)
-        assert (
-            fill(
-                table.tile,
-                *(x.ctypes.data for x in rows),
-                table.tile,
-                constants.ctypes.data,
-                U.ctypes.data,
-                table.tile,
-            )
-            == 0
-        )
-        results.append(U)
-    every, some = results
-    assert (
-        np.array_equal(every[wanted], some[wanted])
-        and np.isnan(np.delete(some, wanted, axis=0)).all()
-    )
-    few = SignalEntries(c, model.BASE_PARAMETERS[-2:])  # what a study of two columns evaluates
-    assert len(few.wanted) < c.signals.count and few.table.address != c.signals.address
 
 
 @needs_compiler
 @pytest.mark.parametrize("changed", [False, True])
 def test_decimated_columns_of_both(model: GeneratedModel, warm: Path, changed: bool) -> None:
-    """W of signals that C gives without a store, all columns and some in another order, with the
+    """W by the regressor in C, all columns and some in another order, with the
     constants of the file and with one changed.
     """
     constants = {next(iter(model.CONSTANTS)): 0.7} if changed else {}
     given, c = States(*states(903)), in_c(model, warm)
-    for columns in (None, [3, 0, len(model.BASE_PARAMETERS) - 1]):
+    names = model.BASE_PARAMETERS
+    for columns in (None, [names[3], names[0], names[-1]]):
         for plan in (decimation_plan(903, 4, Decimate(factor=4)), None):
             found, expected = (
-                decimated_columns(m, given, plan, constants, columns) for m in (c, model)
+                Columns(m, columns, constants).decimated(given, plan) for m in (c, model)
             )
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-
-
-@needs_compiler
-def test_large_results_are_streamed(
-    model: GeneratedModel, warm: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    c, given = in_c(model, warm), states(203)
-    ordinary = c.regressor(*given).copy()
-    monkeypatch.setattr(c, "_large", 0)
-    assert np.array_equal(c.regressor(*given), ordinary)
 
 
 @needs_compiler
@@ -336,7 +223,7 @@ def test_two_processes_at_once(folder: Path, tmp_path: Path) -> None:
     code = (
         "import sys, warnings\nwarnings.simplefilter('error')\nfrom pathlib import Path\nfrom "
         "runtime import load_model\n"
-        "from runtime.model.compiled import compiled_model\n"
+        "from runtime.compiled.model import compiled_model\n"
         f"print(type(compiled_model(load_model('{NAME}', folder=Path(sys.argv[1]), trust=True))).__name__)"
     )
     environment = {**os.environ, "SYMGEN_CACHE": str(tmp_path / "new")}
@@ -439,7 +326,7 @@ FULL = """
 import resource, sys, warnings
 from pathlib import Path
 from runtime import load_model
-from runtime.model.compiled import compiled_model
+from runtime.compiled.model import compiled_model
 model = load_model("planar_2r", folder=Path(sys.argv[1]), trust=True)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
 with warnings.catch_warnings(record=True) as seen:
@@ -474,16 +361,6 @@ def test_a_full_disk(room: float, reason: str, folder: Path, tmp_path: Path) -> 
         and done.stdout.count("\n") == 1
     )
     assert list((tmp_path / "cache").iterdir()) == []
-
-
-@needs_compiler
-def test_what_a_killed_process_left_is_removed(model: GeneratedModel, tmp_path: Path) -> None:
-    for name, age in (("old", 1000.0), ("now", 0.0)):
-        (tmp_path / f".compiling-{name}").mkdir()
-        then = time.time() - age
-        os.utime(tmp_path / f".compiling-{name}", (then, then))
-    in_c(model, tmp_path)
-    assert {p.name for p in tmp_path.iterdir() if p.suffix != ".so"} == {".compiling-now"}
 
 
 def test_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ import runtime
 import runtime.rows.prepared
 from runtime import InputError
 from runtime.identification.identification import assess
-from runtime.limits import LIMIT
 from runtime.records.provenance import origin, record_names
 from runtime.records.record import Origin
 from runtime.records.stream import RecordStream
@@ -154,16 +153,6 @@ def test_records_of_one_name_stay_apart(model):
         replace(first, name="run", origin=Origin(time="a gap")),
     ]
     assert origin(stamped)["time"] == {"run": "uniform", "run (2)": "a gap"}
-
-
-@campaign
-@pytest.mark.parametrize("long", [0, 10**9])
-def test_long_records_are_sampled_by_the_model_of_runs(model, monkeypatch, long):
-    """That model is asked for once, and only then; what is sampled is the same."""
-    asked = []
-    monkeypatch.setattr(LIMIT, "LONG_RECORD", long)
-    result = assess(model, measured(model, 5), STUDY, runs=lambda: asked.append(1) or model)
-    assert len(asked) == (long == 0) and result.advice is not None and result.resolution is not None
 
 
 @campaign

@@ -24,8 +24,7 @@ from runtime.rows.factor import factor
 from runtime.rows.observation import stack
 from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.regressor import (
-    decimated_columns,
-    decimated_signals,
+    Columns,
     distinct_entries,
 )
 from runtime.rows.selection import select_rows
@@ -102,7 +101,7 @@ def test_equal_signals_are_filtered_once():
     assert len(entries.k) == planar.STRUCTURE.sum() == 13
     assert len(entries.source) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
-    signals = decimated_signals(planar, entries, {}, None, states)
+    signals = Columns(planar).signals(states, None)
     D = planar.regressor(states.q, states.qd, states.qdd)
     for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
         np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
@@ -125,7 +124,7 @@ def test_opposite_and_constant_signals():
     entries = distinct_entries(model, {})
     assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
     qd = np.random.default_rng(0).normal(size=(300, 2))
-    columns = decimated_columns(model, States(qd, qd, qd), decimation_plan(300, 2, Decimate()), {})
+    columns = Columns(model).decimated(States(qd, qd, qd), decimation_plan(300, 2, Decimate()))
     np.testing.assert_array_equal(columns[0, 1], -columns[0, 0])
     np.testing.assert_array_equal(columns[1, 0], columns[2, 1])
     np.testing.assert_allclose(columns[3, 0], decimated(np.sign(qd[:, 0]), 2, Decimate()))
@@ -185,7 +184,7 @@ def test_blocks_equal_the_whole(record):
     states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
     np.testing.assert_array_equal(
-        decimated_signals(planar, entries, {}, None, states),
+        Columns(planar).signals(states, None),
         D[entries.k[entries.source], entries.j[entries.source]],
     )
 

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 import symgen
 from runtime import load_model
+from runtime.compiled.cache import FallbackWarning
+from runtime.compiled.model import compiled_model
 from runtime.errors import ModelError
 from runtime.model.casadi import load_symbolic
-from runtime.model.compile_cache import FallbackWarning
-from runtime.model.compiled import compiled_model
 from symgen.cli.main import app
 
 EMITTED = Path(__file__).parents[2] / "generated"

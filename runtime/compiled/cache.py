@@ -16,13 +16,13 @@ import platform
 import shlex
 import shutil
 import subprocess
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from runtime.limits import LIMIT
 from runtime.model.loading import is_writable_by_all
+from runtime.records.provenance import cpuinfo
 
 FLAGS = (
     "-std=c11",
@@ -35,18 +35,8 @@ FLAGS = (
     "-fPIC",
 )
 LIBRARIES = ("-lm",)
-WIDTHS = {
-    "avx512f": 8,
-    "avx2": 4,
-}  # of vectors on x86-64, widest first, and how many doubles they hold
-VECTOR_SINES = "-fveclib=libmvec"
-# of gcc: half of its time here without these; nothing that it emits is slower, and the bits are the
-# same
-QUICK = (
-    "--param=max-combine-insns=2",  # instructions merged by pairs, not by threes and fours
-    "-fno-gcse",
-    "--param=lra-max-considered-reload-pseudos=5",  # rounds of spilling on code of one long block
-)
+WIDTHS = {"avx512f": 8, "avx2": 4}
+"""Vectors on x86-64, widest first, and how many doubles they hold."""
 UNSAFE = (
     "-ffast-math",
     "-Ofast",
@@ -99,7 +89,7 @@ def shared_object(
         version.encode(),
         (
             f"{platform.system()} {platform.machine()} {platform.architecture()[0]} "
-            f"{_cpuinfo('flags', 'Features')}"
+            f"{cpuinfo('flags', 'Features')}"
         ).encode(),  # what the code may depend on
     )
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
@@ -133,24 +123,12 @@ def _cached(folder: Path, key: str, opened: Callable[[Path], ctypes.CDLL]) -> ct
 def _compiled(
     command: Sequence[str], flags: Sequence[str], path: Path, text: bytes, folder: Path, key: str
 ) -> Path:
-    for left in folder.glob(".compiling-*"):  # by a process that was killed
-        if time.time() - left.stat().st_mtime > 2 * LIMIT.COMPILE_TIME:
-            shutil.rmtree(left, ignore_errors=True)
     with TemporaryDirectory(dir=folder, prefix=".compiling-") as scratch:
         source, target = Path(scratch) / path.name, Path(scratch) / f"{path.stem}.so"
         source.write_bytes(text)
         try:
-            line = [
-                *command,
-                *flags,
-                *_own_options(command),
-                source.name,
-                "-o",
-                target.name,
-                *LIBRARIES,
-            ]
             done = subprocess.run(
-                line,
+                [*command, *flags, source.name, "-o", target.name, *LIBRARIES],
                 cwd=scratch,
                 capture_output=True,
                 text=True,
@@ -174,31 +152,9 @@ def _width() -> tuple[str, ...]:
     """
     if platform.machine().lower() not in ("x86_64", "amd64"):
         return ()
-    known = _cpuinfo("flags").split()
+    known = cpuinfo("flags").split()
     width = next((width for width in WIDTHS if width in known), "sse2")
     return f'-DWIDTH="{width}"', f"-DDOUBLES={WIDTHS.get(width, 2)}"
-
-
-def _own_options(command: Sequence[str]) -> tuple[str, ...]:
-    """Options of gcc, and of clang that of the vector functions of glibc, where it knows it; gcc
-    has a declaration in the C file.
-    """
-    predefined = _predefined(command)
-    if b"__clang__" not in predefined:
-        return QUICK if b"__GNUC__" in predefined else ()
-    glibc = platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
-    return (VECTOR_SINES,) if glibc and _predefined([*command, VECTOR_SINES]) else ()
-
-
-def _predefined(command: Sequence[str]) -> bytes:
-    """Macros that a compiler defines; nothing where it refuses an option."""
-    done = subprocess.run(
-        [*command, "-dM", "-E", "-x", "c", os.devnull],
-        capture_output=True,
-        timeout=LIMIT.COMPILE_TIME,
-        check=False,
-    )
-    return b"" if done.returncode else done.stdout
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
@@ -231,20 +187,3 @@ def compiler() -> tuple[tuple[str, ...], str]:
     except (OSError, subprocess.TimeoutExpired) as e:
         raise NotCompiledError(f"{program} did not run: {e}") from e
     return command, done.stdout
-
-
-def processor() -> str:
-    """Machine and name of the processor, as far as the system tells: what results depend on in
-    their last bits.
-    """
-    return (
-        f"{platform.machine()} "
-        f"{_cpuinfo('model name').partition(':')[2].strip() or platform.processor()}"
-    ).strip()
-
-
-def _cpuinfo(*starts: str) -> str:
-    """First line about the processor that starts so; empty where the system has none."""
-    info = Path("/proc/cpuinfo")
-    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
-    return next((line for line in text.splitlines() if line.startswith(starts)), "")

@@ -1,1 +1,0 @@
-"""The kernels of resolution studies in C, checked against NumPy before they are used."""
