@@ -1,12 +1,13 @@
 """What is to be found of the law whose torque stands for a measured one: `controller.law` with
 kd: fit, delay: fit.
 
-    W X = tau_0(t - delay) + kd v(t - delay),       v = qd_ref - qd, tau_0 the law without kd
-        = Y_0 + kd V - (delay - d) d/dt(Y_0 + kd V)            at the last delay d
+    W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
+        = Y + (kd - k) V - (delay - d) d/dt Y          at the last kd k and delay d; V is v where the drive does not cut, else zero
 
 Least squares of X, kd of every joint and one delay together, weighted by joint; deviations are
-those of blocks of time. Where qd_ref does not move, V is the column of FV and their sum alone is
-known.
+those of blocks of time. Where the drive cuts, the law is not linear in kd: passes begin at several
+kd, a step that raises the misfit is halved, and the kd of smallest misfit is taken. Where qd_ref
+does not move and the drive does not cut, V is the column of FV and their sum alone is known.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.records.law import late
+from runtime.records.law import late, torque_law
 from runtime.records.record import Record
 from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
@@ -75,11 +76,14 @@ def completed(
         return tuple(fitted), list(further), None
     who = "controller.law: fit needs"
     own, others = in_memory(fitted, who), in_memory(further, who)
-    found = law_estimate(model, own, study, asked[0])
+    settings = next(r.controller for r in study.record if r.by_law and r.controller is not None)
+    saturation = torque_law(settings, own[0].record.n, model.LIMITS).saturation
+    found = law_estimate(model, own, study, asked[0], saturation)
+    bound = np.where(np.isfinite(found.kd) | (asked[0].kd != "fit"), saturation, np.inf)
 
     def whole(record: Record) -> Record:
         others = {key: x for key, x in record.channels.items() if key != "law_v"}
-        tau = _torque(record, np.nan_to_num(found.kd), found.delay)
+        tau = torque_of(record, np.nan_to_num(found.kd), found.delay, bound)
         return replace(record, tau=tau, channels=others)
 
     changed = tuple(replace(one, record=whole(one.record)) for one in own)
@@ -96,7 +100,8 @@ def gain_doubt(
     laws = [r.controller.law for r in study.record if r.controller is not None]
     if error < LIMIT.LAW_DOUBT or len(own) < len(records) or not laws or laws[0].kd == "fit":
         return ""
-    found = law_estimate(model, own, study, Law(kp=laws[0].kp, kd="fit"))
+    uncut = np.full(own[0].record.n, np.inf)
+    found = law_estimate(model, own, study, Law(kp=laws[0].kp, kd="fit"), uncut)
     if not found.error < error / 2:
         return ""
     stated = laws[0].gains(own[0].record.n)["Vm"]
@@ -112,22 +117,31 @@ def gain_doubt(
 
 
 def law_estimate(
-    model: GeneratedModel, own: Sequence[Prepared], study: Study, law: Law
+    model: GeneratedModel, own: Sequence[Prepared], study: Study, law: Law, saturation: Array
 ) -> LawEstimate:
-    """kd of every joint and the delay, as far as `law` asks for them."""
-    n, labels = own[0].record.n, joint_labels(model)
-    gains = [f"KD{j}" for j in labels] if law.kd == "fit" else []
-    kd, delay, rows = np.zeros(n), 0.0, observe(model, own, study)
-    for _ in range(LIMIT.LAW_PASSES):
-        fit = _fit(model, own, rows, gains, law.delay == "fit", kd, delay)
-        value = dict(zip(fit.names, fit.X, strict=True))
-        kd = np.array([value.get(name, 0.0) for name in gains] or kd)
-        delay = delay + value.get("delay", 0.0)
-        unknown = [name for name in gains if name in value and not _apart(fit, name)]
-        gains = [name for name in gains if name not in unknown]
-        kd = np.array(
-            [0.0 if f"KD{j}" not in gains else x for j, x in zip(labels, kd, strict=True)]
-        )
+    """kd of every joint and the delay, as far as `law` asks for them.
+
+    saturation : ndarray, shape (n,), N m or N
+        Largest torque of the drives; inf where they do not cut.
+    """
+    n = own[0].record.n
+    labels = joint_labels(model)
+    rows = observe(model, own, study)
+    records = TorquesOfLaw(model, own, rows, saturation)
+    asked = [f"KD{j}" for j in labels] if law.kd == "fit" else []
+    cuts = bool(asked) and bool(np.isfinite(saturation).any())
+    starts = LIMIT.LAW_STARTS if cuts else (0.0,)
+    stiffness = law.gains(n)["P"]
+    found = [_searched(records, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
+    kd, delay, _ = min(found, key=lambda each: each[2])
+    fit = records.fit(asked, law.delay == "fit", kd, delay)
+    gains = [name for name in asked if name in fit.names and _apart(fit, name)]
+    if len(gains) < len(asked):  # FV is the sum of both: without a cut the share of kd is zero
+        lost = np.array([f"KD{j}" not in gains for j in labels])
+        records = replace(records, saturation=np.where(lost, np.inf, saturation))
+        start = np.where(lost, 0.0, kd)
+        kd, delay, _ = _searched(records, gains, law.delay == "fit", start, cuts)
+        fit = records.fit(gains, law.delay == "fit", kd, delay)
     sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
     sigmas = np.array([sigma.get(f"KD{j}", np.nan) for j in labels])
     kd = np.where(np.isfinite(sigmas), kd, np.nan)
@@ -136,37 +150,97 @@ def law_estimate(
     return LawEstimate(tuple(labels), kd, sigmas, late_by[0], late_by[1], text, fit.relative_error)
 
 
-def _fit(
-    model: GeneratedModel,
-    own: Sequence[Prepared],
-    rows: Observation,
-    gains: Sequence[str],
-    late_too: bool,
-    kd: Array,
-    delay: float,
-) -> Estimate:
-    """X beside kd and the step of the delay."""
-    records = [one.record for one in own]
-    shifted = [_torque(record, np.zeros_like(kd), delay) for record in records]
-    Y = with_torques(rows, own, shifted)
-    columns: dict[str, Array] = {}
-    if gains:
-        V = with_torques(rows, own, [late(r.t, r.channels["law_v"], delay) for r in records]).Y
-        labels = [f"KD{j}" for j in joint_labels(model)]
-        columns = {k: -V * (rows.joints == labels.index(k)) for k in gains}
-    if late_too:
-        whole = [_torque(record, kd, delay) for record in records]
-        rates = [np.gradient(x, 1 / r.rate, axis=0) for x, r in zip(whole, records, strict=True)]
-        columns["delay"] = with_torques(rows, own, rates).Y
-    W = np.column_stack([rows.W, *columns.values()])
-    wide = replace(Y, W=W, names=(*rows.names, *columns), errors=None)
-    return estimate_of(wide, EstimateSettings("wls", "joint"), model=model)
+def _searched(
+    records: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
+) -> tuple[Array, float, float]:
+    """kd, the delay and the misfit where passes from `kd` end. cuts : the law is not linear in kd."""
+    labels = [f"KD{j}" for j in joint_labels(records.model)]
+    delay = 0.0
+    misfit = records.misfit(kd, delay) if cuts else np.nan
+    for _ in range(LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES):
+        fit = records.fit(gains, late_too, kd, delay)
+        step = {name: x for name, x in zip(fit.names, fit.X, strict=True) if np.isfinite(x)}
+        by_kd = np.array([step.get(name, 0.0) for name in labels])
+        by_delay = step.get("delay", 0.0)
+        if not cuts:
+            kd = kd + by_kd
+            delay = delay + by_delay
+            continue
+        share = 1.0
+        after = records.misfit(kd + by_kd, delay + by_delay)
+        while after > misfit and share > LIMIT.LAW_LEAST_STEP:
+            share /= 2
+            after = records.misfit(kd + share * by_kd, delay + share * by_delay)
+        if not after < misfit:
+            break
+        kd = kd + share * by_kd
+        delay = delay + share * by_delay
+        misfit = after
+    return kd, delay, misfit
 
 
-def _torque(record: Record, kd: Array, delay: float) -> Array:
-    """Torque of the law of a record with these gains, late by `delay`."""
+@dataclass(frozen=True, eq=False)
+class TorquesOfLaw:
+    """Records whose torque is the law, with the rows of their regressor.
+
+    Attributes
+    ----------
+    model : GeneratedModel
+    own : sequence of Prepared
+        With the torque of the law without kd, and the channel law_v.
+    rows : Observation
+        W of these records.
+    saturation : ndarray, shape (n,), N m or N
+        Largest torque of the drives; inf where they do not cut.
+    """
+
+    model: GeneratedModel
+    own: Sequence[Prepared]
+    rows: Observation
+    saturation: Array
+
+    def torques(self, kd: Array, delay: float) -> list[Array]:
+        """Torques of the records with these gains, shape (N, n) each."""
+        return [torque_of(one.record, kd, delay, self.saturation) for one in self.own]
+
+    def slopes(self, kd: Array, delay: float) -> list[Array]:
+        """Derivatives of the torques by kd: v where the drives do not cut."""
+        found = []
+        for one in self.own:
+            v = one.record.channels["law_v"]
+            cut = np.abs(one.record.tau + kd * v) > self.saturation
+            found.append(late(one.record.t, np.where(cut, 0.0, v), delay))
+        return found
+
+    def fit(self, gains: Sequence[str], late_too: bool, kd: Array, delay: float) -> Estimate:
+        """X beside the steps of kd and of the delay."""
+        torques = self.torques(kd, delay)
+        Y = with_torques(self.rows, self.own, torques)
+        columns: dict[str, Array] = {}
+        if gains:
+            V = with_torques(self.rows, self.own, self.slopes(kd, delay)).Y
+            labels = [f"KD{j}" for j in joint_labels(self.model)]
+            columns = {k: -V * (self.rows.joints == labels.index(k)) for k in gains}
+        if late_too:
+            records = [one.record for one in self.own]
+            rates = [
+                np.gradient(x, 1 / r.rate, axis=0) for x, r in zip(torques, records, strict=True)
+            ]
+            columns["delay"] = with_torques(self.rows, self.own, rates).Y
+        W = np.column_stack([self.rows.W, *columns.values()])
+        wide = replace(Y, W=W, names=(*self.rows.names, *columns), errors=None)
+        return estimate_of(wide, EstimateSettings("wls", "joint"), model=self.model)
+
+    def misfit(self, kd: Array, delay: float) -> float:
+        """sum_j N_j log ||Y_j - W_j X||, X by least squares weighted by joint."""
+        fit = self.fit((), False, kd, delay)
+        return float(sum(one.rows * np.log(one.residual_norm) for one in fit.per_joint if one.rows))
+
+
+def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Array:
+    """Torque of the law of a record with these gains, late by `delay`, shape (N, n)."""
     tau = record.tau + kd * record.channels["law_v"] if np.any(kd) else record.tau
-    return late(record.t, tau, np.nan_to_num(delay))
+    return late(record.t, np.clip(tau, -saturation, saturation), np.nan_to_num(delay))
 
 
 def _apart(fit: Estimate, name: str) -> bool:

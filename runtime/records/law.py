@@ -4,8 +4,8 @@ reference and the gains alone.
     tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
 
 P, Vr, Vm of `runtime.settings.controller.Law`, joint side, SI; qd as recorded, else differences
-q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is clipped; kd
-is found with the parameters (`runtime.identification.torque_law`).
+q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is cut yet: kd
+is found with the parameters, under the saturation (`runtime.identification.torque_law`).
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ class TorqueLaw:
         if np.any(self.Vr) or np.any(self.Vm):
             qd = velocity(q, channels, rate, before) if np.any(self.Vm) else 0.0
             tau = tau + self.Vr * channels.get("qd_ref", 0.0) - self.Vm * qd
-        return np.asarray(np.clip(tau, -self.saturation, self.saturation))
+        bound = np.inf if self.fit else self.saturation
+        return np.asarray(np.clip(tau, -bound, bound))
 
 
 def velocity(
@@ -129,5 +130,4 @@ def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any])
         )
     saturation = np.broadcast_to(bound, (n,)).copy()
     fit, delay = law.kd == "fit", 0.0 if law.delay == "fit" else float(law.delay)
-    bound = np.full(n, np.inf) if fit else saturation
-    return TorqueLaw(gains["P"], gains["Vr"], gains["Vm"], bound, fit, delay)
+    return TorqueLaw(gains["P"], gains["Vr"], gains["Vm"], saturation, fit, delay)

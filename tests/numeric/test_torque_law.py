@@ -35,14 +35,16 @@ def reference(t):
 
 
 @cache
-def simulated(feed=0.0, moving=True):
+def simulated(feed=0.0, moving=True, cut=(np.inf, np.inf)):
     """t, q, qd, q_ref, qd_ref, tau_ff of the arm under its law, integrated by scipy; the inertia
-    matrix from the rows of unit accelerations. moving : whether the law follows qd_ref.
+    matrix from the rows of unit accelerations. moving : whether the law follows qd_ref. cut : the
+    largest torques of the drives.
     """
 
     def torque(t, x):
         q_r, qd_r = reference(t)
-        return KP * (q_r - x[:2]) + KD * ((qd_r if moving else 0) - x[2:]) + feed * np.sin(3 * t)
+        law = KP * (q_r - x[:2]) + KD * ((qd_r if moving else 0) - x[2:]) + feed * np.sin(3 * t)
+        return np.clip(law, -np.array(cut), cut)
 
     def rate(t, x):
         D = planar.regressor(
@@ -211,6 +213,31 @@ def test_kd_beside_a_reference_at_rest_is_told(tmp_path):
     assert "kd and FV of joint 1, 2 cannot be told apart" in result.brief()
     viscous = [result.estimate["FV1"], result.estimate["FV2"]]
     np.testing.assert_allclose(viscous, GAIN + TRUE[[3, 8]], rtol=0.02)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
+    """Drives that cut a tenth of the samples: the torque of the record stays within the limit, kd is
+    that of the loop, even where the reference velocity does not move, and the error that of the
+    stated kd. Without the saturation the record said twice the torque.
+    """
+    cut = (53.2, 15.7) if moving else (51.4, 15.2)  # N m, 0.9 quantiles of the uncut torque
+    log = simulated(moving=moving, cut=cut)
+    errors = {}
+    for kd in (KD.tolist(), "fit"):
+        study = written(
+            tmp_path,
+            log,
+            controller={"law": {"kp": KP.tolist(), "kd": kd}, "torque": {"saturation": list(cut)}},
+            signals={"median": 1, "torque_median": 1, "lowpass": {"cutoff": 40}},
+        )
+        result = identified(study)
+        errors[str(kd)] = result.estimate.relative_error
+        assert 0.05 < (np.abs(result.records[0].tau) > 0.999 * np.array(cut)).mean() < 0.4
+        assert np.abs(result.records[0].tau).max(axis=0) == pytest.approx(cut)
+    found = result.estimate.provenance["law"]
+    np.testing.assert_allclose(found["kd"], KD, rtol=1e-3)
+    assert errors["fit"] == pytest.approx(errors[str(KD.tolist())], rel=0.02)
 
 
 def test_a_law_to_be_found_needs_the_whole_record(tmp_path):
