@@ -1,7 +1,7 @@
 """Every estimator against Delta on simulated records of known truth: the encoder inside the loop,
 and recorded positions alone rounded.
 
-    python benchmarks/cestac_estimators.py [--runs 5] [--cloe 2] [-o docs]
+    python benchmarks/cestac_estimators.py [--runs 5] [-o docs]
 
 Everything goes through the verb: `symgen cestac ROBOT study.yaml --json`, with `cestac: {place:
 loop, rounding: phase}`, or `place: record` on a record
@@ -56,12 +56,10 @@ def study_of(robot: str, method: str, place: str, runs: int) -> dict[str, Any]:
     signs = np.sign(np.random.default_rng(1).uniform(-1, 1, len(b.truth)))
     start = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + AWAY * signs)).tolist(), strict=True))
     options: dict[str, Any] = (
-        {"around": AROUND[robot]} if place == "loop" or method in ("iv", "didim", "cloe") else {}
+        {"around": AROUND[robot]} if place == "loop" or method in ("iv", "didim") else {}
     )
     if method in ("iv", "didim"):
         options |= {"start": start, "gains": "one"}
-    if method == "cloe":
-        options |= {"start": "values"}
     mapping = to_mapping(b.study)
     cestac = {
         "columns": "all",
@@ -127,7 +125,6 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--cloe", type=int, default=2, help="runs of output error, on the EMPS")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     given = parser.parse_args()
     folder = Path("cestac_estimators_runs")
@@ -137,13 +134,11 @@ def main() -> None:
     for (above, below), robot in zip(figure.subplots(2, 2, sharex="col").T, STEPS, strict=True):
         kept = determined(robot)
         truth = bench(robot).truth
-        for k, method in enumerate((*METHODS, *(("cloe",) if robot == "emps" else ()))):
+        for k, method in enumerate(METHODS):
             for place, style in (("loop", "-"), ("record", "--")):
                 if place == "record" and method not in RECORDED:
                     continue
-                found = answer(
-                    folder, robot, method, place, given.cloe if method == "cloe" else given.runs
-                )
+                found = answer(folder, robot, method, place, given.runs)
                 label = method.upper() + (", recorded positions alone" if place == "record" else "")
                 for axes, what, e in (
                     (above, "truth", errors(found, truth, kept)),

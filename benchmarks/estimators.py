@@ -1,7 +1,7 @@
 """Every estimator on simulated records with known truth, the encoder inside the loop: bias and
 scatter against stated sigma.
 
-    python benchmarks/estimators.py [--records 100] [--cloe 10] [--workers 2] [-o docs]
+    python benchmarks/estimators.py [--records 100] [--workers 2] [-o docs]
 
 Each record has its own seed: torque noise on the record, and a disturbance of the arm that nobody
 records. Estimates are kept in
@@ -48,8 +48,6 @@ from runtime.parallel import results
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.position_errors import with_errors
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
 
@@ -60,7 +58,7 @@ from haptic_motion import RATE, motion
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 
-METHODS = ("ols", "wls", "irls", "tls", "iv", "didim")
+METHODS = ("ols", "wls", "irls", "iv", "didim")
 # of the damping, its square of the stiffness of the BIRDy gains, which shake the arm where the
 # encoder is coarse
 SOFTER = 0.4
@@ -171,14 +169,12 @@ def made(key: Key) -> tuple[Record, ClosedLoop]:
 
 
 def settings_of(b: Bench, method: str, key: Key) -> EstimateSettings:
-    """Options of one method: TLS is told the step, the others a start 15 % off, OLS nothing."""
+    """Options of one method: IV and DIDIM a start 15 % off, OLS nothing."""
     signs = np.random.default_rng([key.seed, 1]).uniform(-1, 1, len(b.truth))
     start = dict(zip(b.model.BASE_PARAMETERS, (b.truth * (1 + AWAY * signs)).tolist(), strict=True))
     options: dict[str, Mapping[str, Any]] = {
-        "tls": {"position_error": key.step / np.sqrt(12), "bootstrap": 0},
         "iv": {"start": start, "gains": "one"},
         "didim": {"start": start, "gains": "one"},
-        "cloe": {"start": "values"},
     }
     return EstimateSettings(method, options=options.get(method, {}))
 
@@ -186,15 +182,13 @@ def settings_of(b: Bench, method: str, key: Key) -> EstimateSettings:
 def estimates(_: None, key: Key) -> list[dict[str, Any]]:
     """Estimates of one record by every method of the key."""
     b = bench(key.robot)
-    record, loop = made(key)
+    _, loop = made(key)
     seen, found = loop.measured(), []
     for method in key.methods:
         begun = time.process_time()
         row = {"robot": key.robot, "step": key.step, "seed": key.seed, "method": method}
         try:
-            e = estimate_of(
-                _rows(b, record, seen, method, key), settings_of(b, method, key), model=b.model
-            )
+            e = estimate_of(seen, settings_of(b, method, key), model=b.model)
             row |= {
                 "X": e.X.tolist(),
                 "sigma": e.sigma.tolist(),
@@ -207,22 +201,12 @@ def estimates(_: None, key: Key) -> list[dict[str, Any]]:
     return found
 
 
-def _rows(b: Bench, record: Record, seen: Observation, method: str, key: Key) -> Observation:
-    return (
-        with_errors(b.model, record, b.study, seen, key.step / np.sqrt(12))
-        if method == "tls" and key.step
-        else seen
-    )
-
-
-def wanted(records: int, cloe: Mapping[str, int]) -> Iterator[Key]:
+def wanted(records: int) -> Iterator[Key]:
     """Every record, seed by seed, so that a run cut short has all steps."""
     for seed in range(records):
         for robot in ("emps", "tx40"):
             for step in STEPS[robot]:
                 yield Key(robot, step, seed, METHODS)
-                if seed < cloe[robot]:
-                    yield Key(robot, step, seed, ("cloe",))
 
 
 def computed(file: Path, keys: Sequence[Key], workers: int) -> list[dict[str, Any]]:
@@ -304,7 +288,7 @@ def table(rows: Sequence[Mapping[str, Any]], robot: str, kept: Sequence[int]) ->
     )
     lines: list[Sequence[str]] = [head]
     for step in STEPS[robot]:
-        for method in (*METHODS, "cloe"):
+        for method in METHODS:
             s = summary(rows, robot, step, method, kept)
             if s is None:
                 continue
@@ -339,7 +323,7 @@ def bias_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[i
             figure.add_subplot(2, 3, (3 * place + 1, 3 * place + 2)),
             figure.add_subplot(2, 3, 3 * place + 3),
         )
-        for k, method in enumerate(("ols", "tls", "iv", "didim")):
+        for k, method in enumerate(("ols", "iv", "didim")):
             s = summary(rows, robot, step, method, numbers)
             if s is not None:
                 left.errorbar(
@@ -363,7 +347,7 @@ def bias_figure(rows: Sequence[Mapping[str, Any]], kept: Mapping[str, Sequence[i
             title=f"{robot}, encoder {step:.3g} {UNIT[robot]} in the loop",
         )
         left.legend(fontsize=7, ncol=4)
-        for method in (*METHODS, "cloe"):
+        for method in METHODS:
             points = [
                 (d, s)
                 for d in STEPS[robot]
@@ -404,26 +388,26 @@ A bias smaller than scatter / sqrt(records) is not distinguished from zero. `sca
 {tables}
 
 Read: where OLS is biased by more than 5 %, DIDIM is about five times less biased or better, IV so for most parameters, not for friction of joint 2 and ZZ3R: likely because a loop that
-answers encoder steps no longer moves like the one without them, and sign(qd) of such a motion, filtered, is in W. WLS and TLS do not help on the TX40: both suppose errors that are
-independent of the torque, and inside the loop the torque answers them. Output error in position is the first to break (EMPS, coarsest step). Stated sigma is above the scatter where
+answers encoder steps no longer moves like the one without them, and sign(qd) of such a motion, filtered, is in W. WLS does not help on the TX40: it supposes errors that are
+independent of the torque, and inside the loop the torque answers them. Stated sigma is above the scatter where
 the encoder is coarse: its residuals repeat from record to record.
 
 ![bias and scatter](estimators.png)
 
 ## The same through the verb
 
-`symgen cestac` with `--method`, `place: loop` and `rounding: phase`, five runs a step (CLOE two), a random phase of every encoder in each: `python benchmarks/cestac_estimators.py`. Above, the
+`symgen cestac` with `--method`, `place: loop` and `rounding: phase`, five runs a step, a random phase of every encoder in each: `python benchmarks/cestac_estimators.py`. Above, the
 estimates of the runs against the truth; below, %e as the verb prints it. Dashed: recorded positions alone rounded, `place: record`; DIDIM does not see them at all, which says nothing
 about an encoder in the loop.
 
 ![error and %e against Delta](cestac_estimators.png)
 
-Errors against the truth agree with the table above on the TX40 but for TLS at the coarsest step (42 for 58 %). On the EMPS at 0.1 mm TLS, IV and DIDIM leave 5.6, 6.5 and 5.1 % for
-2.1, 3.4 and 2.5: the records above have one phase, the runs do not.
+Errors against the truth agree with the table above on the TX40. On the EMPS at 0.1 mm IV and DIDIM leave 6.5 and 5.1 % for
+3.4 and 2.5: the records above have one phase, the runs do not.
 
 **Which of the two to read.** %e is what steps do: noise and a bias that is there with an exact encoder too (OLS and IV of the EMPS, 1.1 %) are in the estimate it compares with, so it falls
 to zero with the step. It is the only one where the truth is not known, and it answers how fine an encoder must be. The error against the truth never falls below what noise leaves (0.6 to
-1.5 % here). Where steps decide, both are equal. CLOE of the TX40 is not in the figure: two runs take ten minutes of processor time.
+1.5 % here). Where steps decide, both are equal.
 """
 
 
@@ -432,12 +416,6 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--records", type=int, default=100)
-    parser.add_argument(
-        "--cloe", type=int, default=10, help="records of the EMPS on which output error is tried"
-    )
-    parser.add_argument(
-        "--cloe-tx40", type=int, default=0, help="the same of the TX40: minutes and 1 GB each"
-    )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
     parser.add_argument(
@@ -446,7 +424,7 @@ def main() -> None:
     given = parser.parse_args()
     rows = computed(
         given.runs,
-        list(wanted(given.records, {"emps": given.cloe, "tx40": given.cloe_tx40})),
+        list(wanted(given.records)),
         given.workers,
     )
     kept = {robot: determined(robot) for robot in ("emps", "tx40")}

@@ -35,15 +35,10 @@ from runtime.model.generated import GeneratedModel
 from runtime.records.datasets import dataset_study, fetch
 from runtime.records.reading import read_records
 from runtime.rows.observation import Observation
-from runtime.rows.position_errors import with_errors
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
-ENCODER = {
-    "emps": 1e-6,
-    "tx40": 1e-5,
-}  # deviation of a position that TLS is told, m and rad of the joint
 TEXT = Path(__file__).with_name("estimators_records.md")
 
 
@@ -85,13 +80,11 @@ def emps() -> str:
     for k, record in enumerate(records):
         other = closed_loop(model, [records[1 - k]], study, simulators[0]).measured()
         for label, delay, settings in EMPS_METHODS:
-            if k == 1 and settings.method in ("iv", "didim", "cloe"):
+            if k == 1 and settings.method in ("iv", "didim"):
                 # the pulses enter behind the controller: this loop is not simulated from its
                 # reference alone
                 continue
             seen = closed_loop(model, [record], study, simulators[delay]).measured()
-            if settings.method == "tls":
-                seen = with_errors(model, record, study, seen, ENCODER["emps"])
             found = estimate_of(seen, settings, model=model)
             errors = []
             for simulator in simulators:
@@ -125,25 +118,15 @@ EMPS_METHODS: tuple[tuple[str, int, EstimateSettings], ...] = (
     ("ols", 0, EstimateSettings()),
     ("wls", 0, EstimateSettings("wls")),
     ("irls", 0, EstimateSettings("irls")),
-    (
-        "tls",
-        0,
-        EstimateSettings("tls", options={"position_error": ENCODER["emps"], "bootstrap": 0}),
-    ),
     ("iv", 0, EstimateSettings("iv")),
     ("iv, delay", 1, EstimateSettings("iv")),
     ("didim", 0, EstimateSettings("didim")),
     ("didim, delay", 1, EstimateSettings("didim")),
-    ("cloe", 0, EstimateSettings("cloe")),
-    ("cloe, delay", 1, EstimateSettings("cloe")),
-    ("clie", 0, EstimateSettings("cloe", options={"output": "torque"})),
 )
 
 
 def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, Observation]:
-    """Rows of the TX40 record in the loop that is assumed, without the median filter: TLS knows
-    errors behind linear filters alone.
-    """
+    """Rows of the TX40 record in the loop that is assumed, without the median filter."""
     model, mapping = load_model("tx40", folder=GENERATED, trust=True), dict(dataset_study("tx40"))
     mapping["signals"] = {**mapping["signals"], "median": 1}
     mapping["rows"] = {**mapping["rows"], "low_speed": low_speed}
@@ -160,7 +143,7 @@ def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, O
         reference="measured",
         around=around,
     ).measured()
-    return model, study, with_errors(model, record, study, seen, ENCODER["tx40"])
+    return model, study, seen
 
 
 def agreement() -> str:
@@ -199,7 +182,6 @@ def tx40(methods: Sequence[str]) -> str:
     model, study, seen = tx40_rows(0.0, 0.0)
     first, second = (seen.between(*window) for window in study.validate.split)
     options: Mapping[str, Mapping[str, Any]] = {
-        "tls": {"position_error": ENCODER["tx40"], "bootstrap": 0},
         "iv": IV,
         "feasible": {
             "prior": "none",
@@ -234,15 +216,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/estimators.md"))
-    parser.add_argument(
-        "--methods", nargs="+", default=["ols", "wls", "irls", "tls", "iv", "feasible"]
-    )
+    parser.add_argument("--methods", nargs="+", default=["ols", "wls", "irls", "iv", "feasible"])
     given = parser.parse_args()
     page = TEXT.read_text().format(
         emps=emps(),
         errors=tx40(given.methods),
         agreement=agreement(),
-        **{f"{r}_encoder": x for r, x in ENCODER.items()},
     )
     print(page)
     given.output.write_text(page)

@@ -101,8 +101,6 @@ class Method:
         Options under which resampled records and explanations are left out.
     any_rank : bool
         Whether it has an answer where the rows do not determine all parameters.
-    position_error : callable or None
-        Deviation of a position by its options, of a method that asks for the errors of columns.
     """
 
     options: type[Settings]
@@ -112,7 +110,6 @@ class Method:
     closed_loop: bool = False
     brief: Mapping[str, Any] = field(default_factory=dict)
     any_rank: bool = False
-    position_error: Callable[[Any], float] | None = None
 
     def checked(self, settings: EstimateSettings) -> Any:
         """The options of the settings; SettingsError where they or the weights do not suit."""

@@ -28,7 +28,6 @@ from runtime.identification.torque_law import completed, gain_doubt
 from runtime.identification.transmitted import transmitted
 from runtime.identification.uncertainty import uncertainty
 from runtime.identification.validation import direct_comparison, weak_directions
-from runtime.limits import LIMIT
 from runtime.loop.methods import observed as method_observation
 from runtime.loop.methods import simulator_of
 from runtime.model.bound import BoundModel
@@ -94,7 +93,7 @@ def identify(
         Records that the parameters predict; default: those of study.validate.record, read from
         their files.
     simulator : Simulator, optional
-        The closed loop, which iv, didim and cloe need; default: that of study.controller, with the
+        The closed loop, which iv and didim need; default: that of study.controller, with the
         CasADi module that lies with `model`.
     physical : bool
         Whether a physical robot can have the parameters.

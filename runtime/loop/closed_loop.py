@@ -1,5 +1,5 @@
-"""The closed loop in which a record was made, run again with other parameters: what IV, DIDIM and
-CLOE compare the record with.
+"""The closed loop in which a record was made, run again with other parameters: what IV and
+DIDIM compare the record with.
 
     loop = closed_loop(model, records, study, simulator)
     observation = loop.measured()             Y = W X + rho, to which the loop stays attached
@@ -199,10 +199,6 @@ class ClosedLoop:
         Z = self._observed(states).columns(observation.names).W
         return replace(observation, W=np.asfortranarray(Z[observation.closed_loop.rows]))
 
-    def sensitivity(self, X: Array) -> list[tuple[Simulation, Any]]:
-        """One simulation per record, with its derivatives by X."""
-        return [self.simulator.sensitivity(X, part.reference, **part.given) for part in self.parts]
-
     def outputs(self, signals: Sequence[Array], observation: Observation) -> Array:
         """Signals of every record, shape (N, n) or (N, n, c), decimated like Y, on the rows of
         `observation`: shape (r,) or (r, c).
@@ -373,7 +369,7 @@ def loop_of(observation: Observation, method: str) -> ClosedLoop:
         raise SettingsError(
             f"{method} simulates the closed loop of the record, and this study tells none; give a "
             "section `controller` with law, rate and reference "
-            "(symgen identify then makes it), or use ols, wls, irls or tls",
+            "(symgen identify then makes it), or use ols, wls or irls",
             path=("estimate", "method"),
         )
     loop: ClosedLoop = observation.closed_loop.loop

@@ -11,22 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from runtime.errors import InputError, SettingsError
-from runtime.estimators import feasible, irls, tls
+from runtime.estimators import feasible, irls
 from runtime.estimators.essential import Essential, essential_of
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble, ordinary
 from runtime.estimators.method import LINEAR, Beginning, Method, linear_companion
 from runtime.estimators.wls import by_weights, weighted
-from runtime.loop import cloe, didim, iv
+from runtime.loop import didim, iv
 from runtime.loop.closed_loop import closed_loop, loop_of
 from runtime.loop.fixed_point import FixedPointOptions, full
 from runtime.loop.simulated_motion import judged
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import Workers
 from runtime.records.stream import Stream
-from runtime.rows.observation import Observation, stack
+from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
-from runtime.rows.position_errors import with_errors
 from runtime.rows.prepared import Source, prepared, record_of, resolved
 from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings, Study
@@ -38,21 +37,10 @@ METHODS: Mapping[str, Method] = {
     **LINEAR,
     # robust least squares, Huber or Tukey
     "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
-    # total least squares with exact columns
-    "tls": Method(
-        tls.TlsOptions,
-        by_weights,
-        tls.fit,
-        weights=("none", "joint", "iterated"),
-        brief={"bootstrap": 0},
-        position_error=lambda options: options.position_error,
-    ),
     # instrumental variables of the simulated closed loop
     "iv": Method(FixedPointOptions, ordinary, iv.fit, closed_loop=True),
     # torques on the regressor of the simulated motion
     "didim": Method(FixedPointOptions, ordinary, didim.fit, closed_loop=True),
-    # output error of the closed loop, position or torque
-    "cloe": Method(cloe.CloeOptions, ordinary, cloe.fit, closed_loop=True),
     # least squares among physical robots
     "feasible": Method(
         feasible.FeasibleOptions,
@@ -197,8 +185,8 @@ def observed(
     simulator: Simulator | None = None,
     workers: int | Workers = 1,
 ) -> Observation:
-    """The Observation that the method of the study needs: with errors of its columns for tls, with
-    the closed loop for those that simulate it.
+    """The Observation that the method of the study needs: with the closed loop for those that
+    simulate it.
 
     Parameters
     ----------
@@ -224,7 +212,7 @@ def observed(
             raise InputError(message, file=record.file)
     whole = [prepared(model, record, study) for record in several if not isinstance(record, Stream)]
     method = method_of(settings)
-    if len(whole) < len(several) and (simulator is not None or method.position_error is not None):
+    if len(whole) < len(several) and simulator is not None:
         raise SettingsError(
             f"{settings.method} needs records in memory, not by blocks; set stream: off",
             path=("estimate", "method"),
@@ -234,10 +222,6 @@ def observed(
             key: settings.options[key] for key in ("reference", "around") if key in settings.options
         }
         return closed_loop(model, whole, study, simulator, **asked).measured()
-    if method.position_error is not None:
-        error = method.position_error(method.checked(settings))
-        pairs = [(own, own.observation(model)) for own in whole]
-        return stack([with_errors(model, one, study, rows, error) for one, rows in pairs])
     needed_by: str = "" if method.fit is None else settings.method
     if settings.weights == "covariance":
         needed_by = "weights: covariance"

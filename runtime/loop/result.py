@@ -172,21 +172,3 @@ def csv_text(t: Array, **signals: Array) -> str:
 
 def _rms(x: Array) -> Array:
     return np.asarray(np.sqrt((x**2).mean(axis=0)))
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
-    """Derivatives by the base parameters X at the recorded ticks. The loop is closed: gains,
-    reference and g do not move.
-
-    Attributes
-    ----------
-    q, qd : ndarray, shape (N, n, b)
-        Of the position and its rate. The instants at which slips stop move with X.
-    tau : ndarray, shape (N, n, b)
-        Of the torque.
-    """
-
-    q: Array
-    qd: Array
-    tau: Array

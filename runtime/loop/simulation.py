@@ -14,7 +14,7 @@ and what to try.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -35,8 +35,7 @@ from runtime.loop.control_law import (
 from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_function
 from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
-from runtime.loop.result import Sensitivity, Simulation, SimulationError
-from runtime.loop.sensitivity import tangent_along, tangent_function
+from runtime.loop.result import Simulation, SimulationError
 from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
 from runtime.model.generated import GeneratedModel, constants_of, require_no_channels
 from runtime.records.provenance import SIMULATED
@@ -46,7 +45,7 @@ from runtime.settings.study import Study
 
 Array = np.ndarray
 
-BLOCK, TANGENT_BLOCK = 250, 25  # ticks in one call
+BLOCK = 250  # ticks in one call
 
 
 class Simulator:
@@ -80,7 +79,7 @@ class Simulator:
         self.symbolic = symbolic or load_symbolic(casadi_path(model), of=model)
         self.friction: DryFriction = dry_friction(model)
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
-        self._compiled: dict[tuple[Callable[..., Any], int], Any] = {}
+        self._compiled: dict[int, Any] = {}
         self._bias = _rest_functions(self.symbolic, self.constants)
 
     def run(
@@ -131,28 +130,6 @@ class Simulator:
         )
         states, out = self._iterated(inputs)
         return self._result(inputs, states, out, reference, ideal=ideal, name=name)
-
-    def sensitivity(
-        self,
-        X: Array,
-        reference: Reference,
-        *,
-        g: Array | float = 1.0,
-        start: Array | None = None,
-        disturbance: Array | None = None,
-        feedforward: Array | None = None,
-    ) -> tuple[Simulation, Sensitivity]:
-        """An ideal run and its derivatives by X, from the tangent system stepped beside it
-        (`runtime.loop.sensitivity`).
-        """
-        inputs = self._inputs(X, reference, g, start, disturbance, feedforward, None)
-        states, out = self._iterated(inputs)
-        run = self._result(inputs, states, out, reference, ideal=True)
-        function = self._ticks(tangent_function, inputs.substeps, TANGENT_BLOCK)
-        before = np.vstack([inputs.x, states[:-1]])
-        return run, tangent_along(
-            function, before, inputs, self.law.flags, TANGENT_BLOCK, self.controller.record_every
-        )
 
     def _inputs(
         self,
@@ -267,28 +244,23 @@ class Simulator:
             )
         return steps
 
-    def _ticks(self, function_of: Callable[..., Any], substeps: int, block: int) -> Any:
-        """The CasADi function of `block` ticks, each by `tick_function` or `tangent_function`; made
-        once.
-        """
-        key = function_of, substeps
-        if key not in self._compiled:
-            tick = function_of(
+    def _ticks(self, substeps: int) -> Any:
+        """The CasADi function of BLOCK ticks; made once."""
+        if substeps not in self._compiled:
+            tick = tick_function(
                 self.symbolic, self.friction, self.constants, substeps, self.controller.integrator
             )
-            self._compiled[key] = (compiled(tick) if self._in_c else tick).mapaccum(block)
-        return self._compiled[key]
+            self._compiled[substeps] = (compiled(tick) if self._in_c else tick).mapaccum(BLOCK)
+        return self._compiled[substeps]
 
     def _iterated(self, inputs: LoopInputs) -> tuple[Array, Array]:
         """BLOCK ticks at a time: states after each tick (S + N, 6n), outputs y, tau, qdd (S + N,
         3n).
         """
-        function, x, states, out = (
-            self._ticks(tick_function, inputs.substeps, BLOCK),
-            inputs.x,
-            [],
-            [],
-        )
+        function = self._ticks(inputs.substeps)
+        x = inputs.x
+        states = []
+        out = []
         for rows, used in blocks(inputs.signals, BLOCK):
             after, outputs = function(x, rows.T, inputs.X, inputs.law, self.law.flags)
             states.append(after.full().T[:used])

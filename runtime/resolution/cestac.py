@@ -33,7 +33,7 @@ from runtime.compiled.model import target_of
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of, method_of
+from runtime.loop.methods import estimate_of, point_estimate
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.parallel import results
@@ -45,11 +45,9 @@ from runtime.resolution.loop import Loop, loop_of, without_loop_options
 from runtime.resolution.perturbed import (
     PreparedRecord,
     Task,
-    column_errors,
     perturbed,
     prepared_records,
     study_columns,
-    with_deviation,
 )
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, run_block
@@ -112,7 +110,7 @@ def cestac(
     provenance : mapping, optional
         Further entries of Cestac.provenance; names and time stamps of the records are there.
     simulator : Simulator, optional
-        Closed loop of iv, didim, cloe, and of place: loop; default: that of study.controller, with
+        Closed loop of iv, didim, and of place: loop; default: that of study.controller, with
         the CasADi model beside `model`.
 
     Raises
@@ -174,15 +172,13 @@ def cestac(
         constants=dict(constants or {}),
         loop=loop,
     )
-    if method_of(study.estimate).position_error is not None:
-        task = replace(task, errors=column_errors(model, as_measured, study, task.names))
     measured, whole = (
         perturbed(task.columns, task, Level(0.0), ()),
         [own.record for own in as_measured],
     )
     origins = {**origin(whole), **(provenance or {})}
     reference = estimate_of(
-        *with_deviation(measured, task, Level(0.0)), model=model, provenance=origins
+        measured, point_estimate(task.estimate), model=model, provenance=origins
     )
     _refuse(reference)
     described = {
@@ -232,13 +228,9 @@ def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
             "robot file; every run is a record of its own, compared "
             "with the mean of as many records of the same seeds whose encoder is that of the study."
         )
-    elif method in ("didim", "cloe"):
+    elif method == "didim":
         told.append(
-            f"{method} reads of the recorded positions "
-            f"{'the first alone' if method == 'didim' else 'what the loop does not explain'}; "
-            "rounding them "
-            "says nothing of an encoder in the loop, whose controller answers its steps: place: "
-            "loop does."
+            "didim reads of the recorded positions the first alone; rounding them says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
         )
     elif method == "iv":
         told.append(

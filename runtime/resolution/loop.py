@@ -1,4 +1,4 @@
-"""The closed loop of a resolution study: for methods that simulate it (iv, didim, cloe), and for
+"""The closed loop of a resolution study: for methods that simulate it (iv, didim), and for
 encoders that stand inside it.
 
     place: record
@@ -179,7 +179,7 @@ def loop_of(
         raise SettingsError(
             f"{asked} simulates the closed loop, and this study tells none; give a section "
             "`controller` with law, rate and reference, "
-            "or use ols, wls, irls or tls on recorded positions",
+            "or use ols, wls or irls on recorded positions",
             path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),
         )
     quiet = replace(study, signals=replace(study.signals, median=study.cestac.median))

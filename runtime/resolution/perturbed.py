@@ -21,13 +21,12 @@ from runtime.errors import InputError
 from runtime.estimators.essential import essential_of
 from runtime.estimators.method import linear_companion
 from runtime.loop.closed_loop import LoopPart
-from runtime.loop.methods import method_of, observed, point_estimate
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, base_columns
 from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.resolution.loop import Loop
 from runtime.resolution.own_encoder import OwnEncoder, own_encoder
-from runtime.resolution.rounding import VARIANCE, rounded, stream
+from runtime.resolution.rounding import rounded, stream
 from runtime.resolution.runs import Level
 from runtime.rows.observation import Observation, stack
 from runtime.rows.prepared import Prepared, decimated_torque, observation_of
@@ -95,9 +94,6 @@ class Task:
         Values in place of the robot file's.
     loop : Loop or None
         Closed loop, of a study that simulates one.
-    errors : ndarray, shape (n, b, b), or None
-        Of method tls: covariance of the errors of one row of joint j, by encoder errors of variance
-        1.
     """
 
     records: tuple[PreparedRecord, ...]
@@ -109,7 +105,6 @@ class Task:
     drives: Drives | None
     constants: Mapping[str, float]
     loop: Loop | None = None
-    errors: Array | None = None
 
     @property
     def columns(self) -> Columns:
@@ -182,21 +177,6 @@ def prepared_records(
     return tuple(
         prepared_record(record, study, drives, part)
         for record, part in zip(records, parts, strict=True)
-    )
-
-
-def column_errors(
-    model: GeneratedModel, records: Sequence[Prepared], study: Study, names: Sequence[str]
-) -> Array | None:
-    """Covariance of the errors of one row of joint j, shape (n, b, b), by encoder errors of
-    variance 1, for a method that asks for them.
-    """
-    signals = replace(study.signals, median=study.cestac.median)
-    unit = replace(study.estimate, options={"position_error": 1.0})
-    return (
-        observed(model, records, replace(study, signals=signals, estimate=unit))
-        .columns(names)
-        .errors
     )
 
 
@@ -341,23 +321,3 @@ def system_of(
         for record, q, torque in zip(task.records, positions, torques, strict=True)
     ]
     return observations[0] if len(observations) == 1 else stack(observations)
-
-
-def with_deviation(
-    observation: Observation, task: Task, level: Level
-) -> tuple[Observation, EstimateSettings]:
-    """The observation and the settings of its estimate, with the deviation of the positions, that
-    of
-    the level included, where the method asks for it.
-    """
-    settings = point_estimate(task.estimate)
-    if method_of(settings).position_error is None:
-        return observation, settings
-    variance = (
-        float(settings.options.get("position_error", 0.0)) ** 2
-        + VARIANCE[task.settings.rounding] * level.delta**2
-    )
-    errors = None if task.errors is None else variance * task.errors
-    return replace(observation, errors=errors), replace(
-        settings, options={**settings.options, "position_error": variance**0.5}
-    )

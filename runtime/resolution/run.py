@@ -13,9 +13,9 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.estimators.method import LINEAR, linear_system
-from runtime.loop.methods import estimate_of
-from runtime.resolution.perturbed import Task, perturbed, with_deviation
-from runtime.resolution.runs import Level, Run, Runs
+from runtime.loop.methods import estimate_of, point_estimate
+from runtime.resolution.perturbed import Task, perturbed
+from runtime.resolution.runs import Run, Runs
 from runtime.rows.observation import Observation
 from runtime.rows.regressor import Columns
 
@@ -42,17 +42,17 @@ def one_run(columns: Columns, task: Task, key: tuple[int, int]) -> Run:
         raise InputError(
             f"the regressor of {task.model.NAME} is not finite at perturbed positions; use smaller steps"
         )
-    X = _estimated(task, observation, level)
+    X = _estimated(task, observation)
     norm = float(np.linalg.norm(observation.Y - observation.W @ X))
     return Run(*key, tuple(X.tolist()), norm)
 
 
-def _estimated(task: Task, observation: Observation, level: Level) -> Array:
+def _estimated(task: Task, observation: Observation) -> Array:
     """X of the method of the task, shape (b,); of nan where it finds no estimate."""
     if task.estimate.method in LINEAR:
         return linear_system(observation, task.estimate).solve().X
     try:
-        estimate = estimate_of(*with_deviation(observation, task, level), model=task.model)
+        estimate = estimate_of(observation, point_estimate(task.estimate), model=task.model)
         if estimate.status in USABLE:
             return estimate.X
     except InputError:

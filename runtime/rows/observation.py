@@ -95,9 +95,6 @@ class Observation:
         Signals and rows used, complete (to_mapping), with the factor that "auto" became.
     files : mapping of str to str
         SHA-256 of the measured files, by name.
-    errors : ndarray, shape (n, b, b), or None
-        Mean covariance of the errors of one row of W of joint j, where it is known
-        (`runtime.rows.position_errors`).
     closed_loop : LoopRows or None
         What can simulate the same rows with other parameters, where it is known.
     reduced : Reduced or None
@@ -116,7 +113,6 @@ class Observation:
     dropped: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
-    errors: Array | None = None
     closed_loop: LoopRows | None = None
     reduced: Reduced | None = None
     findings: tuple[str, ...] = ()
@@ -202,7 +198,6 @@ class Observation:
         if tuple(names) == self.names:
             return self
         kept = column_numbers(names, self.names)
-        errors = None if self.errors is None else self.errors[:, kept][:, :, kept]
         reduced = self.reduced
         if reduced is not None:
             segments = tuple(
@@ -216,7 +211,6 @@ class Observation:
             self,
             W=np.asfortranarray(self.W[:, kept]),
             names=tuple(names),
-            errors=errors,
             reduced=reduced,
         )
 
@@ -438,7 +432,6 @@ def in_time(observations: Sequence[Observation]) -> Observation:
         },
         settings=same_settings([o.settings for o in observations]),
         files=all_files([o.files for o in observations]),
-        errors=_mean_errors(observations),
         findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
     )
 
@@ -450,17 +443,6 @@ def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
 
 def default_block(rows: Sequence[int], rate: float) -> float:
     return float(max(max(rows) / BLOCKS, SHORTEST) / rate)
-
-
-def _mean_errors(observations: Sequence[Observation]) -> Array | None:
-    """Means over all rows of each joint; None unless each observation knows its errors."""
-    known = [o.errors for o in observations if o.errors is not None]
-    if len(known) < len(observations):
-        return None
-    rows = np.array([o.rows for o in observations], dtype=float)
-    return np.asarray(
-        np.einsum("oj,ojab->jab", rows / np.maximum(rows.sum(axis=0), 1), np.array(known))
-    )
 
 
 def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:

@@ -28,7 +28,6 @@ from math import floor, log
 
 import numpy as np
 
-from runtime.errors import SettingsError
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.missing import require_positions
@@ -58,7 +57,6 @@ class Perturbation:
     observation : the unperturbed rows.
     clean : their Gram matrices.
     smooth : by encoder, what errors of variance 1 add to them, switching columns left out.
-    errors : by encoder, E[dW_j'dW_j] alone, shape (encoders, n, b, b).
     speeds : by encoder, sensitivity of the rows to dqd of that encoder, times the root of its
     variance, shape (encoders, n, b, K).
     root : ndarray, shape (n, encoders), joint position error per encoder error.
@@ -74,7 +72,6 @@ class Perturbation:
     root: Array
     clean: Array
     smooth: Array
-    errors: Array
     speeds: Array
     switches: tuple[Switch, ...]
     kernels: Kernels
@@ -183,7 +180,7 @@ def perturbation(
         encoder_drives(study.cestac.side, drives or own.drives, "cestac"), own.record.n
     )
     rows = [_rows(observation, j) for j in range(observation.n)]
-    smooth, errors, speeds = _smooth(
+    smooth, speeds = _smooth(
         model,
         window[selection.kept],
         selection.mask,
@@ -203,53 +200,11 @@ def perturbation(
         root=root,
         clean=np.array([A.T @ A for A in rows]),
         smooth=smooth,
-        errors=errors,
         speeds=speeds,
         switches=switching,
         kernels=kernels(band, len(window), selection.factor),
         used=selection.mask[:, np.clip(nearest, 0, len(selection.kept) - 1)],
     )
-
-
-def with_errors(
-    model: GeneratedModel,
-    record: Record | Prepared,
-    study: Study,
-    observation: Observation,
-    deviation: float,
-    *,
-    drives: Drives | None = None,
-) -> Observation:
-    """`observation` of the record with the covariance of the errors of its columns, for errors of
-    every encoder of that deviation.
-
-    deviation : of one raw position, rad or m, on the side study.cestac.side. Columns that switch
-    with the sign of a speed count as exact.
-    Raises SettingsError where a median filter stands ahead of the others, or positions are read as
-    counts.
-    """
-    if study.signals.reader != "lowpass":
-        raise SettingsError(
-            "counts; the errors of the columns are known for reader: lowpass alone",
-            path=("signals", "reader"),
-        )
-    if study.signals.median != 1:
-        raise SettingsError(
-            (
-                f"{study.signals.median}; the errors of the columns are known for linear filters "
-                "alone, use 1"
-            ),
-            path=("signals", "median"),
-        )
-    part = perturbation(
-        model,
-        record,
-        replace(study, cestac=replace(study.cestac, median=1)),
-        observation.names,
-        drives=drives,
-    )
-    total = deviation**2 * part.errors.sum(axis=0)
-    return replace(observation, errors=total / np.maximum(observation.rows, 1)[:, None, None])
 
 
 def _rows(observation: Observation, j: int) -> Array:
@@ -268,9 +223,8 @@ def _smooth(
     root: Array,
     switching: Sequence[Switch],
     constants: Mapping[str, float],
-) -> tuple[Array, Array, Array]:
-    """Per encoder: what errors of variance 1 add to the Gram matrices, E[dW'dW] of it, and the
-    sensitivities to the speed; of the states at the kept instants, of which mask, bool (n, K), is
+) -> tuple[Array, Array]:
+    """Per encoder: what errors of variance 1 add to the Gram matrices, and the sensitivities to the speed; of the states at the kept instants, of which mask, bool (n, K), is
     used.
     """
     columns = np.array([model.BASE_PARAMETERS.index(name) for name in names])
@@ -292,7 +246,7 @@ def _smooth(
 
     at_rest = store(axes[:, 0], 0.0, root[:, 0])
     encoders, (n, b) = root.shape[1], rigid.shape
-    smooth, errors = np.zeros((encoders, n, b + 1, b + 1)), np.zeros((encoders, n, b, b))
+    smooth = np.zeros((encoders, n, b + 1, b + 1))
     speeds = np.zeros((encoders, n, b, len(kept)))
     for i in range(encoders):
         first, second = np.empty((3, *at_rest.shape)), np.zeros_like(at_rest)
@@ -306,10 +260,9 @@ def _smooth(
             S = np.einsum("kl,kbK->blK", C, first[:, C_j, j][..., used]).reshape(
                 len(C_j), 3 * int(used.sum())
             )
-            errors[i, j][np.ix_(C_j, C_j)] = S @ S.T
+            smooth[i, j][np.ix_(C_j, C_j)] += S @ S.T
             shifted = band.gain * second[C_j, j][:, used] @ rows[j]  # E[dW]'[W Y]
             smooth[i, j][C_j] += shifted
             smooth[i, j][:, C_j] += shifted.T
             speeds[i, j, C_j] = first[1, C_j, j] * used
-        smooth[i, :, :-1, :-1] += errors[i]
-    return smooth, errors, speeds
+    return smooth, speeds

@@ -7,6 +7,8 @@ from typing import Any
 
 WENT: Mapping[str, str] = {
     "estimate.options.prior: entropic": "the distance entropic went; set euclidean, or none",
+    "estimate.method: tls": "total least squares went; set wls, and ask `symgen cestac --advise` what the encoder does to the estimate",
+    "estimate.method: cloe": "output error of the closed loop went; set didim, which reads the same records of the same loop",
     "signals.lines": "lines of uneven encoders are no longer estimated; leave the key out: bounds are widened by their deviation",
     "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
 }

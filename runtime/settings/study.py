@@ -205,7 +205,7 @@ class Rows(Settings):
     low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
 
 
-SIMULATING = ("iv", "didim", "cloe")
+SIMULATING = ("iv", "didim")
 """Methods that simulate the closed loop."""
 
 
@@ -224,7 +224,7 @@ class EstimateSettings(Settings):
         Options of the method.
     """
 
-    method: Literal["ols", "wls", "irls", "tls", "iv", "didim", "cloe", "feasible"] = "ols"
+    method: Literal["ols", "wls", "irls", "iv", "didim", "feasible"] = "ols"
     weights: Literal["none", "joint", "iterated", "covariance"] = "none"
     columns: Literal["all"] | Many[Text] = "all"
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -414,7 +414,7 @@ class Study(Settings):
     payload : PayloadSettings or None
         Records with a load.
     controller : Controller or None
-        Closed loop of simulation, IV, DIDIM and CLOE.
+        Closed loop of simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
     stream : int or str

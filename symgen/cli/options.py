@@ -78,9 +78,7 @@ Uneven = Annotated[
 ]
 Method = Annotated[
     Text,
-    typer.Option(
-        help="Estimator in place of the study's: ols, wls, irls, tls, iv, didim, cloe, feasible."
-    ),
+    typer.Option(help="Estimator in place of the study's: ols, wls, irls, iv, didim, feasible."),
 ]
 Reader = Annotated[
     Text,

@@ -46,10 +46,8 @@ ESTIMATORS = {
     "ols": "least squares, as the chapter",
     "wls": "weighted by joint",
     "irls": "weighted, outliers count less",
-    "tls": "errors in the regressor too",
     "iv": "instrumental variables, needs the controller",
     "didim": "simulated closed loop, torques; needs the controller",
-    "cloe": "simulated closed loop, positions; needs the controller",
     "feasible": "masses and inertias that bodies can have",
 }
 

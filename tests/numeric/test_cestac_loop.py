@@ -132,14 +132,6 @@ def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F81
     assert found.levels[0].e[found.names.index("ZZ1R")] > 0.2
 
 
-def test_total_least_squares_is_told_the_steps(arm, study, record):  # noqa: F811
-    """On rounded positions it is nearer to the estimate of the record than least squares."""
-    least, total = (cestac(arm[0], record, method(study, name)) for name in ("ols", "tls"))
-    i = least.names.index("ZZ2")
-    assert np.allclose(least.reference.X, total.reference.X)
-    assert total.levels[0].e[i] < least.levels[0].e[i]
-
-
 @campaign
 def test_other_processes_simulate_the_same_loop(arm, study, simulator):  # noqa: F811
     one, two = (

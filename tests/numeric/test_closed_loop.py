@@ -28,7 +28,7 @@ from runtime.settings.controller import ReferenceSettings
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
-SIMULATING = ("iv", "didim", "cloe")
+SIMULATING = ("iv", "didim")
 ARM = {
     "signals": {"median": 1, "lowpass": {"cutoff": 100, "on": ["q"]}, "decimate": {"factor": 10}},
     "rows": {"trim": 4, "low_speed": 0.15},
@@ -105,7 +105,7 @@ def away(truth, names, share=0.15):
     return dict(zip(names, truth * (1 + share * signs), strict=True))
 
 
-@pytest.mark.parametrize("method", ["ols", "wls", "irls", "tls", "iv", "didim"])
+@pytest.mark.parametrize("method", ["ols", "wls", "irls", "iv", "didim"])
 @some(3)
 def test_noise_free_record_gives_the_truth(arm, clean, method):
     """DIDIM to 1e-4, its stop. The others see the torque of a tick, held until the next, beside the
@@ -119,7 +119,7 @@ def test_noise_free_record_gives_the_truth(arm, clean, method):
     )
     found = estimate_of(
         clean[1],
-        EstimateSettings(method, options={"position_error": 0.0} if method == "tls" else options),
+        EstimateSettings(method, options=options),
         model=model,
     )
     assert found.status == "ok", found.message
@@ -130,38 +130,11 @@ def test_noise_free_record_gives_the_truth(arm, clean, method):
     np.testing.assert_allclose(found.X, truth, rtol=0, atol=5e-5 if method == "didim" else 1e-2)
 
 
-@pytest.mark.parametrize("output", ["position", pytest.param("torque", marks=campaign)])
-def test_output_error_of_a_noise_free_record_is_nothing(emps, axes, output):
-    """CLOE and CLIE simulate what made the record: the truth to rounding, from 10 % away. First 6 s
-    of the EMPS motion.
-    """
-    model, study, records = emps
-    truth, followed = (
-        np.array([95.0, 205.0, 20.0, -3.0]),
-        Reference.sampled(records[0].q_r[:6000], 1000.0),
-    )
-    record = axes[0].run(truth, followed, ideal=True).record()
-    seen = closed_loop(
-        model,
-        [record],
-        replace(study, rows=replace(study.rows, low_speed=0.01)),
-        axes[0],
-        around=0.02,
-    ).measured()
-    found = estimate_of(
-        seen, EstimateSettings("cloe", options={"output": output, "start": "values"}), model=model
-    )
-    assert found.status == "ok" and found.details["output"] == output
-    np.testing.assert_allclose(found.X, truth, rtol=1e-6)
-    assert found.details["output_error"][0] < 1e-6
-
-
 @pytest.mark.parametrize(
     ("method", "masked", "expected"),
     [
         ("iv", False, (95.141, 203.56, 20.390, -3.165)),
         ("didim", False, (94.890, 206.19, 20.244, -3.173)),
-        pytest.param("cloe", False, (95.200, 208.28, 20.031, -3.169), marks=campaign),
         ("ols", True, (94.356, 193.64, 21.407, -3.412)),
         ("iv", True, (94.397, 193.72, 21.400, -3.412)),
         ("didim", True, (95.085, 190.78, 21.802, -3.443)),
@@ -172,8 +145,7 @@ def test_emps_record(emps, axes, method, masked, expected):
     """Found by an independent simulation without delay, all rows, and with rows slower than 0.01
     m/s and 20 samples around them out.
 
-    Output error is told apart from its minimum by how a reversal within one tick is treated: 0.1 %;
-    the others agree to 0.02 %.
+    They agree to 0.02 %.
     Slow rows out: 1.5 %, for 10 ms more on either side of the mask move FV by 1.4 % and the offset
     by 1.7 %.
     """
@@ -184,9 +156,7 @@ def test_emps_record(emps, axes, method, masked, expected):
     ).measured()
     found = estimate_of(seen, EstimateSettings(method), model=model)
     assert found.status == "ok"
-    np.testing.assert_allclose(
-        found.X, expected, rtol=1.5e-2 if masked else 1e-3 if method == "cloe" else 2e-4
-    )
+    np.testing.assert_allclose(found.X, expected, rtol=1.5e-2 if masked else 2e-4)
     if not masked:
         relative = {"iv": 4.08, "didim": 4.37}
         assert method not in relative or abs(found.relative_error - relative[method]) < 0.01

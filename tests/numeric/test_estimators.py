@@ -365,7 +365,7 @@ def test_columns_restrict_the_estimate():
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
-        (EstimateSettings(method="cloe"), "section `controller`"),
+        (EstimateSettings(method="didim"), "section `controller`"),
         (EstimateSettings(weights="joint"), "belong to method wls"),
         (EstimateSettings(columns=("ZZ9",)), "no parameter ZZ9"),
         (EstimateSettings(options={"colour": 1}), "unknown key colour"),

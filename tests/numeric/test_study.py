@@ -154,7 +154,7 @@ def test_one_record_or_several():
         (
             {"estimate": {"method": "magic"}},
             ("estimate", "method"),
-            "expected ols, wls, irls, tls, iv, didim, cloe or feasible",
+            "expected ols, wls, irls, iv, didim or feasible",
         ),
         ({"essential": {"threshold": 1}}, ("essential", "threshold"), "expected more than 1"),
         (
