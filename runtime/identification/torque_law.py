@@ -228,7 +228,7 @@ class TorquesOfLaw:
             ]
             columns["delay"] = with_torques(self.rows, self.own, rates).Y
         W = np.column_stack([self.rows.W, *columns.values()])
-        wide = replace(Y, W=W, names=(*self.rows.names, *columns), errors=None)
+        wide = replace(Y, W=W, names=(*self.rows.names, *columns))
         return estimate_of(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
