@@ -110,7 +110,7 @@ def main() -> None:
     command("identify", "models/planar_2r.py", "run.csv", "-o", "found", "--friction", code=1)
     json.loads(Path("found/estimate.json").read_text(encoding="utf-8"))
     command("convert", "planar_2r", "planar.urdf")
-    command("apply", "found", "planar.urdf", "--check", "--help")
+    command("apply", "found", "planar.urdf", "--help")
     command("cestac", "planar_2r", "run.csv", "-o", "steps", "--delta", "1e-6", "--runs", "5")
     command("report", "planar_2r", "run.csv", "-o", "report", "--help")
     command("simulate", "emps", "loop.yaml", "-o", "loop")

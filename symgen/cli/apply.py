@@ -18,9 +18,8 @@ def apply(
     model: Annotated[
         Path, typer.Argument(help="The file that the values go into: .urdf, or .xml, .mjcf (MJCF).")
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write; default: MODEL itself.")
-    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write.")] = None,
+    in_place: Annotated[bool, typer.Option("--in-place", help="Write MODEL itself.")] = False,
     robot: Annotated[
         str | None,
         typer.Option(
@@ -31,9 +30,6 @@ def apply(
     exact: options.Exact = False,
     lock: options.Lock = None,
     chain: options.Chain = None,
-    check: Annotated[
-        bool, typer.Option("--check", help="Tell what would change, and write nothing.")
-    ] = False,
     diff: Annotated[
         bool, typer.Option("--diff", help="Print the lines that change instead of the table.")
     ] = False,
@@ -41,7 +37,7 @@ def apply(
     force: options.Force = False,
 ) -> None:
     """Write masses, centres, inertias, friction and motor inertia of RESULTS into MODEL: numbers
-    change, every other byte stays.
+    change, every other byte stays. Without -o and --in-place it prints what would change.
 
     The file is written whole or not at all, and only with values that a physical robot can have;
     else exit code 2, with the reason.
@@ -50,22 +46,23 @@ def apply(
         from symgen.description.values import assignment
         from symgen.update.apply import apply as applied_to
 
-        if output is not None and output.exists() and not force and not check:
+        if output is not None and in_place:
+            fail("-o writes a file of its own, --in-place MODEL itself; leave one of them out")
+        if output is not None and output.exists() and not force:
             fail(f"{output} exists already; choose another name or add --force")
         locked = dict(assignment(text, "--lock") for text in lock or ())
         applied = applied_to(results, model, robot=robot, lock=locked, chain=chain, exact=exact)
         typer.echo(
             applied.to_json() if json else applied.diff() if diff else str(applied), nl=not json
         )
-        if not check:
-            path = applied.write(output or model)
-            typer.echo(f"written: {path.name if output is None else output}", err=True)
-            if path.parent != model.resolve().parent and applied.names_files:
-                typer.echo(
-                    (
-                        f"note: {output} lies in another folder than {model.name}; paths of meshes "
-                        "in "
-                        "it are as they were"
-                    ),
-                    err=True,
-                )
+        if output is None and not in_place:
+            ways = f"-o FILE writes another file, --in-place writes {model.name}"
+            typer.echo(f"nothing is written; {ways}", err=True)
+            return
+        path = applied.write(output or model)
+        typer.echo(f"written: {path.name if output is None else output}", err=True)
+        if path.parent != model.resolve().parent and applied.names_files:
+            typer.echo(
+                f"note: {output} lies in another folder than {model.name}; paths of meshes in it are as they were",
+                err=True,
+            )

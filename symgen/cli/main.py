@@ -26,7 +26,7 @@ VERBS = {
     "simulate": "Simulate the closed loop of a study file and write its record.",
     "datasets": "List the measured records this program knows.",
     "convert": "Write a robot in another format: .yaml, .urdf.",
-    "apply": "Write identified values into your own URDF or MJCF, in place.",
+    "apply": "Write identified values into your own URDF or MJCF.",
     "new": "Write a skeleton robot file.",
     "schema": "Print the JSON Schema of robot files or of results.",
     "studio": "Serve a local page where one works: robot, record, check, solve, results.",

@@ -31,7 +31,7 @@ from symgen.description.tree_parts import TreePart
 from symgen.errors import DescriptionError
 from symgen.update.applied import Applied
 from symgen.update.nearest import NONE, nearest, strange
-from symgen.update.robot_text import read_text, require_same_frames
+from symgen.update.places import read_text, require_same_frames
 from symgen.update.writing import UNITS, Writing
 from symgen.update.xml_edits import XmlEdits, same
 

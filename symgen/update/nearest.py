@@ -1,16 +1,24 @@
-"""Parameters of the links of a file that give the identified base parameters, as near to the file's
-as physics allows.
+"""Numbers of a file that give the identified base parameters, as near to the file's as physics
+allows: the feasible program of `identify`, with the file as prior.
 
-    min ||S^-1 (chi - chi0)||     subject to  K chi = X,  every condition of `runtime.model.inertia`
+    min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of `runtime.model.inertia`
 
-chi are ten parameters for each link of the file that has inertia, in the frame of the body it
-belongs to, and those of the elements on the joints;
-chi0 are the values of the file, S their sizes. A body may be several links, held together by fixed
-joints: the record knows their sum. First the link that the joint carries changes alone; only where
-no physical link is left, the others change with it. What the torques cannot tell from a motor
-inertia is one, whether the format has a place for it or not; other elements that the file does not
-have change only where links cannot take them in. Without conditions chi = chi0 + G (X - K chi0);
-the semidefinite program is solved where that is no physical robot.
+u are the numbers that the file states, u0 as it states them, S their sizes: of each link with
+inertia mass M, centre c and tensor I about it, and the parameters of the elements on the joints.
+chi are the ten parameters of each link in the frame j of its body, and those of the elements:
+
+    MS = M c,    J = I + M (c'c 1 - c c')
+
+A link has a mass density if and only if M > 0 and tr(I)/2 1 - I is positive semidefinite, so that
+the conditions are linear in u; K chi(u) is linearised, and the program solved again until it stays.
+A number on which no base parameter depends does not move, nor does a mass that enters none but by
+its first moment and its tensor.
+
+A body may be several links, held together by fixed joints: the record knows their sum. First the
+link that the joint carries changes alone; only where no physical link is left, the others change
+with it. What the torques cannot tell from a motor inertia is one, whether the format has a place
+for it or not; other elements that the file does not have change only where links cannot take them
+in.
 """
 
 from __future__ import annotations
@@ -20,69 +28,130 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.estimators.feasibility import feasibility, limit_rows, scales
-from runtime.estimators.semidefinite import closest, solutions
+from runtime.estimators.feasibility import feasibility, nearest_standard, scales
 from runtime.limits import LIMIT
-from runtime.model.inertia import INERTIAL, PhysicalModel
+from runtime.model.inertia import INERTIAL, Condition, PhysicalModel
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
+from symgen.update.places import FileLink
 
 NONE = "no physical robot of this file has the estimate"
 MISSED = 1e-9  # of the size of a base parameter: more is not reached
-ACCURACY = 1e-7  # of the size of a parameter, of the semidefinite program
-UNMOVED = 1e-12  # of the size of a parameter
-IN_PROGRAM = 1e2  # size of a motor inertia beside that of the file, in the program
-NEAR = 1e-6  # of the size of a parameter: nearer to the file is rounding
+STEPS, SETTLED = 30, 1e-15  # of Newton, and what they change at last
+FAR = 1e6  # sizes that a number may move
+ROTORS = 1e6  # size of a motor inertia beside that of the file
+NEAR = 1e-6  # of the size of a number: nearer to the file is rounding
+BARRIER = 2 * LIMIT.LEAST_EIGENVALUE  # what the program keeps an element from zero
 STRANGE = 2.0  # mass over that of the file
 TINY = 1e-15  # SI; an eigenvalue so little below zero is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class FileLink:
-    """A link of the file with inertia.
-
-    Attributes
-    ----------
-    name : str
-        Of the file.
-    j : int
-        Body it belongs to.
-    ten : ndarray, shape (10,)
-        XX .. ZZ, MX, MY, MZ, M of the file in frame j.
-    """
-
-    name: str
-    j: int
-    ten: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Nearest:
-    """Parameters chi, shape (p,), of the links of a file and of the elements on its joints.
+    """Numbers u, shape (p,), of the links of a file and of the elements on its joints.
 
     Attributes
     ----------
-    chi, chi0 : ndarray, shape (p,)
+    u, u0 : ndarray, shape (p,)
         Found, and of the file.
+    chi : ndarray, shape (p,)
+        Standard parameters chi(u).
     gain : ndarray, shape (p, b)
-        d chi / d X without conditions.
-    free : ndarray, shape (p, p)
-        Projection on what X leaves open.
+        d u / d X without conditions.
+    seen, told : ndarray of bool, shape (p,)
+        Numbers that a base parameter depends on, and those that X alone tells.
     links : mapping of list of int
-        Places of the ten parameters of each link.
+        Places of the ten numbers of each link.
     elements : mapping of int
         Place of each parameter of an element.
     spread : tuple of str
         Links behind fixed joints that had to change too.
     """
 
+    u: Array
+    u0: Array
     chi: Array
-    chi0: Array
     gain: Array
-    free: Array
+    seen: Array
+    told: Array
     links: Mapping[str, list[int]]
     elements: Mapping[str, int]
     spread: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The unknowns of the program.
+
+    Attributes
+    ----------
+    physical : PhysicalModel
+        With ten parameters by link of the file, and the elements.
+    links : list of (FileLink, list of int)
+        Links, and the places of their ten.
+    u0, size, ease : ndarray, shape (p,)
+        As the file states them, their sizes, and how many of these they change as readily as
+        others change one.
+    masses : ndarray of bool, shape (p,)
+        Masses that enter no base parameter but by first moments and tensors.
+    """
+
+    physical: PhysicalModel
+    links: Sequence[tuple[FileLink, list[int]]]
+    u0: Array
+    size: Array
+    ease: Array
+    masses: Array
+
+    def head(self, count: int) -> Numbers:
+        """The first `count` numbers alone."""
+        p = self.physical
+        kept = tuple(c for c in p.conditions if max(c.numbers) < count)
+        part = replace(p, standard=p.standard[:count], K=p.K[:, :count], conditions=kept)
+        links = [(link, at) for link, at in self.links if at[-1] < count]
+        of_numbers = (self.u0, self.size, self.ease, self.masses)
+        return Numbers(part, links, *(x[:count] for x in of_numbers))
+
+    def chi(self, u: Array) -> Array:
+        """Standard parameters of numbers u, shape (p,)."""
+        chi = u.copy()
+        for link, at in self.links:
+            chi[at] = link.place.ten(u[at])
+        return chi
+
+    def slope(self, u: Array) -> Array:
+        """d chi / d u, shape (p, p): chi is of second order in every number."""
+        T = np.eye(len(u))
+        for link, at in self.links:
+            for k, place in enumerate(at):
+                step = np.zeros(10)
+                step[k] = self.size[place]
+                rise = link.place.ten(u[at] + step) - link.place.ten(u[at] - step)
+                T[at, place] = rise / (2 * self.size[place])
+        return T
+
+    def seen(self, u: Array) -> Array:
+        """Numbers that a base parameter depends on, bool (p,)."""
+        A = self.physical.K @ self.slope(u) * self.size
+        share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
+        return np.asarray(np.any(share, axis=0))
+
+    @property
+    def conditions(self) -> list[Condition]:
+        """Those of the model on chi, stated on u: of a link about its centre."""
+        of_links = {tuple(at) for _, at in self.links}
+        return [
+            _about_the_centre(c) if c.numbers in of_links else c for c in self.physical.conditions
+        ]
+
+
+def _about_the_centre(c: Condition) -> Condition:
+    """The condition of a link on mass, centre and tensor about it: NUMBERS in the place of
+    INERTIAL.
+    """
+    B = np.zeros_like(c.B)
+    B[0], B[4:] = c.B[9], c.B[:6]
+    return replace(c, B=B)
 
 
 def nearest(
@@ -93,7 +162,7 @@ def nearest(
     X: Array,
     absent: Collection[str] = (),
 ) -> Nearest:
-    """The parameters of `links`, and of the elements, nearest to those of the file.
+    """The numbers of `links`, and of the elements, nearest to those of the file.
 
     Parameters
     ----------
@@ -115,30 +184,40 @@ def nearest(
     DescriptionError
         A base parameter that no link of the file can give, or no physical robot.
     """
-    whole, places, elements, counts = _of_file(physical, links, values, absent)
-    K, chi0 = whole.rows(names), np.array([whole.values[name] for name in whole.standard])
+    whole, elements, counts = _of_file(physical, links, values, absent)
+    K, chi0 = whole.physical.rows(names), whole.chi(whole.u0)
+    answer = ""
     for count in counts:
-        part = _head(whole, count)
+        part = whole.head(count)
         rest = X - K[:, count:] @ chi0[count:]
-        chi, answer = _within(part, names, rest, X)
-        if chi is not None:
+        u, answer = _within(part, names, rest, X)
+        if u is not None:
             break
     else:
         raise DescriptionError(f"{NONE}: {answer.replace('NOT physically feasible: ', '')}")
-    K_part = K[:, :count]
-    G = _gain(K_part, scales(part), _rotors(part))
-    solution, gain, free = (
-        chi0.copy(),
-        np.zeros((len(chi0), len(X))),
-        np.zeros((len(chi0), len(chi0))),
-    )
-    solution[:count], gain[:count], free[:count, :count] = chi, G, np.eye(count) - G @ K_part
-    moved = [
+    found = np.concatenate([u, whole.u0[count:]])
+    places = {link.name: at for link, at in whole.links}
+    moved = tuple(
         name
         for name, at in places.items()
-        if at[0] >= counts[-2] and not _unmoved(solution, chi0, whole, at)
-    ]
-    return Nearest(solution, chi0, gain, free, places, elements, tuple(moved))
+        if at[0] >= counts[-2] and np.any(found[at] != whole.u0[at])
+    )
+    gain, told = np.zeros((len(found), len(X))), np.zeros(len(found), dtype=bool)
+    S = np.where(part.masses, 0.0, part.size * part.ease)
+    A = K[:, :count] @ part.slope(u) * S
+    gain[:count] = S[:, None] * np.linalg.pinv(A, rcond=1e-12)
+    told[:count] = np.linalg.norm(np.eye(count) - np.linalg.pinv(A, rcond=1e-12) @ A, axis=1) < NEAR
+    return Nearest(
+        found,
+        whole.u0,
+        whole.chi(found),
+        gain,
+        whole.seen(found) & ~whole.masses,
+        told,
+        places,
+        elements,
+        moved,
+    )
 
 
 def _of_file(
@@ -146,66 +225,67 @@ def _of_file(
     links: Sequence[FileLink],
     values: Mapping[str, float],
     absent: Collection[str],
-) -> tuple[PhysicalModel, dict[str, list[int]], dict[str, int], list[int]]:
-    """The model with ten parameters by link of the file, their places, those of elements, and how
-    many parameters may change, try by try.
+) -> tuple[Numbers, dict[str, int], list[int]]:
+    """The numbers of the file, the places of those of elements, and how many may change, try by
+    try.
 
     First links that lead a body, and elements; then elements that the file does not have and the
     links can take in; then the other links.
     """
     leading = {link.j: link for link in reversed(links)}
-    inertial = {f"{family}{j}": (j, k) for j in physical.links for k, family in enumerate(INERTIAL)}
-    own = [
-        name for name in physical.standard if name not in inertial or inertial[name][0] in leading
-    ]
-    spare = _spare(physical, own, [name for name in absent if name in own])
-    own = [*(name for name in own if name not in spare), *spare]
-    counts = [len(own) - len(spare), len(own)]
-    of = {
-        name: float(leading[inertial[name][0]].ten[inertial[name][1]])
-        if name in inertial
-        else values.get(name, 0.0)
-        for name in own
-    }
-    columns = [physical.standard.index(name) for name in own]
-    standard, conditions = list(own), []
-    elements = {name: k for k, name in enumerate(own) if name not in inertial}
-    places: dict[str, list[int]] = {}
-    for condition in physical.conditions:
-        named = [physical.standard[k] for k in condition.numbers]
-        if all(name in own for name in named):
-            j = inertial[named[0]][0] if named[0] in inertial else 0
-            numbers = tuple(own.index(name) for name in named)
-            conditions.append(
-                replace(
-                    condition,
-                    name=f"link {leading[j].name!a:.60}" if j else condition.name,
-                    numbers=numbers,
-                    size=np.ones(len(condition.size)),
-                )
-            )
-            if j:
-                places[leading[j].name] = list(numbers)
-    for v, link in enumerate(
-        (link for link in links if link is not leading[link.j]),
-        start=max(physical.links, default=0) + 1,
-    ):
-        at = list(range(len(standard), len(standard) + 10))
-        standard += [f"{family}{v}" for family in INERTIAL]
-        of |= dict(zip(standard[-10:], map(float, link.ten), strict=True))
-        columns += [physical.standard.index(f"{family}{link.j}") for family in INERTIAL]
-        condition = next(c for c in physical.conditions if c.name == f"link {link.j}")
-        name = f"link {link.name!a:.60}"
-        conditions.append(replace(condition, name=name, numbers=tuple(at), size=np.ones(4)))
-        places[link.name] = at
-    whole = replace(
-        physical,
-        standard=tuple(standard),
-        K=physical.K[:, columns],
-        conditions=tuple(conditions),
-        values=of,
+    led = [leading[j] for j in physical.links if j in leading]
+    others = [link for link in links if link is not leading[link.j]]
+    inertial = {f"{family}{j}" for j in physical.links for family in INERTIAL}
+    names = [name for name in physical.standard if name not in inertial]
+    of_led = [f"{family}{link.j}" for link in led for family in INERTIAL]
+    spare = _spare(physical, [*of_led, *names], [name for name in absent if name in names])
+    names = [*(name for name in names if name not in spare), *spare]
+    first = len(of_led) + len(names)
+    counts = [first - len(spare), first, first + 10 * len(others)]
+    columns = [*of_led, *names, *(f"{family}{link.j}" for link in others for family in INERTIAL)]
+    places = [list(range(10 * k, 10 * k + 10)) for k in range(len(led))]
+    places += [list(range(first + 10 * k, first + 10 * k + 10)) for k in range(len(others))]
+    elements = {name: len(of_led) + k for k, name in enumerate(names)}
+    conditions = []
+    of_body = {c.name: c for c in physical.conditions}
+    for link, at in zip([*led, *others], places, strict=True):
+        c = of_body[f"link {link.j}"]
+        conditions.append(
+            replace(c, name=f"link {link.name!a:.60}", numbers=tuple(at), size=np.ones(4))
+        )
+    for c in physical.conditions:
+        named = [physical.standard[k] for k in c.numbers]
+        if all(name in elements for name in named):
+            numbers = tuple(elements[name] for name in named)
+            conditions.append(replace(c, numbers=numbers, size=np.ones(len(c.size))))
+    u0 = np.array([values.get(name, 0.0) for name in columns])
+    size = np.ones(len(columns))
+    for link, at in zip([*led, *others], places, strict=True):
+        u0[at], size[at] = link.numbers, _sizes_of(link.numbers)
+    further = range(max(physical.links) + 1, max(physical.links) + 1 + len(others))
+    standard = (*columns[:first], *(f"{family}{v}" for v in further for family in INERTIAL))
+    K = physical.K[:, [physical.standard.index(name) for name in columns]]
+    led_bodies = tuple(link.j for link in led)
+    of_file = replace(
+        physical, standard=standard, K=K, links=led_bodies, conditions=tuple(conditions)
     )
-    return whole, places, elements, [*counts, len(standard)]
+    at = list(elements.values())
+    size[at] = scales(replace(physical, standard=tuple(names), values=dict(values)))
+    ease = np.array([ROTORS if name.startswith("Ia") else 1.0 for name in columns])
+    masses = np.zeros(len(columns), dtype=bool)
+    for at in places:
+        masses[at[0]] = not np.any(K[:, at[-1]])
+    of_links = list(zip([*led, *others], places, strict=True))
+    whole = Numbers(of_file, of_links, u0, size, ease, masses)
+    values_of_file = dict(zip(standard, whole.chi(u0).tolist(), strict=True))
+    return replace(whole, physical=replace(of_file, values=values_of_file)), elements, counts
+
+
+def _sizes_of(x: Array) -> Array:
+    """Sizes of NUMBERS: mass, how far the link extends, its moments."""
+    M, moments = x[0], float(np.abs(x[[4, 7, 9]]).sum()) / 2
+    extent = np.sqrt(x[1:4] @ x[1:4] + moments / M) if M > 0 else 1.0
+    return np.array([M, *[max(extent, 1e-3)] * 3, *[max(moments, 1e-3 * M * extent**2)] * 6])
 
 
 def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -> list[str]:
@@ -224,29 +304,12 @@ def _spare(physical: PhysicalModel, own: Sequence[str], absent: Sequence[str]) -
     return spare
 
 
-def _head(whole: PhysicalModel, count: int) -> PhysicalModel:
-    """The model with its first `count` parameters alone."""
-    conditions = tuple(c for c in whole.conditions if max(c.numbers) < count)
-    return replace(
-        whole, standard=whole.standard[:count], K=whole.K[:, :count], conditions=conditions
-    )
-
-
-def _within(
-    part: PhysicalModel, names: Sequence[str], rest: Array, X: Array
-) -> tuple[Array | None, str]:
-    """chi of the parameters of `part` with K chi = rest; None, and why, where no physical robot has
-    them.
-    """
-    K, S, chi0, rotors = (
-        part.rows(names),
-        scales(part),
-        np.array([part.values[name] for name in part.standard]),
-        _rotors(part),
-    )
-    chi = chi0 + _gain(K, S, rotors) @ (rest - K @ chi0)
-    sizes = np.maximum(np.abs(X), np.abs(K) @ S)
-    missed = np.abs(K @ chi - rest) > MISSED * np.maximum(sizes, MISSED)
+def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple[Array | None, str]:
+    """Numbers with K chi(u) = rest; None, and why, where no physical robot has them."""
+    K = part.physical.rows(names)
+    sizes = np.maximum(np.abs(X), np.abs(K) @ scales(part.physical))
+    reached = K @ np.linalg.lstsq(K, rest, rcond=None)[0]
+    missed = np.abs(reached - rest) > MISSED * np.maximum(sizes, MISSED)
     if missed.any():
         lost = ", ".join(
             f"{name} = {x:.4g}" for name, x, out in zip(names, X, missed, strict=True) if out
@@ -255,115 +318,66 @@ def _within(
             f"the links of this file cannot have {lost}: a body without inertial has no place for "
             "it; add an inertial to the link that moves"
         )
-    moved = [c for c in part.conditions if not _unmoved(chi, chi0, part, list(c.numbers))]
-    if all(c.smallest(chi) >= -TINY for c in moved):
-        clean = _as_it_was(K, S, rest, chi, chi0, NEAR * S, rotors)
-        if np.abs(K @ clean - rest).max() <= MISSED * sizes.max() and min(
-            part.smallest(clean).values()
-        ) >= min(0.0, *part.smallest(chi).values()):
-            chi = clean
-        return chi, ""
-    free = np.abs(np.eye(len(chi)) - _gain(K, S, rotors) @ K) @ S / S
-    still = [
-        c for c in part.conditions if free[list(c.numbers)].max() < MISSED
-    ]  # X tells all of it
-    if broken := [c.name for c in still if c in moved and c.smallest(chi) < -LIMIT.MARGIN_ROUNDING]:
-        return (
-            None,
-            (
-                "no positive mass density and friction gives these parameters; in the way: "
-                f"{', '.join(broken)}"
-            ),
-        )
-    part = replace(part, conditions=tuple(c for c in part.conditions if c not in still))
-    answer = feasibility(part, names, rest)
-    if not answer.feasible:
-        return None, answer.text
-    return _solved(part, K, np.where(rotors, IN_PROGRAM, 1.0) * S, rest, answer.chi), ""
+    u = _solved(part, K, rest, part.u0, ~part.masses)
+    if u is None or _violated(part, u):
+        answer = feasibility(part.physical, names, rest)
+        if not answer.feasible:
+            return None, answer.text
+        u = _held(part, nearest_standard(part.physical, names, rest, answer.chi))
+    near = NEAR * part.size
+    near[[c.numbers[0] for c in part.conditions if len(c.numbers) == 1]] += BARRIER
+    moved = np.abs(u - part.u0) > near
+    clean = _solved(part, K, rest, np.where(moved, u, part.u0), moved)
+    if clean is None or np.abs(K @ part.chi(clean) - rest).max() > MISSED * sizes.max():
+        return u, ""
+    return (u if _violated(part, clean) else clean), ""
 
 
-def _solved(part: PhysicalModel, K: Array, S: Array, rest: Array, start: Array) -> Array:
-    """The nearest chi with K chi = rest that fulfils every condition, `start` one that does."""
-    chi0 = np.array([part.values[name] for name in part.standard])
-    own = [
-        x for c in part.conditions if (x := c.smallest(chi0)) > 0
-    ]  # small links have small eigenvalues
-    least = max(
-        min(
-            [LIMIT.LEAST_EIGENVALUE, min(part.smallest(start).values()) / 2, *(x / 2 for x in own)]
-        ),
-        LIMIT.LEAST_EIGENVALUE**2,
-    )
-    optimum = closest(
-        np.diag(1 / S),
-        chi0 / S,
-        part.conditions,
-        limit_rows(part, None),
-        solutions(K, rest, S),
-        least=least,
-    )
-    near = ACCURACY * S
-    near[[c.numbers[0] for c in part.conditions if len(c.numbers) == 1]] += 2 * least
-    for chi in (
-        (_as_it_was(K, S, rest, optimum.chi, chi0, near, _rotors(part)), optimum.chi)
-        if optimum.solved
-        else ()
-    ):
-        if min(part.smallest(chi).values()) >= 0:
-            return chi
-    return start
+def _violated(part: Numbers, u: Array) -> bool:
+    """Whether a condition on numbers that moved does not hold."""
+    moved = u != part.u0
+    return any(c.smallest(u) < -TINY for c in part.conditions if moved[list(c.numbers)].any())
 
 
-def _as_it_was(
-    K: Array, S: Array, rest: Array, chi: Array, chi0: Array, near: Array, rotors: Array
-) -> Array:
-    """chi with the parameters that differ from those of the file by `near`, the accuracy of the
-    solver, set to these.
+def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
+    """The numbers nearest to `start` without conditions, of which those that are `free` move; None
+    where the steps do not settle.
     """
-    moved = np.abs(chi - chi0) > near
-    chi = np.where(moved, chi, chi0)
-    chi[moved] += _gain(K[:, moved], S[moved], rotors[moved]) @ (rest - K @ chi)
-    return chi
+    S, u = (part.size * part.ease)[free], start.copy()
+    for _ in range(STEPS):
+        A = K @ part.slope(u)[:, free]
+        wanted = rest - K @ part.chi(u) + A @ (u - start)[free]
+        step = S * (np.linalg.pinv(A * S, rcond=1e-12) @ wanted)
+        if not np.all(np.abs(step) <= FAR * S):
+            return None
+        before, u = u, start.copy()
+        u[free] += step
+        if np.all(np.abs(u - before) <= SETTLED * part.size):
+            break
+    return u
+
+
+def _held(part: Numbers, chi: Array) -> Array:
+    """Numbers of chi; of each link those that no base parameter tells are the file's, unless that
+    is no physical link.
+    """
+    u = chi.copy()
+    for link, at in part.links:
+        u[at] = link.place.numbers(chi[at])
+    held = np.where(part.seen(u), u, part.u0)
+    for c in part.conditions:
+        at = list(c.numbers)
+        u[at] = held[at] if c.smallest(held) >= 0 else u[at]
+    return u
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
     """What of a link is no longer that of the file, a sentence; "" where its mass is within STRANGE
     times that and its centre has moved by less than the link extends.
     """
-    (before, m0), (after, m) = (
-        (ten[6:9] / ten[9] if ten[9] else ten[6:9], ten[9])
-        for ten in (link.ten, closest.chi[closest.links[link.name]])
-    )
-    far = float(np.linalg.norm(after - before))
+    before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
+    m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))
     extent = np.sqrt(max(link.ten[[0, 3, 5]].sum(), 0.0) / 2 / m0) if m0 else 0.0
     if m0 / STRANGE <= m <= STRANGE * m0 and far <= extent:
         return ""
     return f"link {link.name!a:.60} of {m:.3g} kg (file {m0:.3g}), its centre {far:.2g} m away"
-
-
-def _rotors(part: PhysicalModel) -> Array:
-    """Whether each parameter is a motor inertia, bool (p,)."""
-    return np.array([name.startswith("Ia") for name in part.standard])
-
-
-def _gain(K: Array, S: Array, rotors: Array) -> Array:
-    """G, shape (p, b): d chi = G d X, first of motor inertias, bool (p,), what they can give, then
-    the smallest change of the others in sizes S: with Q the projection on what motor inertias
-    cannot give, G_l = S_l (Q K_l S_l)^+ Q, G_m = S_m (K_m S_m)^+ (1 - K_l G_l).
-    """
-    G, one = np.zeros(K.T.shape), np.eye(len(K))
-    of_rotors = _smallest(K[:, rotors], S[rotors])
-    Q = one - K[:, rotors] @ of_rotors
-    G[~rotors] = _smallest(Q @ K[:, ~rotors], S[~rotors]) @ Q
-    G[rotors] = of_rotors @ (one - K[:, ~rotors] @ G[~rotors])
-    return G
-
-
-def _smallest(K: Array, S: Array) -> Array:
-    """S (K S)^+: the smallest change in sizes S for a change of K chi."""
-    return np.asarray(S[:, None] * np.linalg.pinv(K * S, rcond=1e-12))
-
-
-def _unmoved(chi: Array, chi0: Array, part: PhysicalModel, at: Sequence[int]) -> bool:
-    S = scales(part)
-    return bool(np.all(np.abs(chi - chi0)[at] <= UNMOVED * S[: len(chi)][at]))

@@ -17,13 +17,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import permutations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from symgen.description.fields import located
+from symgen.description.files import TREES
 from symgen.description.mjcf_text import DEEPEST, ORIENTATION
-from symgen.description.tree import FIXED_TYPE, Array, Joint, Tree
-from symgen.description.tree_robot import inertial_of
+from symgen.description.robot import FIXED, Robot
+from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree
+from symgen.description.tree_frames import Table, placed
+from symgen.description.tree_parts import TreePart, part_of
+from symgen.description.tree_robot import (
+    JOINT_TERMS,
+    inertial_of,
+    parse_tree,
+    robot_of_tree,
+    ten_of,
+)
 from symgen.description.xml_text import XmlElement, read_elements
 from symgen.errors import DescriptionError
 from symgen.update.xml_edits import XmlEdits, numbers, same
@@ -35,6 +47,7 @@ NUMBERS = (  # of a link: what, label and unit, in the order of `LinkPlace.numbe
 )
 SPRING = ("K", "OFFSET")  # of a joint that has one: OFFSET = -stiffness springref
 DIAGONAL = 1e-12  # of the largest moment: smaller products are none
+POSE = 1e-6  # m, rad: frames of two descriptions of one robot differ by no more
 
 
 @dataclass(frozen=True)
@@ -133,9 +146,17 @@ class LinkPlace:
         tensor = (turned.T @ own.I @ turned)[np.triu_indices(3)]
         return np.array([own.M, *(R.T @ (own.pose[:3, 3] - self.X[:3, 3])), *tensor])
 
-    def write(self, edits: XmlEdits, ten: Array) -> None:
-        """The edits that make the file state `ten`."""
-        x = self.numbers(ten)
+    def ten(self, x: Array) -> Array:
+        """The ten parameters in frame j, shape (10,), of NUMBERS that the file states."""
+        pose, (xx, xy, xz, yy, yz, zz) = np.eye(4), x[4:]
+        if self.principal or self.attributes is URDF:
+            pose[:3, :3] = self.axes
+        pose[:3, 3] = x[1:4]
+        I = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return ten_of(Inertial(float(x[0]), pose, I), self.X)
+
+    def write(self, edits: XmlEdits, x: Array) -> None:
+        """The edits that make the file state NUMBERS x, shape (10,)."""
         if self.inertial is None:
             row = self.attributes.inertial[""]
             words = _words({key: x[[*row[key]]] for key in ("pos", "mass", "fullinertia")})
@@ -322,3 +343,118 @@ def _bodies(e: XmlElement) -> Iterator[XmlElement]:
             yield child
         if child.tag in ("body", "frame"):
             yield from _bodies(child)
+
+
+@dataclass(frozen=True, eq=False)
+class FileLink:
+    """A link of the file with inertia.
+
+    Attributes
+    ----------
+    name : str
+        Of the file.
+    j : int
+        Body it belongs to.
+    ten : ndarray, shape (10,)
+        XX .. ZZ, MX, MY, MZ, M of the file in frame j.
+    place : LinkPlace
+        Where its numbers stand.
+    """
+
+    name: str
+    j: int
+    ten: Array
+    place: LinkPlace
+
+    @property
+    def numbers(self) -> Array:
+        """NUMBERS, shape (10,), as the file states them."""
+        return self.place.numbers(self.ten) if self.place.stated is None else self.place.stated
+
+
+@dataclass(frozen=True, eq=False)
+class RobotText:
+    """A file of links and joints, and what it says.
+
+    Attributes
+    ----------
+    file : str
+        Its name.
+    tree : Tree
+        Links and joints of the part of it that is read.
+    table : Table
+        Khalil frames of `tree`.
+    robot : Robot
+        The robot of `tree`.
+    places : Places
+        Where the numbers stand.
+    """
+
+    file: str
+    tree: Tree
+    table: Table
+    robot: Robot
+    places: Places
+
+    @property
+    def links(self) -> list[FileLink]:
+        """The links with inertia of the bodies that move, body by body, the one that the joint
+        carries first.
+        """
+        return [
+            FileLink(name, j, ten_of(inertial, X), self.places.link(name, self.tree, X))
+            for j in self.robot.links
+            for name, X in self.table.bodies[j].links.items()
+            if (inertial := self.tree.links[name]) is not None and np.any(ten_of(inertial, X))
+        ]
+
+    def joint_values(self, j: int) -> dict[str, float]:
+        """What the file says of the elements along joint j, by family."""
+        return {family: value(self.table.joint[j]) for family, _, value in JOINT_TERMS}
+
+    def attribute(self, family: str, j: int) -> str | None:
+        """Where joint j holds a parameter; None: the format has no place for it."""
+        return self.places.attribute(family, self.table.joint[j])
+
+
+def read_text(content: bytes, path: Path, exact: bool, part: TreePart) -> RobotText:
+    """The file as `symgen.description.read_robot` reads it.
+
+    Raises
+    ------
+    DescriptionError
+        No URDF or MJCF; the message names file and line.
+    """
+    with located(path.name):
+        if (suffix := path.suffix.lower()) not in TREES:
+            raise DescriptionError(
+                "values go back into a URDF (.urdf) or an MJCF (.xml, .mjcf); a robot file takes "
+                "them by `symgen convert --estimate`"
+            )
+        whole = parse_tree(content, path.name, exact=exact)
+        attributes = URDF if suffix == ".urdf" else MJCF
+        tree = part_of(whole, part)
+        robot = robot_of_tree(tree, path.name, "")[0]
+        places = Places(content, whole, attributes)
+        return RobotText(path.name, tree, placed(tree), robot, places)
+
+
+def require_same_frames(text: RobotText, robot: Robot, file: str) -> None:
+    """Raise DescriptionError unless the frames of `robot` are those of the text: parameters of a
+    link mean nothing in another frame.
+    """
+    ours, theirs = ({f.j: f for f in one.frames} for one in (text.robot, robot))
+    different = [
+        j for j in ours.keys() ^ theirs.keys() if j in ours or theirs[j].sigma != FIXED
+    ]  # kept frames come last
+    for j in ours.keys() & theirs.keys():
+        pairs = zip(ours[j].at_zero, theirs[j].at_zero, strict=True)
+        apart = max(abs(x.value(text.robot.constants) - y.value(robot.constants)) for x, y in pairs)
+        if apart > POSE or (ours[j].ant, ours[j].sigma) != (theirs[j].ant, theirs[j].sigma):
+            different.append(j)
+    if different:
+        raise DescriptionError(
+            f"{file} and {text.file} have other frames {', '.join(map(str, sorted(different)))}: "
+            "say --chain, --lock and --exact as when the one was "
+            "converted from the other"
+        )

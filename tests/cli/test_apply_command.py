@@ -1,5 +1,5 @@
-"""`symgen apply`: in place or into another file, --check writes nothing, an existing file is whole
-or as it was, errors are one line.
+"""`symgen apply`: in place or into another file, neither asked nothing is written, an existing file is
+whole or as it was, errors are one line.
 """
 
 import json
@@ -48,16 +48,23 @@ def test_in_place_and_into_another_file(folder) -> None:
         and "+25.00" in said
     )
     assert "exists already" in run("results", "arm.xml", "-o", "new.xml", code=2).stderr
-    run("results/estimate.json", "arm.xml")
+    run("results/estimate.json", "arm.xml", "--in-place")
     assert Path("arm.xml").read_text() == EXPECTED
-    assert "no number changes" in run("results", "arm.xml").stdout
+    assert "no number changes" in run("results", "arm.xml", "--in-place").stdout
+    both = run("results", "arm.xml", "--in-place", "-o", "x.xml", code=2).stderr
+    assert "leave one of them out" in both
     assert sorted(p.name for p in folder.iterdir()) == ["arm.xml", "new.xml", "results"]
 
 
-def test_check_writes_nothing(folder) -> None:
-    run("results", "arm.xml", "--check")
-    assert '-        <body name="a2"' in run("results", "arm.xml", "--check", "--diff").stdout
-    changes = json.loads(run("results", "arm.xml", "--check", "--json", "-o", "x.xml").stdout)
+def test_nothing_is_written_unless_asked(folder) -> None:
+    told = run("results", "arm.xml")
+    assert "0.0625" in told.stdout
+    assert (
+        told.stderr
+        == "nothing is written; -o FILE writes another file, --in-place writes arm.xml\n"
+    )
+    assert '-        <body name="a2"' in run("results", "arm.xml", "--diff").stdout
+    changes = json.loads(run("results", "arm.xml", "--json").stdout)
     (change,) = changes["changes"]
     assert (change["place"], change["number"], change["before"]) == (
         "joint 'a2'",
@@ -91,7 +98,7 @@ def test_an_existing_file_is_never_half_written(folder, monkeypatch) -> None:
 
 def test_a_link_to_the_file_stays_one(folder) -> None:
     Path("link.xml").symlink_to("arm.xml")
-    run("results", "link.xml")
+    run("results", "link.xml", "--in-place")
     assert Path("link.xml").is_symlink() and Path("arm.xml").read_text() == EXPECTED
 
 
