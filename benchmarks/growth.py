@@ -5,8 +5,7 @@ figure.
 
 Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by
 the NumPy and the C module; largest resident set of
-`symgen identify` with the whole record in memory and by blocks (memory.py). Joints, 2 to 30:
-revolute chains and binary trees with friction; generation
+`symgen identify`. Joints, 2 to 30: revolute chains and binary trees with friction; generation
 from the robot file to the text of the module, the time of compiling C up to 12, and the regressor
 of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
@@ -22,6 +21,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
+import subprocess
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -34,7 +36,6 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from memory import BLOCK, identified, write_npz
 
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
@@ -98,22 +99,36 @@ def by_samples(models: dict[str, GeneratedModel], samples: tuple[int, ...]) -> C
             columns.entries  # noqa: B018 (found once)
             plan = decimation_plan(N, 40, Decimate(factor=40))
             found.setdefault(f"decimated signals, {label}", []).append(
-                (N, least(lambda: columns.signals(states, plan)))  # noqa: B023
+                (N, least(lambda: list(columns.signals(states, plan))))  # noqa: B023
             )
     return found
 
 
 def memory(folder: Path, model: GeneratedModel, samples: tuple[int, ...]) -> Curves:
-    """MB of `symgen identify`, with the whole record in memory and by blocks, beside what W would
-    take.
+    """MB of `symgen identify`, the largest of the processes so far: samples ascend; and what W
+    would take at every sample.
     """
-    found: Curves = {"whole record": [], "by blocks": [], "W alone (never formed)": []}
+    identify = "from symgen.cli.main import main; main()"
+    path, columns = folder / "record.npz", np.arange(1, 7)
+    found: Curves = {"identification": [], "W at every sample (never formed)": []}
     for N in samples:
-        record = write_npz(model, N, folder, "lowpass")
-        found["whole record"].append((N, identified(record, "off")["bytes"] / 1e6))
-        found["by blocks"].append((N, identified(record, BLOCK)["bytes"] / 1e6))
-        found["W alone (never formed)"].append((N, 8 * 6 * len(model.BASE_PARAMETERS) * N / 1e6))
-        record.unlink()
+        t = np.arange(N) / 1000.0
+        q = np.sin(t[:, None] * columns)
+        states = q, columns * np.cos(t[:, None] * columns), -(columns**2) * q
+        tau = model.inverse_dynamics(*states, model.base_parameters(model.VALUES))
+        named = {f"q{j}": q[:, j - 1] for j in columns} | {
+            f"tau{j}": tau[:, j - 1] for j in columns
+        }
+        np.savez(path, t=t, **named)
+        subprocess.run(
+            [sys.executable, "-c", identify, "identify", "tx40", str(path), "--no-plausible"],
+            capture_output=True,
+            check=False,  # the verdict may be no
+        )
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024
+        found["identification"].append((N, peak / 1e6))
+        W = 8 * 6 * len(model.BASE_PARAMETERS) * N
+        found["W at every sample (never formed)"].append((N, W / 1e6))
     return found
 
 

@@ -15,7 +15,7 @@ from typing import BinaryIO, cast
 
 from runtime.errors import InputError
 
-WHOLE = 2**31  # bytes of a file that is read into memory; larger ones are read by blocks
+WHOLE = 2**31  # bytes of a file that is read into memory
 ALWAYS = 2**28  # bytes, 256 MiB: what any file may unpack to
 RATIO = 20  # times its size: what a larger one may unpack to; measured records reach 2 to 10
 PART = 2**20  # bytes read at a time
@@ -97,11 +97,7 @@ def read_bytes(path: Path) -> bytes:
     """The uncompressed bytes of a file."""
     if require_file(path) > WHOLE:
         raise InputError(
-            (
-                f"more than {WHOLE // 2**30} GiB; read it by blocks (stream: 65536 in the study "
-                "file, "
-                "or --block)"
-            ),
+            f"more than {WHOLE // 2**30} GiB; cut it into shorter records",
             file=str(path),
         )
     return b"".join(_parts(path))

@@ -127,25 +127,6 @@ class Workers:
         for other in self.others:
             other.start(*modules)
 
-    def meanwhile(self, function: Callable[[], R]) -> Callable[[], R]:
-        """Evaluate a pickled function in another process, before later tasks; here, when its value
-        is
-        asked for, where no other process has been started, or it dies.
-        """
-        running = [other.pool for other in self.others if other.pool is not None]
-        try:
-            future = running[-1].submit(function)
-        except (IndexError, BrokenProcessPool):
-            return function
-
-        def value() -> R:
-            try:
-                return future.result()
-            except BrokenProcessPool:
-                return function()
-
-        return value
-
     def __enter__(self) -> Workers:
         return self
 
@@ -191,22 +172,6 @@ def results(
         with connected(scheduler, timeout) as cluster:
             shared = _shared(task, context, keys, [cluster], here=False)
             yield from (result for _, result in shared)
-
-
-def in_order(
-    task: Callable[[C, K], R], context: C, keys: Iterable[K], workers: int | Workers = 0
-) -> Iterator[R]:
-    """task(context, key) in the order of the keys, by so many processes; results that come early
-    wait.
-    """
-    waiting: dict[int, R] = {}
-    following = 0
-    with started(workers) as processes:
-        for number, result in _shared(task, context, keys, processes.others):
-            waiting[number] = result
-            while following in waiting:
-                yield waiting.pop(following)
-                following += 1
 
 
 @contextmanager

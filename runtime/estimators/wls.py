@@ -50,7 +50,6 @@ def weighted(
         system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known_variance=True
     )
     if settings.weights == "covariance":
-        observation.require_rows("weights: covariance")
         return _covariance(start)
     return _iterated(start) if settings.weights == "iterated" else start
 

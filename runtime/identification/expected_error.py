@@ -39,7 +39,6 @@ from runtime.estimators.method import linear_companion, linear_system
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, channels_of, joint_units
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
-from runtime.records.stream import Stream
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared
 from runtime.settings.study import EstimateSettings
@@ -61,10 +60,10 @@ def expected_error(
     observation: Observation,
     settings: EstimateSettings,
     fit: Estimate,
-    records: Sequence[Prepared | Stream],
+    records: Sequence[Prepared],
 ) -> Expected:
     """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
-    file nor records in memory tell a range, or a loop does not close in it.
+    file nor records tell a range, or a loop does not close in it.
 
     Parameters
     ----------
@@ -76,7 +75,7 @@ def expected_error(
         that has no weights: a slide of large forces says nothing of the noise of a wrist.
     fit : Estimate
         The parameters that stand for the robot.
-    records : sequence of Prepared or Stream
+    records : sequence of Prepared
     """
     states = reference_states(model, records)
     if states is None or channels_of(model):
@@ -107,7 +106,7 @@ def expected_error(
         (
             acceleration_error(own.record, own.states, own.study.signals, own.drives)
             for own in records
-            if isinstance(own, Prepared) and own.study.signals.reader == "lowpass"
+            if own.study.signals.reader == "lowpass"
         ),
         default=0.0,
     )
@@ -140,18 +139,19 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
 
 
 def reference_states(
-    model: GeneratedModel, records: Sequence[Prepared | Stream]
+    model: GeneratedModel, records: Sequence[Prepared]
 ) -> tuple[Array, Array, Array] | None:
     """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None where no range is
     known.
     """
     limits = dict(getattr(model, "LIMITS", {}) or {})
-    n, whole = len(model.JOINTS), [own for own in records if isinstance(own, Prepared)]
+    n = len(model.JOINTS)
     span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
     if span.shape != (n, 2) or speed.shape != (n,) or not np.isfinite([*span.T, speed]).all():
-        if not whole:
+        if not records:
             return None
-        q, qd = (np.concatenate([getattr(own.states, key) for own in whole]) for key in ("q", "qd"))
+        q = np.concatenate([own.states.q for own in records])
+        qd = np.concatenate([own.states.qd for own in records])
         half, speed = np.ptp(q, axis=0) / 2, np.abs(qd).max(axis=0)
         alike = np.array(joint_units(model))[:, None] == np.array(joint_units(model))
         half, speed = (

@@ -239,12 +239,7 @@ def homogeneity(
 
 
 def _blocks(part: Observation, fit: Estimate) -> list[Array]:
-    """Whitened rows [W Y] of every block of residuals; of rows that are not held, those over the
-    deviation of their joint.
-    """
-    if part.reduced:
-        scale = np.array([1 / joint.sigma_rho for joint in fit.per_joint])
-        return list(part.block_rows(part.names, scale, part.residual_block))
+    """Whitened rows [W Y] of every block of residuals."""
     A, e = np.column_stack([part.W, part.Y]), part.Y - part.W @ fit.X
     instant = np.rint((part.t - part.t.min()) * part.rate).astype(np.intp)
     block = part.blocks()

@@ -33,13 +33,11 @@ from runtime.loop.methods import simulator_of
 from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import physical_model
-from runtime.parallel import Workers, started
 from runtime.plausible.plausibility import plausibility
 from runtime.progress import at
 from runtime.records.provenance import origin, record_names
-from runtime.records.reading_by_blocks import records_or_streams
+from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.records.stream import Stream, in_memory
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac
 from runtime.rows.observation import Observation
@@ -56,9 +54,8 @@ if TYPE_CHECKING:
 __all__ = ["Identification", "assess", "feasibility_of", "identify"]
 
 T = TypeVar("T")
-Measured = tuple[Prepared | Stream, ...]
+Measured = tuple[Prepared, ...]
 """Records as the study reads them."""
-NEED_WHOLE = "a load, friction curves and scalars of laws need"
 NO_CHECKS = "plausibility of the record: not judged beside force sensors; identify without them too"
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
@@ -67,16 +64,15 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 @single_threaded
 def identify(
     model: GeneratedModel,
-    records: Record | Stream | Sequence[Record | Stream],
+    records: Record | Sequence[Record],
     study: Study | None = None,
     *,
-    further: Sequence[Record | Stream] | None = None,
+    further: Sequence[Record] | None = None,
     simulator: Simulator | None = None,
     physical: bool = False,
     friction: bool = False,
     variants: GeneratedModel | None = None,
     plausible: bool | None = None,
-    workers: int | Workers = 1,
     provenance: Mapping[str, Any] | None = None,
 ) -> Identification:
     """Parameters of a robot from its records, and how far to trust them.
@@ -85,11 +81,11 @@ def identify(
     ----------
     model : GeneratedModel
         An emitted module.
-    records : Record, Stream, or a sequence of them
-        Joint side, SI, fitted together. Records are read by blocks where one of them is a stream.
+    records : Record, or a sequence of them
+        Joint side, SI, fitted together.
     study : Study, optional
         Settings; default: Study().
-    further : sequence of Record or Stream, optional
+    further : sequence of Record, optional
         Records that the parameters predict; default: those of study.validate.record, read from
         their files.
     simulator : Simulator, optional
@@ -105,10 +101,6 @@ def identify(
     plausible : bool, optional
         Whether record, study and robot file suit each other (`runtime.plausibility`); default:
         where `variants` is given.
-    workers : int or Workers, optional
-        Processes, this one among them, that read and filter long records by blocks. The results do
-        not depend on it in any bit; a record in memory, or of one
-        piece, takes one process.
     provenance : mapping, optional
         What else reproduces the result; names of the records, hashes and versions are added.
 
@@ -124,19 +116,15 @@ def identify(
     records = tuple(records) if isinstance(records, Sequence) else (records,)
     study = study or Study()
     if further is None:
-        further = records_or_streams(
-            study.validate.record, model, study.stream, missing=study.signals.admits_missing
-        )
+        missing_too = study.signals.admits_missing
+        further = read_records(study.validate.record, model, missing=missing_too)
     wide, records, study, further = with_wrench(model, records, study, further)
     asked = variants is not None if plausible is None else plausible
     plausible = asked and wide is model and study.signals.reader != "static"
     model = wide
     asked_study, statement = at_rest(model, records, of_links(model, study))
     study, lowpass = resolved(asked_study, records)
-    measured: Measured = tuple(
-        record if isinstance(record, Stream) else prepared(model, record, study)
-        for record in records
-    )
+    measured = tuple(prepared(model, record, study) for record in records)
     model, laws, measured, further, load = _with_laws(model, study, measured, further)
     simulator = simulator or simulator_of(model, study)
     measured, further, law = completed(model, study, measured, further)
@@ -148,62 +136,57 @@ def identify(
     }
     names = record_names([*records, *further])
     fitted_names, further_names = names[: len(records)], names[len(records) :]
-    with started(workers) as processes:
-        checks = partial(plausibility, model, measured, asked_study, variants=variants)
-        judged = processes.meanwhile(checks) if plausible else None
-        observe = partial(method_observation, model, study=study, workers=processes)
-        observation = observe(measured, simulator=simulator)
-        observation = _with_findings(observation, law.text if law else "", load, statement)
-        fits = fitted(observation, study, model, provenance)
-        doubt = gain_doubt(model, study, measured, fits.estimate.relative_error)
-        observation = _with_findings(observation, doubt)
-        unseen = {
-            name: observe([record], windows=())
-            for name, record in zip(further_names, further, strict=True)
-        }
-        fits, validation, missing = validated(
-            fits, observation, unseen, study, model, ", ".join(fitted_names)
-        )
-        if asked and not plausible:
-            rest = "plausibility of the record: not judged for poses at rest"
-            missing = (*missing, rest if statement else NO_CHECKS)
-        comparison = direct_comparison(observation.first_rows, fits.best(validation, study))
-        result = Identification(
-            model=model,
-            study=study,
-            prepared=measured,
-            observation=observation,
-            estimate=fits.estimate,
-            essential=fits.reduced,
-            comparison=comparison,
-            validation=validation,
-            sets=fits.sets,
-            homogeneity=agreement(fits, observation, fitted_names, unseen, study, model),
-            missing=missing,
-            correlations=weak_directions(observation, study.estimate),
-            uncertainty=uncertainty(observation, study.estimate, fits.reduced, comparison),
-            laws=laws,
-        )
-        if physical and not result.determined:
-            groups = "; ".join(", ".join(group) for group in result.estimate.groups)
-            text = f"physical consistency: the record does not tell apart {groups}"
-            result, physical = replace(result, missing=(*missing, text)), False
-        result = result if statement else _with_elasticity(result)
-        whole = in_memory(measured, NEED_WHOLE) if friction or study.payload is not None else []
-        return replace(
-            result,
-            payload=None
-            if study.payload is None
-            else payload_study(model, whole, study, provenance=origin(records)),
-            feasibility=feasibility_of(result) if physical else None,
-            friction=friction_curves(model, whole, study, result.estimate) if friction else (),
-            plausibility=judged() if judged else None,
-        )
+    observe = partial(method_observation, model, study=study)
+    observation = observe(measured, simulator=simulator)
+    observation = _with_findings(observation, law.text if law else "", load, statement)
+    fits = fitted(observation, study, model, provenance)
+    doubt = gain_doubt(model, study, measured, fits.estimate.relative_error)
+    observation = _with_findings(observation, doubt)
+    unseen = {name: observe([record]) for name, record in zip(further_names, further, strict=True)}
+    fits, validation, missing = validated(
+        fits, observation, unseen, study, model, ", ".join(fitted_names)
+    )
+    if asked and not plausible:
+        rest = "plausibility of the record: not judged for poses at rest"
+        missing = (*missing, rest if statement else NO_CHECKS)
+    comparison = direct_comparison(observation, fits.best(validation, study))
+    result = Identification(
+        model=model,
+        study=study,
+        prepared=measured,
+        observation=observation,
+        estimate=fits.estimate,
+        essential=fits.reduced,
+        comparison=comparison,
+        validation=validation,
+        sets=fits.sets,
+        homogeneity=agreement(fits, observation, fitted_names, unseen, study, model),
+        missing=missing,
+        correlations=weak_directions(observation, study.estimate),
+        uncertainty=uncertainty(observation, study.estimate, fits.reduced, comparison),
+        laws=laws,
+    )
+    if physical and not result.determined:
+        groups = "; ".join(", ".join(group) for group in result.estimate.groups)
+        text = f"physical consistency: the record does not tell apart {groups}"
+        result, physical = replace(result, missing=(*missing, text)), False
+    result = result if statement else _with_elasticity(result)
+    return replace(
+        result,
+        payload=None
+        if study.payload is None
+        else payload_study(model, measured, study, provenance=origin(records)),
+        feasibility=feasibility_of(result) if physical else None,
+        friction=friction_curves(model, measured, study, result.estimate) if friction else (),
+        plausibility=plausibility(model, measured, asked_study, variants=variants)
+        if plausible
+        else None,
+    )
 
 
 def _with_laws(
-    model: GeneratedModel, study: Study, measured: Measured, further: Sequence[Record | Stream]
-) -> tuple[GeneratedModel, FittedLaws | None, Measured, Sequence[Record | Stream], str]:
+    model: GeneratedModel, study: Study, measured: Measured, further: Sequence[Record]
+) -> tuple[GeneratedModel, FittedLaws | None, Measured, Sequence[Record], str]:
     """The model with the scalars of its laws fitted, these, the records with the torque that each
     joint transmits, and a sentence on that torque ("": no column reads it).
     """
@@ -218,7 +201,7 @@ def _with_laws(
         )
     at("scalars of laws")
     columns = None if study.estimate.columns == "all" else tuple(study.estimate.columns)
-    laws = fit_laws(model, in_memory(loaded, NEED_WHOLE), columns, weights=weighted)
+    laws = fit_laws(model, loaded, columns, weights=weighted)
     model = cast(GeneratedModel, BoundModel(model, laws.constants))
     return model, laws, *transmitted(model, loaded, others, weighted)
 
@@ -234,8 +217,8 @@ def _with_elasticity(result: Identification) -> Identification:
     """The result with the stiffness of transmissions whose motor and link are both measured."""
     if not result.determined:
         return result
-    fit, records = result.estimate, [one for one in result.prepared if isinstance(one, Prepared)]
-    elastic = elasticity(result.model, records, fit.names, fit.X)
+    fit = result.estimate
+    elastic = elasticity(result.model, result.prepared, fit.names, fit.X)
     if elastic is None:
         return result
     return replace(
@@ -271,7 +254,7 @@ def feasibility_of(result: Identification) -> Feasibility:
 
 def assess(
     model: GeneratedModel,
-    records: Record | Stream | Sequence[Record | Stream],
+    records: Record | Sequence[Record],
     study: Study | None = None,
     *,
     encoder: Sequence[float] = (),
@@ -327,18 +310,16 @@ def assess(
     result = replace(
         result, feasibility=attempt("physical consistency", lambda: feasibility_of(result))
     )
-    whole = [own for own in result.prepared if isinstance(own, Prepared)]
-    if len(whole) < len(result.prepared):
-        missing.append("friction and encoder resolution: they need whole records; set stream: off")
-        return replace(result, missing=tuple(missing))
-    study, names = result.study, result.essential.names
+    study, measured, names = result.study, result.prepared, result.essential.names
     columns = names if study.cestac.columns == "essential" else None
-    curves = attempt("friction", lambda: friction_curves(model, whole, study, result.estimate))
+    curves = attempt("friction", lambda: friction_curves(model, measured, study, result.estimate))
     advice = attempt(
         "resolution advice",
-        lambda: advise(model, whole, study, columns=names, asked=tuple(encoder)),
+        lambda: advise(model, measured, study, columns=names, asked=tuple(encoder)),
     )
-    resolution = attempt("resolution study", lambda: cestac(model, whole, study, columns=columns))
+    resolution = attempt(
+        "resolution study", lambda: cestac(model, measured, study, columns=columns)
+    )
     return replace(
         result, friction=curves or (), advice=advice, resolution=resolution, missing=tuple(missing)
     )

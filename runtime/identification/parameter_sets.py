@@ -71,7 +71,7 @@ def physical_asked(errors: Mapping[Any, float], first: bool) -> bool:
 def physical_possible(observation: Observation, settings: EstimateSettings, fit: Estimate) -> bool:
     """Whether there is a feasible set beside `fit`, all parameters by a linear method."""
     whole = settings.columns == "all" and fit.status == "ok"
-    return whole and settings.weights != "covariance" and not observation.reduced
+    return whole and settings.weights != "covariance"
 
 
 def physical_set(

@@ -49,7 +49,6 @@ from runtime.plausible.known import torque_unit_doubt
 from runtime.plausible.plausibility import Plausibility
 from runtime.records.provenance import record_names
 from runtime.records.record import UNNAMED, Record
-from runtime.records.stream import Stream
 from runtime.resolution.advice import Advice
 from runtime.resolution.result import Cestac
 from runtime.rows.observation import Observation
@@ -76,7 +75,7 @@ class Identification:
     model : GeneratedModel
     study : Study
         Settings, complete; its files relative to the current folder.
-    prepared : tuple of Prepared or Stream
+    prepared : tuple of Prepared
         The records, joint side, SI, as the study reads them.
     observation : Observation
         Y = W X + rho of all records.
@@ -119,7 +118,7 @@ class Identification:
 
     model: GeneratedModel
     study: Study
-    prepared: tuple[Prepared | Stream, ...]
+    prepared: tuple[Prepared, ...]
     observation: Observation
     estimate: Estimate
     essential: Essential
@@ -139,7 +138,7 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     @property
-    def records(self) -> tuple[Record | Stream, ...]:
+    def records(self) -> tuple[Record, ...]:
         """The records."""
         return tuple(map(record_of, self.prepared))
 
@@ -258,7 +257,7 @@ class Identification:
         encoders = [
             text
             for own in self.prepared
-            if isinstance(own, Prepared) and own.study.signals.reader == "lowpass"
+            if own.study.signals.reader == "lowpass"
             for text in encoder_sentences(own.record, own.states, own.study.signals, own.drives)
         ]
         return (
@@ -275,13 +274,6 @@ class Identification:
         parts of the records that did not give it; nan: on none.
         """
         return self.set_errors.get(self.model_columns, float("nan"))
-
-    @property
-    def compared_rows(self) -> int:
-        """Rows of the comparison, which holds the first instants alone of records that were read by
-        blocks.
-        """
-        return sum(len(joint.t) for joint in self.comparison)
 
     @property
     def negative(self) -> tuple[str, ...]:

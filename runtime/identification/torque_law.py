@@ -24,7 +24,6 @@ from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.law import late, torque_law
 from runtime.records.record import Record
-from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe, with_torques
 from runtime.rows.prepared import Prepared
@@ -64,9 +63,9 @@ class LawEstimate(Result):
 def completed(
     model: GeneratedModel,
     study: Study,
-    fitted: Sequence[Prepared | Stream],
-    further: Sequence[Record | Stream],
-) -> tuple[tuple[Prepared | Stream, ...], list[Record | Stream], LawEstimate | None]:
+    fitted: Sequence[Prepared],
+    further: Sequence[Record],
+) -> tuple[tuple[Prepared, ...], list[Record], LawEstimate | None]:
     """The records with the torque of the completed law, and what was found; as they are where
     nothing is to be.
     """
@@ -74,11 +73,9 @@ def completed(
     asked = [law for law in laws if "fit" in (law.kd, law.delay)]
     if not asked:
         return tuple(fitted), list(further), None
-    who = "controller.law: fit needs"
-    own, others = in_memory(fitted, who), in_memory(further, who)
     settings = next(r.controller for r in study.record if r.by_law and r.controller is not None)
-    saturation = torque_law(settings, own[0].record.n, model.LIMITS).saturation
-    found = law_estimate(model, own, study, asked[0], saturation)
+    saturation = torque_law(settings, fitted[0].record.n, model.LIMITS).saturation
+    found = law_estimate(model, fitted, study, asked[0], saturation)
     bound = np.where(np.isfinite(found.kd) | (asked[0].kd != "fit"), saturation, np.inf)
 
     def whole(record: Record) -> Record:
@@ -86,17 +83,17 @@ def completed(
         tau = torque_of(record, np.nan_to_num(found.kd), found.delay, bound)
         return replace(record, tau=tau, channels=others)
 
-    changed = tuple(replace(one, record=whole(one.record)) for one in own)
-    return changed, [whole(one) for one in others], found
+    changed = tuple(replace(one, record=whole(one.record)) for one in fitted)
+    return changed, [whole(one) for one in further], found
 
 
 def gain_doubt(
-    model: GeneratedModel, study: Study, records: Sequence[Prepared | Stream], error: float
+    model: GeneratedModel, study: Study, records: Sequence[Prepared], error: float
 ) -> str:
     """Whether another kd than the stated one explains the records, a sentence; "" where it does
     not, or they hold none. error : of the stated one, %.
     """
-    own = [one for one in records if isinstance(one, Prepared) and "law_v" in one.record.channels]
+    own = [one for one in records if "law_v" in one.record.channels]
     laws = [r.controller.law for r in study.record if r.controller is not None]
     if error < LIMIT.LAW_DOUBT or len(own) < len(records) or not laws or laws[0].kd == "fit":
         return ""

@@ -20,7 +20,6 @@ from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.generated import TRANSMITTED, GeneratedModel, channels_of
 from runtime.records.record import Record
-from runtime.records.stream import Stream, in_memory
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, prepared
 
@@ -32,26 +31,24 @@ SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 def transmitted(
     model: GeneratedModel,
-    fitted: Sequence[Prepared | Stream],
-    further: Sequence[Record | Stream],
+    fitted: Sequence[Prepared],
+    further: Sequence[Record],
     weights: bool,
-) -> tuple[tuple[Prepared | Stream, ...], list[Record | Stream], str]:
+) -> tuple[tuple[Prepared, ...], list[Record], str]:
     """The records with the torque of the model where laws read it, and what was done, a sentence;
     as they are, and "", where none does.
 
     Raises
     ------
     InputError
-        A record that is read by blocks, or a torque that does not settle.
+        A torque that does not settle.
     """
     read = {c: own for c, own in channels_of(model).items() if c.startswith(TRANSMITTED)}
     if not read:
         return tuple(fitted), list(further), ""
     names = ", ".join(sorted({name for own in read.values() for name in own}))
-    who = f"{names}: the torque of the model needs"
-    records, others = in_memory(fitted, who), in_memory(further, who)
     torque = _Torque(model, read)
-    X, records = np.zeros(len(model.BASE_PARAMETERS)), [torque.given(r, None) for r in records]
+    X, records = np.zeros(len(model.BASE_PARAMETERS)), [torque.given(r, None) for r in fitted]
     before = np.zeros(0)
     for k in range(PASSES):
         X = _solved([r.observation(model) for r in records], weights)
@@ -70,7 +67,7 @@ def transmitted(
         f"not the measured one; it settled in {k + 1} passes."
     )
     study, drives = records[0].study, records[0].drives
-    seen = [torque.given(replace(prepared(model, r, study), drives=drives), X) for r in others]
+    seen = [torque.given(replace(prepared(model, r, study), drives=drives), X) for r in further]
     return tuple(records), [one.record for one in seen], told
 
 

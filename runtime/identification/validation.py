@@ -28,8 +28,7 @@ from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of, point_estimate
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel
-from runtime.rows.observation import Observation
-from runtime.rows.segments import Window
+from runtime.rows.observation import Observation, Window
 from runtime.settings.study import EstimateSettings
 from runtime.table import Table
 

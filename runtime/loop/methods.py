@@ -22,12 +22,9 @@ from runtime.loop.closed_loop import closed_loop, loop_of
 from runtime.loop.fixed_point import FixedPointOptions, full
 from runtime.loop.simulated_motion import judged
 from runtime.model.generated import GeneratedModel
-from runtime.parallel import Workers
-from runtime.records.stream import Stream
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
 from runtime.rows.prepared import Source, prepared, record_of, resolved
-from runtime.rows.segments import Window
 from runtime.settings.study import EstimateSettings, Study
 
 if TYPE_CHECKING:
@@ -65,7 +62,7 @@ def estimate(
     ----------
     model : GeneratedModel
         Emitted module.
-    records : Record, Prepared, Stream, a sequence of them, or Observation
+    records : Record, Prepared, a sequence of them, or Observation
         Joint side, SI.
     study : Study, optional
         Settings; default: Study().
@@ -100,7 +97,7 @@ def estimate_of(
     Parameters
     ----------
     observation : Observation
-        Rows held; of a linear method, or reduced.
+        Rows of the records.
     settings : EstimateSettings, optional
         Method, weights, columns, options; default: ols.
     model : GeneratedModel, optional
@@ -110,8 +107,6 @@ def estimate_of(
     """
     settings = settings or EstimateSettings()
     method = method_of(settings)
-    if method.fit is not None:
-        observation.require_rows(settings.method)
     system = method.system(observation, settings)
     solution = system.solve()
     if method.fit is None or (solution.rank < len(system.names) and not method.any_rank):
@@ -150,7 +145,7 @@ def essential(
     ----------
     model : GeneratedModel
         Emitted module.
-    records : Record, Stream, a sequence of them, or Observation
+    records : Record, Prepared, a sequence of them, or Observation
         Joint side, SI.
     study : Study, optional
         Settings; default: Study().
@@ -181,9 +176,7 @@ def observed(
     records: Source | Sequence[Source],
     study: Study,
     *,
-    windows: Sequence[Window] | None = None,
     simulator: Simulator | None = None,
-    workers: int | Workers = 1,
 ) -> Observation:
     """The Observation that the method of the study needs: with the closed loop for those that
     simulate it.
@@ -192,12 +185,10 @@ def observed(
     ----------
     model : GeneratedModel
         Emitted module.
-    records : Record, Prepared, Stream, or a sequence of them
+    records : Record, Prepared, or a sequence of them
         Joint side, SI.
     study : Study
         Settings.
-    windows, workers
-        As in `runtime.rows.observe.observe`.
     simulator : Simulator, optional
         Closed loop that made the records.
     """
@@ -210,22 +201,14 @@ def observed(
                 "another robot, or of some of its joints"
             )
             raise InputError(message, file=record.file)
-    whole = [prepared(model, record, study) for record in several if not isinstance(record, Stream)]
+    own = [prepared(model, record, study) for record in several]
     method = method_of(settings)
-    if len(whole) < len(several) and simulator is not None:
-        raise SettingsError(
-            f"{settings.method} needs records in memory, not by blocks; set stream: off",
-            path=("estimate", "method"),
-        )
     if simulator is not None:
         asked = {
             key: settings.options[key] for key in ("reference", "around") if key in settings.options
         }
-        return closed_loop(model, whole, study, simulator, **asked).measured()
-    needed_by: str = "" if method.fit is None else settings.method
-    if settings.weights == "covariance":
-        needed_by = "weights: covariance"
-    return observe(model, several, study, windows=windows, needed_by=needed_by, workers=workers)
+        return closed_loop(model, own, study, simulator, **asked).measured()
+    return observe(model, own, study)
 
 
 def simulator_of(model: GeneratedModel, study: Study) -> Simulator | None:

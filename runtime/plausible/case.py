@@ -35,7 +35,7 @@ class Case:
     ----------
     model : GeneratedModel
     given : sequence of Prepared
-        Records, or excerpts of those that are read by blocks, as they were read.
+        Records, as they were read.
     straight : sequence of Prepared
         The same, counts that start anew unwrapped.
     study : Study

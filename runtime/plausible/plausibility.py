@@ -40,7 +40,7 @@ from runtime.plausible.physics import (
     size,
     values,
 )
-from runtime.plausible.samples import excerpts, samples_of
+from runtime.plausible.samples import samples_of
 from runtime.plausible.sizes import (
     accelerations,
     inertias,
@@ -53,7 +53,6 @@ from runtime.plausible.sizes import (
 from runtime.plausible.through_time import change, cut_torques, jumps
 from runtime.plausible.trials import Problem, Trial, decisive, tried
 from runtime.progress import at
-from runtime.records.stream import Stream
 from runtime.rows.prepared import Source, prepared, record_of
 from runtime.settings.study import Study
 from runtime.signals.states import require_motion, unwrapped
@@ -175,8 +174,8 @@ def plausibility(
     Parameters
     ----------
     model : GeneratedModel
-    records : Record, Stream, Prepared, or a sequence of them
-        Joint side, SI. Of a record that is read by blocks some excerpts are judged.
+    records : Record, Prepared, or a sequence of them
+        Joint side, SI.
     study : Study, optional
         Default: Study().
     variants : GeneratedModel, optional
@@ -237,11 +236,7 @@ def _case(
     variants: GeneratedModel | None,
 ) -> Case | Check:
     """What the checks read; the finding where there is nothing to read."""
-    own = [
-        prepared(model, part, study)
-        for record in records
-        for part in (excerpts(record, study) if isinstance(record, Stream) else [record])
-    ]
+    own = [prepared(model, record, study) for record in records]
     try:
         require_no_channels(model, "a trial of another reading")
         whole = [unwrapped(one.record, study.signals, one.drives) for one in own]

@@ -15,11 +15,8 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.records.missing import Missing
 from runtime.records.record import Record
-from runtime.records.stream import PieceReader, Stream
 from runtime.rows.prepared import Prepared
-from runtime.rows.selection import window_of
 from runtime.settings.study import Study
 from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_filtered
 
@@ -93,23 +90,6 @@ class Samples:
 def moving(qd: Array) -> Array:
     """Samples at which each joint moves, bool (K, n)."""
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
-
-
-def excerpts(stream: Stream, study: Study) -> list[Record]:
-    """EXCERPTS of a stream, evenly spread over the window; the whole of a short one."""
-    start, stop = window_of(stream.times(), study.rows.window, stream.name)
-    number, length = LIMIT.EXCERPTS
-    if stop - start <= number * length:
-        number, length = 1, stop - start
-    reader = PieceReader(stream)
-    begins = map(int, np.linspace(start, stop - length, number))
-    parts = []
-    for begin in begins:
-        t, q, tau, gaps, channels = reader.read(begin, begin + length)
-        missing = Missing(gaps, stream.follows) if gaps.any() else None
-        given = Record(t, q, tau, name=stream.name, missing=missing, channels=channels)
-        parts.append(replace(given, origin=stream.origin))
-    return parts
 
 
 def samples_of(records: Sequence[Record | Prepared], study: Study) -> Samples:

@@ -17,7 +17,6 @@ from runtime.model.inertia import INERTIAL, PhysicalModel
 from runtime.plausible.case import Case
 from runtime.plausible.trials import reach
 from runtime.records.record import Record
-from runtime.records.stream import Stream
 
 Array = np.ndarray
 
@@ -27,7 +26,7 @@ Array = np.ndarray
     f"{LIMIT.LOG_RATES[0]:g} Hz to {LIMIT.LOG_RATES[1] / 1e3:g} kHz",
     "look at the unit of the time column (record.units.t: ms, us) and at record.rate",
 )
-def times(records: Sequence[Record | Stream]) -> Answer:
+def times(records: Sequence[Record]) -> Answer:
     """Sampling rate and duration of the records."""
     record = min(records, key=lambda one: one.rate)
     text = f"{record.rate:.4g} Hz over {len(record) / record.rate:.4g} s"

@@ -1,14 +1,11 @@
 """The clock of a record: stamps that increase, uniform within the jitter allowed, at the rate that
 is stated.
-
-Stamps are read by blocks, twice: for their order and mean rate, then against the uniform grid of
-that rate.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,13 +62,8 @@ class Stamps:
         )
 
 
-def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
-    """Sampling rate, Hz: the stated one where there is one.
-
-    Parameters
-    ----------
-    blocks : callable
-        Consecutive stamps, s, as often as asked.
+def clock(stamps: Stamps, t: Array) -> float:
+    """Sampling rate, Hz, of the stamps t, shape (N,), s: the stated one where there is one.
 
     Raises
     ------
@@ -79,23 +71,17 @@ def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
         Time that goes back or stands, another rate than the stated one, or stamps off the uniform
         grid.
     """
-    first = last = np.nan
-    N = 0
-    for t, step in _steps(blocks()):
-        if (step <= 0).any():
-            i = int(np.argmax(step <= 0))
-            after = i + len(t) - len(step)
-            raise stamps.error(
-                (
-                    f"time goes from {instant(t[after] - step[i])} s to {instant(t[after])} s; "
-                    "expected increasing time"
-                ),
-                N + after,
-            )
-        first, last, N = (float(t[0]) if N == 0 else first), float(t[-1]), N + len(t)
+    N = len(t)
+    step = np.diff(t)
+    if (step <= 0).any():
+        i = int(np.argmax(step <= 0))
+        raise stamps.error(
+            f"time goes from {instant(t[i])} s to {instant(t[i + 1])} s; expected increasing time",
+            i + 1,
+        )
     if N < 2:
         raise InputError(f"{N} samples; a record needs more", file=stamps.file)
-    rate = (N - 1) / (last - first)
+    rate = float((N - 1) / (t[-1] - t[0]))
     if stamps.rate is not None and abs(
         rate / stamps.rate - 1
     ) > RATE_TOLERANCE + 2 * stamps.jitter / (N - 1):
@@ -103,7 +89,14 @@ def clock(stamps: Stamps, blocks: Callable[[], Iterable[Array]]) -> float:
             f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the "
             "unit of time"
         )
-    _require_uniform(stamps, blocks(), first, rate)
+    deviation = np.abs(t - t[0] - np.arange(N) / rate).max() * rate
+    if deviation > stamps.jitter:
+        i = int(np.argmax(np.abs(step * rate - 1)))
+        raise stamps.error(
+            f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, step "
+            f"{step[i]:g} s here, {1 / rate:g} s on average{HINT}",
+            i + 1,
+        )
     return stamps.rate or rate
 
 
@@ -112,7 +105,7 @@ def rate_of(stamps: Stamps, t: Array) -> float:
     irregularity and the setting that cures them.
     """
     try:
-        return clock(stamps, lambda: [t])
+        return clock(stamps, t)
     except InputError as e:
         if not (np.diff(t) > 0).any():
             raise
@@ -130,38 +123,3 @@ def rate_of(stamps: Stamps, t: Array) -> float:
             row=e.row,
             remedy={"resample": yaml_values(setting[1], file="remedy")[0]} if setting else None,
         ) from None
-
-
-def _require_uniform(stamps: Stamps, blocks: Iterable[Array], first: float, rate: float) -> None:
-    """Raise InputError where stamps leave the uniform grid by more than the jitter, at the step
-    that differs most.
-    """
-    deviation = worst = 0.0
-    N = place = 0
-    length = np.nan
-    for t, step in _steps(blocks):
-        deviation = max(
-            deviation, float(np.max(np.abs(t - first - np.arange(N, N + len(t)) / rate) * rate))
-        )
-        off = np.abs(step * rate - 1)
-        if len(off) and off.max() > worst:
-            i = int(np.argmax(off))
-            worst, place, length = float(off[i]), N + i + len(t) - len(step), float(step[i])
-        N += len(t)
-    if deviation > stamps.jitter:
-        raise stamps.error(
-            (
-                f"time is not uniform: off the grid by up to {deviation:.3g} sampling periods, "
-                "step "
-                f"{length:g} s here, {1 / rate:g} s on average{HINT}"
-            ),
-            place,
-        )
-
-
-def _steps(blocks: Iterable[Array]) -> Iterator[tuple[Array, Array]]:
-    """Stamps, s, and the steps that end in them, by block."""
-    before: list[float] = []
-    for t in blocks:
-        yield t, np.diff(np.concatenate([before, t]))
-        before = [float(t[-1])]

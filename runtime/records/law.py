@@ -55,9 +55,7 @@ class TorqueLaw:
         made = {"tau": self.torque(own["q"], own, rate), "law_v": v}
         return {**own, **{key: late(t, x, self.delay) for key, x in made.items()}}
 
-    def torque(
-        self, q: Array, channels: Mapping[str, Array], rate: float, before: Array | None = None
-    ) -> Array:
+    def torque(self, q: Array, channels: Mapping[str, Array], rate: float) -> Array:
         """Torques of the law, shape (N, n), N m or N.
 
         Parameters
@@ -68,24 +66,20 @@ class TorqueLaw:
             q_r; qd, qd_ref and tau_ff where they were recorded, shape (N, n).
         rate : float, Hz
             Sampling rate.
-        before : ndarray, shape (n,), optional
-            Positions one sample ahead; default: those of the first sample.
         """
         tau = self.P * (channels["q_r"] - q) + channels.get("tau_ff", 0.0)
         if np.any(self.Vr) or np.any(self.Vm):
-            qd = velocity(q, channels, rate, before) if np.any(self.Vm) else 0.0
+            qd = velocity(q, channels, rate) if np.any(self.Vm) else 0.0
             tau = tau + self.Vr * channels.get("qd_ref", 0.0) - self.Vm * qd
         bound = np.inf if self.fit else self.saturation
         return np.asarray(np.clip(tau, -bound, bound))
 
 
-def velocity(
-    q: Array, channels: Mapping[str, Array], rate: float, before: Array | None = None
-) -> Array:
+def velocity(q: Array, channels: Mapping[str, Array], rate: float) -> Array:
     """Velocities that the law takes, shape (N, n): as recorded, else differences backward."""
     if "qd" in channels:
         return channels["qd"]
-    return np.asarray(np.diff(q, axis=0, prepend=q[:1] if before is None else before[None]) * rate)
+    return np.asarray(np.diff(q, axis=0, prepend=q[:1]) * rate)
 
 
 def late(t: Array, x: Array, delay: float) -> Array:

@@ -64,17 +64,17 @@ class Missing:
         return near
 
 
-def bridged(q: Array, missing: Array, before: Array | None = None) -> Array:
-    """q, shape (N, n), with straight lines where samples are missing: between their neighbours,
-    from `before`, shape (n,), on, and held at the ends.
+def bridged(q: Array, missing: Array) -> Array:
+    """q, shape (N, n), with straight lines where samples are missing: between their neighbours, and
+    held at the ends.
     """
     q, at = np.array(q), np.arange(len(q))
     for j in np.flatnonzero(missing.any(axis=0)):
         known = np.flatnonzero(~missing[:, j])
-        values = q[known, j]
-        if before is not None:
-            known, values = np.append(-1, known), np.append(before[j], values)
-        q[missing[:, j], j] = np.interp(at[missing[:, j]], known, values) if len(known) else 0.0
+        if len(known):
+            q[missing[:, j], j] = np.interp(at[missing[:, j]], known, q[known, j])
+        else:
+            q[:, j] = 0.0
     return q
 
 

@@ -115,40 +115,7 @@ class RecordFiles:
         parts: dict[str, Array] = {}
         for table, groups in groups_of(self.columns, self.tables):
             parts |= zip(groups, table.read(list(groups.values()), self.samples), strict=True)
-        return self._converted(0, parts)[0]
-
-    def blocks(self, size: int, start: int = 0, stop: int | None = None) -> Iterator[Samples]:
-        """The same by blocks of `size` samples; [start, stop) of them, default: all."""
-        asked, stop = groups_of(self.columns, self.tables), self.samples if stop is None else stop
-        streams = [
-            table.blocks(list(groups.values()), size, start, stop) for table, groups in asked
-        ]
-        keys = [key for _, groups in asked for key in groups]
-        last = None
-        for a, blocks in zip(range(start, stop, size), zip(*streams, strict=True), strict=True):
-            samples, last = self._converted(
-                a, dict(zip(keys, (x for block in blocks for x in block), strict=True)), last
-            )
-            yield samples
-
-    def times(self, size: int) -> Iterator[Array]:
-        """t by blocks of `size` samples, s; the record has a time column."""
-        for a, (t,) in zip(
-            range(0, self.samples, size),
-            self.first.blocks([[self.columns.t or ""]], size),
-            strict=True,
-        ):
-            names = [self.columns.t or ""]
-            yield self._time(require_finite(t, names, self.first.file, self.first.row, a))
-
-    def largest_known(self, size: int) -> Array | None:
-        """Size of the known torques, shape (n,), read by blocks; None where there are none."""
-        names = asked_columns(self.columns)["tau_known"]
-        if not names:
-            return None
-        blocks = self.tables[2].blocks([names], size)
-        largest = np.max([np.abs(x).max(axis=0) for (x,) in blocks], axis=0)
-        return np.ravel(self._on_joints(largest[None]))
+        return self._converted(parts)
 
     @property
     def stated_rate(self) -> float:
@@ -165,19 +132,13 @@ class RecordFiles:
         for table in self.tables:
             table.close()
 
-    def _converted(
-        self, start: int, parts: dict[str, Array], before: Array | None = None
-    ) -> tuple[Samples, Array]:
-        """Samples from `start` on, as the files hold them, in the joint side, SI, and the last
-        positions, shape (n,), of the file.
-
-        before : positions of the file ahead of `start`.
-        """
+    def _converted(self, parts: dict[str, Array]) -> Samples:
+        """Samples as the files hold them in the joint side, SI."""
         missing = (
             np.isnan(parts["q"]) if self.missing else np.empty((len(parts["q"]), 0), dtype=bool)
         )
         if missing.any():
-            parts["q"] = bridged(parts["q"], missing, before)
+            parts["q"] = bridged(parts["q"], missing)
         sides = {"tau": self.side.torque, "tau_known": self._on_joints, "t": self._time}
         sides |= dict.fromkeys(("q", "q_r"), self.side.position)
         sides |= dict.fromkeys(("qd", "qd_ref"), self.side.velocity)
@@ -189,15 +150,14 @@ class RecordFiles:
         for table, groups in groups_of(self.columns, self.tables):
             for key, names in groups.items():
                 hint = COUNTS if key == "q" and not self.missing else ""
-                values = require_finite(parts[key], names, table.file, table.row, start, hint)
+                values = require_finite(parts[key], names, table.file, table.row, hint)
                 x[key] = y = sides[key](values)
                 if key != "t":
                     most = LIMIT.LARGEST_NUMBER
                     y = y[:, ~np.isnan(y).all(axis=0)] if key == "q_link" else y
-                    require_finite(y, names, table.file, table.row, start, largest=most)
+                    require_finite(y, names, table.file, table.row, largest=most)
         channels = {k: x[k] for k in (*JOINT_CHANNELS, *self.columns.further) if k in x}
-        samples = Samples(x.get("t"), x["q"], x.get("tau"), missing, x.get("tau_known"), channels)
-        return samples, parts["q"][-1]
+        return Samples(x.get("t"), x["q"], x.get("tau"), missing, x.get("tau_known"), channels)
 
     def _on_joints(self, known: Array) -> Array:
         """Known torques with zeros where a joint has none, shape (N, n)."""
@@ -216,7 +176,6 @@ def open_records(
     model: GeneratedModel | None,
     folder: str | Path | None,
     *,
-    by_blocks: bool = False,
     missing: bool = False,
 ) -> Iterator[RecordFiles]:
     """The files of each record of one robot, opened behind one another; no name twice.
@@ -227,8 +186,6 @@ def open_records(
         Emitted model of the robot, for its drives and its number of joints.
     folder : str or Path, optional
         Where relative file names start; default: the current folder.
-    by_blocks : bool
-        Refuse formats that are read whole only.
     missing : bool
         Whether positions may be missing: nan, an empty field, a null.
     """
@@ -241,7 +198,6 @@ def open_records(
             drives,
             Path(folder or ""),
             joints,
-            by_blocks=by_blocks,
             missing=missing,
             limits=dict(getattr(model, "LIMITS", {})),
         )
@@ -260,7 +216,6 @@ def open_record(
     folder: Path,
     joints: Sequence[str],
     *,
-    by_blocks: bool,
     missing: bool,
     limits: Mapping[str, Any],
 ) -> RecordFiles:
@@ -276,13 +231,13 @@ def open_record(
         Where relative file names start.
     joints : sequence of str
         Names of the joints of the robot, where it has them.
-    by_blocks, missing : bool
+    missing : bool
         As for `open_records`.
     limits : mapping
         LIMITS of the robot.
     """
     opened = [
-        open_table(path, settings.topic, settings.decimal, by_blocks=by_blocks)
+        open_table(path, settings.topic, settings.decimal)
         for path in record_files(settings, folder)
     ]
     first, last, other = tables = places(settings, opened)
@@ -293,13 +248,6 @@ def open_record(
     for table, groups in groups_of(names, tables):
         counts[table] = table.samples(list(groups.values()))
         widths |= zip(groups, table.widths(list(groups.values())), strict=True)
-        if (
-            by_blocks and counts[table] < LIMIT.FEWEST_SAMPLES
-        ):  # a whole record says so itself, after what is wrong with its lines
-            raise InputError(
-                f"{counts[table]} samples; a record has at least {LIMIT.FEWEST_SAMPLES}",
-                file=table.file,
-            )
     samples, n = counts[first], widths["q"]
     torques = (counts.get(last, samples), widths.get("tau", n))
     require_alike(names, first, last, (samples, n), torques)

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from runtime.records.record import Record
-from runtime.records.stream import Stream
 
 SIMULATED = "SIMULATED"
 """First word of the name of a record that was not measured."""
 
 
-def record_names(records: Sequence[Record | Stream]) -> tuple[str, ...]:
+def record_names(records: Sequence[Record]) -> tuple[str, ...]:
     """The name of each record, each name once: of equal ones the second is called "name (2)"."""
     names: list[str] = []
     for record in records:
@@ -28,7 +27,7 @@ def record_names(records: Sequence[Record | Stream]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def origin(records: Sequence[Record | Stream]) -> dict[str, Any]:
+def origin(records: Sequence[Record]) -> dict[str, Any]:
     """Provenance of a result on `records`: their names, whether one of them was simulated, and
     their time stamps in words.
     """

@@ -275,13 +275,11 @@ def require_finite(
     names: Sequence[str],
     file: str,
     row: Callable[[int], str] = sample,
-    first: int = 0,
     hint: str = "",
     largest: float = FINITE,
 ) -> Array:
-    """The columns x, shape (N, k), from sample `first` on, if there is neither nan nor infinity nor
-    a number above `largest` among them; row : place of a sample in words; hint : what else may be
-    done about nan.
+    """The columns x, shape (N, k), if there is neither nan nor infinity nor a number above `largest`
+    among them; row : place of a sample in words; hint : what else may be done about nan.
     """
     if not (np.abs(x) <= largest).all():
         bad = np.argwhere(~(np.abs(x) <= largest))
@@ -293,6 +291,6 @@ def require_finite(
             f"the record{f'; {hint}' if hint and np.isnan(x[i, j]) else ''}",
             file=file,
             column=column,
-            row=row(first + int(i)),
+            row=row(int(i)),
         )
     return x

@@ -65,16 +65,7 @@ def torque_section(result: Identification) -> Section:
         )
         for joint in result.comparison
     ]
-    text = (
-        [
-            (
-                f"Read by blocks: figures show the first {result.compared_rows} of "
-                f"{result.estimate.rows} rows, tables count all."
-            )
-        ]
-        if result.compared_rows < result.estimate.rows
-        else []
-    )
+    text = []
     thinned = max(
         (image.series.total - len(image.series.t) for image in images if image.series is not None),
         default=0,

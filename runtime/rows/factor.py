@@ -185,13 +185,9 @@ def factor(W: Array, Y: Array, rows: Sequence[int], names: Sequence[str]) -> Fac
 
 
 def joint_factors(
-    W: Array,
-    Y: Array,
-    rows: Sequence[int],
-    parts: Array,
-    columns: Sequence[Array] | None = None,
+    W: Array, Y: Array, rows: Sequence[int], parts: Array
 ) -> list[tuple[JointFactor, ...]]:
-    """Factors by joint of each part of the rows.
+    """Factors by joint of each part of the rows; of W one part of a joint is copied at a time.
 
     Parameters
     ----------
@@ -199,23 +195,23 @@ def joint_factors(
         As of `factor`.
     parts : ndarray of int, shape (r,)
         Number of the part of each row, from 0.
-    columns : sequence of ndarray of int, optional
-        C_j of each joint; default: those that are not zero in its rows.
     """
-    if not (np.isfinite(W).all() and np.isfinite(Y).all()):
-        raise ValueError(
-            "W or Y holds values that are not finite; leave those samples out of the record"
-        )
-    by_joint, count = [], int(parts.max(initial=0)) + 1
+    count = int(parts.max(initial=0)) + 1
+    by_joint = []
     for j, end in enumerate(np.cumsum(rows)):
-        own = slice(end - rows[j], end)
-        C = np.flatnonzero(W[own].any(axis=0)) if columns is None else columns[j]
-        order = np.argsort(parts[own], kind="stable")
-        ends = np.cumsum(np.bincount(parts[own], minlength=count))[:-1]
-        A = np.vstack([W[own].T[C], Y[own]])[:, order]
-        by_joint.append(
-            [JointFactor(C, triangularise(x.T), x.shape[1]) for x in np.split(A, ends, axis=1)]
-        )
+        first = end - rows[j]
+        C = np.flatnonzero(W[first:end].any(axis=0))
+        order = first + np.argsort(parts[first:end], kind="stable")
+        ends = np.cumsum(np.bincount(parts[first:end], minlength=count))[:-1]
+        factors = []
+        for part in np.split(order, ends):
+            A = np.vstack([W.T[np.ix_(C, part)], Y[part]])
+            if not np.isfinite(A).all():
+                raise ValueError(
+                    "W or Y holds values that are not finite; leave those samples out of the record"
+                )
+            factors.append(JointFactor(C, triangularise(A.T), len(part)))
+        by_joint.append(factors)
     return list(zip(*by_joint, strict=True))
 
 

@@ -26,7 +26,6 @@ from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, check_states, drives_of
 from runtime.records.missing import COUNTS, require_positions
 from runtime.records.record import JOINT_CHANNELS, Record
-from runtime.records.stream import PieceReader, Stream
 from runtime.rows.observation import Observation
 from runtime.rows.regressor import Columns
 from runtime.rows.selection import (
@@ -148,10 +147,10 @@ class Prepared:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
-Source: TypeAlias = Record | Prepared | Stream
+Source: TypeAlias = Record | Prepared
 
 
-def prepared(model: GeneratedModel, record: Record | Prepared, study: Study) -> Prepared:
+def prepared(model: GeneratedModel, record: Source, study: Study) -> Prepared:
     """The record as `study` reads it; one that was prepared shares what was made of it."""
     study, _ = resolved(study, [record])
     if isinstance(record, Prepared):
@@ -175,16 +174,10 @@ def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
         return study, ""
     parts, shares = [], []
     for record in map(record_of, records):
-        times = record.times() if isinstance(record, Stream) else [record.t]
-        start, stop = 0, len(record)
-        if study.rows.window != (None, None):
-            start, stop = window_of(times, study.rows.window, record.name)
-        part = start, min(stop, start + EXCERPT)
-        if isinstance(record, Stream):
-            _, q, tau, _, channels = PieceReader(record).read(*part)
-        else:
-            q, tau = record.q[slice(*part)], record.tau[slice(*part)]
-            channels = {key: x[slice(*part)] for key, x in record.channels.items()}
+        start, stop = window_of(record.t, study.rows.window, record.name)
+        part = slice(start, min(stop, start + EXCERPT))
+        q, tau = record.q[part], record.tau[part]
+        channels = {key: x[part] for key, x in record.channels.items()}
         parts.append((q, channels, record.rate))
         shares += [taken(tau, q, record.rate, signals.median)] if torques else []
     positions, texts = [(q, rate) for q, _, rate in parts], []
@@ -219,7 +212,7 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
     return records[0].drives if records else drives_of(model)
 
 
-def record_of(record: Source) -> Record | Stream:
+def record_of(record: Source) -> Record:
     """The record itself."""
     return record.record if isinstance(record, Prepared) else record
 
@@ -228,11 +221,7 @@ def decimated_torque(tau: Array, selection: Selection) -> Array:
     """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
     filter, window, decimation.
     """
-    return decimated_rows(median_filtered(tau, selection.signals.window_of_torques), selection)
-
-
-def decimated_rows(tau: Array, selection: Selection) -> Array:
-    """The same of torques behind their median filter."""
+    tau = median_filtered(tau, selection.signals.window_of_torques)
     windowed = np.ascontiguousarray(tau[selection.samples].T)
     return windowed if selection.plan is None else decimate(windowed, selection.plan)
 

@@ -3,13 +3,13 @@ equal ones once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
 linear: filter
-the signals, then place them. The regressor is evaluated in blocks on one reused store and decimated
-block by block: the signals are not stored.
+the signals, then place them. The regressor is evaluated in pieces of samples on one reused store and
+decimated piece by piece: the signals are not stored.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel, channels_of
 from runtime.rows.observation import column_numbers
-from runtime.signals.decimation import PIECE, Plan, decimated_pieces
+from runtime.signals.decimation import PIECE, Plan, decimated_parts
 from runtime.signals.filters import States
 
 Array = np.ndarray
@@ -82,24 +82,32 @@ class Columns:
         plan : of the decimation; None keeps every sample.
         instants : those of the K that are stored.
         """
-        signals = self.signals(states, plan)[:, instants]
         entries = self.entries
-        store = np.zeros((len(self.names), len(self.model.JOINTS), signals.shape[-1]))
-        store[entries.row, entries.j] = entries.sign[:, None] * signals[entries.which]
+        first, last, _ = instants.indices(len(states) if plan is None else plan.K)
+        store = np.zeros((len(self.names), len(self.model.JOINTS), last - first))
+        for part, signals in self.signals(states, plan):
+            a, b = max(part.start, first), min(part.stop, last)
+            if a < b:
+                values = signals[entries.which, a - part.start : b - part.start]
+                store[entries.row, entries.j, a - first : b - first] = (
+                    entries.sign[:, None] * values
+                )
         return store
 
-    def signals(self, states: States, plan: Plan | None) -> Array:
-        """The distinct signals of the states (N, n) of the window, decimated, shape (S, K).
+    def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
+        """Consecutive instants of the window, and the distinct signals of its states (N, n) there,
+        decimated, shape (S, instants), until the next are asked for.
 
         plan : None keeps every sample.
         """
-        N = len(states)
-        if plan is None:
-            pieces = [self._evaluated(states[t0 : t0 + PIECE]).copy() for t0 in range(0, N, PIECE)]
-            return np.concatenate(pieces, axis=1)
-        return decimated_pieces(
-            lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.source), plan
-        )
+        if plan is not None:
+            yield from decimated_parts(
+                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.source), plan
+            )
+            return
+        for t0 in range(0, len(states), PIECE):
+            t1 = min(t0 + PIECE, len(states))
+            yield slice(t0, t1), self._evaluated(states[t0:t1])
 
     def _evaluated(self, states: States) -> Array:
         """Distinct signals of the states (B, n), shape (S, B), until the next call."""
@@ -130,8 +138,7 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
         read = ", ".join(channels[missing[0]])
         raise InputError(
             f"{model.NAME}: {read} read {missing[0]}, which these states do not have; "
-            f"name its column, record.columns: {{channels: {{{missing[0]}: COLUMN}}}}, of a whole "
-            "record (stream: off)"
+            f"name its column, record.columns: {{channels: {{{missing[0]}: COLUMN}}}}"
         )
     return {c: states.channels[c] for c in channels}
 

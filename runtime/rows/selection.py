@@ -7,7 +7,7 @@ is never kept or dropped because of noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -79,7 +79,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Instants:
-    """Which samples of a record, or of a piece of it, are kept.
+    """Which samples of a record are kept.
 
     Attributes
     ----------
@@ -88,11 +88,8 @@ class Instants:
     factor, first, kept : int
         Decimation keeps one sample in `factor` from `first` on, counted from `start`, `kept` in
         all.
-    used : (int, int)
-        Numbers of the instants whose rows may be used: without those of rows.trim and, in a piece,
-        those of its neighbours.
-    number : int
-        Number of the first kept instant in the whole record.
+    trim : int
+        Kept instants whose rows are left out at each end.
     """
 
     start: int
@@ -100,55 +97,29 @@ class Instants:
     factor: int
     first: int
     kept: int
-    used: tuple[int, int]
-    number: int = 0
-
-    def sample(self, number: int) -> int:
-        """The kept sample of an instant."""
-        return self.start + self.first + (number - self.number) * self.factor
-
-    def part(self, begin: int, end: int, used: tuple[int, int]) -> Instants:
-        """The kept instants of the samples [begin, end), counted from `begin`, of which `used` are
-        used.
-        """
-        start, stop = max(self.start, begin), min(self.stop, end)
-        ahead = start - self.start
-        first = (self.first - ahead) % self.factor
-        kept = len(range(first, stop - start, self.factor))
-        number = self.number + (ahead + first - self.first) // self.factor
-        return Instants(start - begin, stop - begin, self.factor, first, kept, used, number)
+    trim: int
 
 
 def window_of(
-    times: Iterable[Array],
-    window: tuple[float | None, float | None],
-    file: str,
-    margin: int = 0,
+    t: Array, window: tuple[float | None, float | None], file: str, margin: int = 0
 ) -> tuple[int, int]:
-    """Samples [start, stop) with t0 <= t <= t1, s, of all times; None leaves an end open.
+    """Samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
     margin : samples left out at each end of the record, a tenth of it at most.
     """
     t0, t1 = window
-    start = stop = N = 0
-    first = last = np.nan
-    for t in times:
-        N += len(t)
-        start += 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
-        stop += len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
-        first, last = (float(t[0]) if np.isnan(first) else first), float(t[-1])
+    start = 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
+    stop = len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
     if stop <= start:
         raise InputError(
-            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{first:g}, {last:g}] s",
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{t[0]:g}, {t[-1]:g}] s",
             file=file,
         )
-    margin = min(margin, N // 10)
-    return max(start, margin), min(stop, N - margin)
+    margin = min(margin, len(t) // 10)
+    return max(start, margin), min(stop, len(t) - margin)
 
 
-def instants_of(
-    times: Iterable[Array], rate: float, signals: Signals, rows: Rows, file: str
-) -> Instants:
-    """Window and decimation of a record of consecutive times, s, at a rate, Hz.
+def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
+    """Window and decimation of a record at the times t, shape (N,), s, at a rate, Hz.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
     spreads it over 27 instants (docs/truth.md, Ends of records), so that rows.trim: auto leaves
@@ -158,7 +129,7 @@ def instants_of(
     trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
     trim = 0 if signals.reader == "static" else trim
     margin = ceil(LIMIT.END_PERIODS * rate / low.hertz) if auto and low is not None else 0
-    start, stop = window_of(times, rows.window, file, margin)
+    start, stop = window_of(t, rows.window, file, margin)
     factor = decimation_factor(signals, rate)
     kept = kept_samples(
         stop - start, factor, signals.decimate.phase if signals.decimate else "first"
@@ -171,7 +142,7 @@ def instants_of(
             "use a longer record or window, or a smaller rows.trim",
             file=file,
         )
-    return Instants(start, stop, factor, int(kept[0]), K, (trim, K - trim))
+    return Instants(start, stop, factor, int(kept[0]), K, trim)
 
 
 def select_rows(
@@ -180,42 +151,34 @@ def select_rows(
     """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape
     (N, n), are the filtered velocities.
     """
-    at = instants_of([record.t], record.rate, signals, rows, record.file)
+    at = instants_of(record.t, record.rate, signals, rows, record.file)
     usable = None if keep is None else _keep(keep, record)
-    selection = selected(at, record.t, qd, record.rate, signals, rows, usable)
-    if not selection.mask.any():
-        raise InputError(nothing_left(selection.dropped, at.kept), file=record.file)
-    return selection
-
-
-def selected(
-    at: Instants,
-    t: Array,
-    qd: Array,
-    rate: float,
-    signals: Signals,
-    rows: Rows,
-    keep: Array | None = None,
-) -> Selection:
-    """The rows used among these instants of samples at the times t, shape (N,), s, with velocities
-    qd, shape (N, n); keep : samples, and joints, that may be used.
-    """
-    kept, n = np.arange(at.first, at.stop - at.start, at.factor), qd.shape[1]
-    instants, number = kept + at.start, at.number + np.arange(at.kept)
-    mask = np.ones((n, len(kept)), dtype=bool)
-    dropped, slow = {}, per_joint(rows.low_speed, n, "rows.low_speed")[:, None]
-    for reason, usable in (
-        ("trim", (number >= at.used[0]) & (number < at.used[1])),
+    kept = np.arange(at.first, at.stop - at.start, at.factor)
+    instants, number = kept + at.start, np.arange(at.kept)
+    mask = np.ones((record.n, len(kept)), dtype=bool)
+    dropped, slow = {}, per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]
+    for reason, allowed in (
+        ("trim", (number >= at.trim) & (number < at.kept - at.trim)),
         *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
         ("low_speed", np.abs(qd[instants].T) >= slow),
-        ("mask", True if keep is None else keep[instants].T),
+        ("mask", True if usable is None else usable[instants].T),
     ):
         before = mask.sum(axis=1)
-        mask &= usable
+        mask &= allowed
         dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
-    window = slice(at.start, at.stop)
-    rate = rate / at.factor
-    return Selection(window, kept, mask, at.factor, t[instants], rate, signals, rows, dropped)
+    if not mask.any():
+        raise InputError(nothing_left(dropped, at.kept), file=record.file)
+    return Selection(
+        samples=slice(at.start, at.stop),
+        kept=kept,
+        mask=mask,
+        factor=at.factor,
+        t=record.t[instants],
+        rate=record.rate / at.factor,
+        signals=signals,
+        rows=rows,
+        dropped=dropped,
+    )
 
 
 def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:

@@ -31,7 +31,6 @@ from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, channels_of, elements_of, joint_units
 from runtime.model.inertia import INERTIAL, physical_model
 from runtime.records.record import JOINT_CHANNELS, Record
-from runtime.records.stream import in_memory
 from runtime.rows.prepared import Source, record_of
 from runtime.rows.selection import UNMEASURED, per_joint
 from runtime.settings.record import WRENCH
@@ -71,14 +70,13 @@ def with_wrench(
     ------
     InputError
         A module without the function or the frame, a robot with loops and a sensor that is not
-        below it, records without or with other sensors, or by blocks, what simulates a loop or a
-        load, and `signals.reader: counts`.
+        below it, records without or with other sensors, what simulates a loop or a load, and
+        `signals.reader: counts`.
     """
-    every = [record_of(one) for one in (*records, *further)]
-    channels = sorted({c for r in every for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
+    own = [record_of(one) for one in (*records, *further)]
+    channels = sorted({c for r in own for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
     if not channels:
         return model, records, study, further
-    own = in_memory(every, "a wrench needs")
     for record in own:
         for c in channels:
             if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:

@@ -11,6 +11,7 @@ WENT: Mapping[str, str] = {
     "estimate.method: cloe": "output error of the closed loop went; set didim, which reads the same records of the same loop",
     "signals.lines": "lines of uneven encoders are no longer estimated; leave the key out: bounds are widened by their deviation",
     "estimate.options.prior: pullback": "the distance pullback went; set euclidean, or none",
+    "stream": "gone, every record is read whole; remove the key, and cut a record that memory does not hold into shorter ones",
 }
 """By the key, "stream", or by the key and its value, "estimate.method: tls"; keys of lists have no
 numbers: "record.resample".

@@ -20,7 +20,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from runtime.limits import LIMIT
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.record import (
@@ -417,9 +416,6 @@ class Study(Settings):
         Closed loop of simulation, IV and DIDIM.
     excitation : ExcitationSettings or None
         Search for an exciting motion.
-    stream : int or str
-        Samples of the blocks by which records are read; auto: blocks for large files, off: whole
-        records.
     """
 
     symgen: Version = SCHEMA
@@ -433,7 +429,6 @@ class Study(Settings):
     payload: PayloadSettings | None = None
     controller: Controller | None = None
     excitation: ExcitationSettings | None = None
-    stream: Literal["auto", "off"] | Annotated[Whole, Field(ge=LIMIT.FEWEST_SAMPLES)] = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "record", with_law(self.record, self.controller))

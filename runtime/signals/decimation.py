@@ -22,7 +22,8 @@ its last one, everything is linear in blocks:
 [P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and
 v are K/G short steps. The start, and the samples
 behind the last whole block with their reflection, are products of their own: x_0 = X0 u, [v; y] = A
-u + Ax x. The signals are never stored.
+u + Ax x. The signals are never stored. Of a long record, PART kept samples are computed at a time,
+from the samples that decide them: the filter has forgotten all others but for TRUNCATION.
 
 |lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows; residues come from zeros and
 poles, polynomial coefficients would lose all
@@ -31,10 +32,11 @@ digits at n_d = 100.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
+from math import ceil, log
 
 import numpy as np
 from scipy.linalg import toeplitz
@@ -54,6 +56,10 @@ LONGEST, MOST_KEPT = (
 # samples of a signal treated at a time, as many as an emitted module takes at once: rows of 32 kB,
 # which stay in cache
 PIECE = 4096
+PART = 16384
+"""Kept samples that are computed at a time."""
+TRUNCATION = 1e-20
+"""What the filter still knows of a sample that is out of its reach, of the signal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +80,11 @@ class Operator:
             [[self.D], 2 * (self.lam ** np.arange(length - 1)[:, None] @ self.c).real]
         )
 
+    @property
+    def reach(self) -> int:
+        """Samples in which the slowest mode decays to TRUNCATION."""
+        return ceil(log(TRUNCATION) / log(np.abs(self.lam).max()))
+
 
 @lru_cache(maxsize=32)
 def operator(factor: int) -> Operator:
@@ -90,7 +101,7 @@ class Plan:
     """What does not depend on the signals, for N samples of which K are kept. Complex numbers are
     pairs Re, Im, 2 m of them.
 
-    factor, phase : n_d, phi.
+    factor, phase, pad : n_d, phi, p.
     L, G, blocks : samples of a block, its kept samples, number of blocks.
     step : lambda^L, complex, shape (m,).
     PQY : shape (L, 4 m + G).
@@ -102,6 +113,7 @@ class Plan:
 
     factor: int
     phase: int
+    pad: int
     N: int
     K: int
     L: int
@@ -141,6 +153,7 @@ def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
     return Plan(
         factor=factor,
         phase=phase,
+        pad=pad,
         N=N,
         K=K,
         L=L,
@@ -160,6 +173,25 @@ def plan(N: int, factor: int, phase: int, pad: int) -> Plan:
 def decimate(u: Array, plan: Plan) -> Array:
     """Kept samples, shape (S, K), of signals u, shape (S, N)."""
     return decimated_pieces(lambda t0, t1: u[:, t0:t1], len(u), plan)
+
+
+def decimated_parts(
+    read: Callable[[int, int], Array], S: int, whole: Plan, most: int = PART
+) -> Iterator[tuple[slice, Array]]:
+    """Consecutive kept samples [a, b) of S signals, at most `most` of them at a time, and their
+    values, shape (S, b - a); read : as of `decimated_pieces`, samples that several parts ask for are
+    read again.
+    """
+    far = operator(whole.factor).reach
+    for a in range(0, whole.K, most):
+        b = min(a + most, whole.K)
+        first = whole.phase + a * whole.factor
+        last = whole.phase + (b - 1) * whole.factor
+        begin, end = max(first - far, 0), min(last + far + 1, whole.N)
+        ahead, phase = divmod(first - begin, whole.factor)
+        part = plan(end - begin, whole.factor, phase, whole.pad)
+        y = decimated_pieces(partial(_later, read, begin), S, part)
+        yield slice(a, b), y[:, ahead : ahead + b - a]
 
 
 def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> Array:
@@ -193,6 +225,11 @@ def decimated_pieces(read: Callable[[int, int], Array], S: int, plan: Plan) -> A
         )
         y[:, :K] = outputs.swapaxes(0, 1).reshape(S, K)
     return y
+
+
+def _later(read: Callable[[int, int], Array], begin: int, t0: int, t1: int) -> Array:
+    """The samples [t0, t1), counted from sample `begin`."""
+    return read(begin + t0, begin + t1)
 
 
 def recursion(a: Array, x: Array, drive: Array) -> None:

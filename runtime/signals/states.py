@@ -20,7 +20,6 @@ from runtime.model.drives import Drives
 from runtime.records.missing import COUNTS, Missing, require_positions
 from runtime.records.record import Record
 from runtime.settings.study import Signals
-from runtime.signals.counts.by_blocks import CountStage
 from runtime.signals.counts.lattice import unwrapped_counts
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import SpeedErrors, States, filtered_states
@@ -36,7 +35,6 @@ def observed_states(
     *,
     missing: Missing | None = None,
     name: str = "record",
-    counts: CountStage | None = None,
     v: Array | None = None,
 ) -> States:
     """q, qd, qdd of measured joint positions by the reader of the study.
@@ -55,8 +53,6 @@ def observed_states(
         Samples of q that hold no position.
     name : str
         What errors call the record.
-    counts : CountStage, optional
-        Reads the counts of a piece of the record, whose findings it keeps; default: q is the whole.
     v : ndarray, shape (N, n), optional
         Recorded velocities, for reader lowpass.
 
@@ -73,8 +69,6 @@ def observed_states(
         return States(q, rest, rest) if static else filtered_states(q, rate, signals, v)
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(q, drives, missing)
-    if counts is not None:
-        return _joint_states(*counts.read(position), rate, signals, drives)
     reading = read_counts(position, rate, signals.step, name=name)
     states = _joint_states(*reading.motion, rate, signals, drives)
     return replace(states, findings=sentences(reading.findings, name))
@@ -96,8 +90,8 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
         return record
     drives = encoder_drives(signals.side, drives)
     position = encoder_position(record.q, drives)
-    known, counts, unwrapping = unwrapped_counts(position, signals.step, name=record.name)
-    if not unwrapping.wraps:
+    known, counts, wraps = unwrapped_counts(position, signals.step, name=record.name)
+    if not wraps:
         return record
     x = known.position(counts)
     return replace(record, q=x if drives is None else drives.joint_position(x))

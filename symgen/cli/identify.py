@@ -4,7 +4,6 @@ how far to trust them.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,13 +22,6 @@ def identify(
         ),
     ] = None,
     target: options.Target = "numpy",
-    block: Annotated[
-        int | None,
-        typer.Option(
-            min=10,
-            help="Read by blocks of so many samples; default: large files, or as the study says.",
-        ),
-    ] = None,
     physical: Annotated[
         bool,
         typer.Option("--physical", help="Tell whether a physical robot can have these parameters."),
@@ -47,7 +39,6 @@ def identify(
             help="Tell whether record, study and robot file suit each other, and what would.",
         ),
     ] = True,
-    workers: options.Workers = 1,
     trust: options.Trust = False,
     exact: options.Exact = False,
     verbose: Annotated[
@@ -69,27 +60,16 @@ def identify(
     """Identify the base parameters of ROBOT from RECORD, or from several fitted together. Ends with
     the verdict: exit code 0 for Yes and With care, 1 for No.
     """
-    from runtime.parallel import Workers
-
-    with (
-        session.progress_lines(),
-        session.results_in(output) as results,
-        Workers(workers) as processes,
-    ):
+    with session.progress_lines(), session.results_in(output) as results:
         import runtime
         from runtime.compiled.model import target_of
         from runtime.records.provenance import processor
-        from runtime.records.reading_by_blocks import is_stream, records_or_streams
+        from runtime.records.reading import read_records
 
         model = session.model_of(robot, target, trust=trust, exact=exact, records=record)
         study = session.study_of_arguments(record)
-        study = study if block is None else replace(study, stream=block)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
-        if is_stream(study.record, study.stream):
-            processes.start("runtime.identification.identification")
-        records = records_or_streams(
-            study.record, model, study.stream, missing=study.signals.admits_missing
-        )
+        records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = runtime.identify(
             model,
             records,
@@ -98,7 +78,6 @@ def identify(
             friction=friction,
             variants=session.variants_of(robot, exact=exact) if plausible else None,
             plausible=plausible,
-            workers=processes,
             provenance={"target": target_of(model), "processor": processor()},
         )
         if results is not None:

@@ -40,14 +40,12 @@ def report(
         import runtime
         from runtime.identification.identification import assess
         from runtime.json_documents import json_text
-        from runtime.records.reading_by_blocks import records_or_streams
+        from runtime.records.reading import read_records
 
         model = session.model_of(robot, trust=trust, exact=exact, records=record)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})
         asked = session.changed(study, cestac={"delta": encoder}).cestac.delta
-        records = records_or_streams(
-            study.record, model, study.stream, missing=study.signals.admits_missing
-        )
+        records = read_records(study.record, model, missing=study.signals.admits_missing)
         result = assess(
             model,
             records,

@@ -163,14 +163,11 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """
     from runtime.identification.schemas import load_whole_estimate
     from runtime.identification.validation import direct_comparison
-    from runtime.records.record import Record
     from runtime.rows.prepared import prepared
 
     place = Path(request["run"])
     loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
     fit = load_whole_estimate(place / "estimate.json")
-    if not isinstance(record, Record):
-        raise InputError("the record is read by blocks; its report shows the torques")
     own = prepared(loaded, record, study)
     selection, K = own.selection, len(own.selection.kept)
     shown = np.unique(np.linspace(0, K - 1, min(K, INSTANTS_DRAWN)).astype(int))
@@ -193,7 +190,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
     relative to its study.
     """
-    from runtime.records.reading_by_blocks import records_or_streams
+    from runtime.records.reading import read_records
     from runtime.settings.location import located
 
     model = runtime.load_model(symgen.model(path))
@@ -205,7 +202,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     }
     chosen = study.record if asked is None else (named.get(asked, study.record[0]),)
     missing = study.signals.admits_missing
-    return model, study, records_or_streams(chosen, model, study.stream, missing=missing), named
+    return model, study, read_records(chosen, model, missing=missing), named
 
 
 @answered

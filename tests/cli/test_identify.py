@@ -9,7 +9,6 @@ import jsonschema
 import numpy as np
 import pytest
 import typer
-from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime.estimators.estimate import Estimate
@@ -226,73 +225,8 @@ def test_folder_that_cannot_be_written(tmp_path):
     assert result.exit_code == 2 and result.stderr.startswith("error: ")
 
 
-@pytest.fixture(scope="module")
-def whole(tx40_data):
-    """estimate.json of the TX40 record, read whole."""
-    return run("tx40", "tx40", "--json").stdout
-
-
-@campaign
-@pytest.mark.parametrize(
-    "held", [pytest.param(100e6, marks=campaign), 0], ids=["rows held", "rows reduced"]
-)
-def test_blocks_give_the_same_result(whole, monkeypatch, held):
-    """Every figure of estimate.json but the settings, to 1e-9 of the largest of its kind."""
-    monkeypatch.setattr("runtime.rows.observe.HELD", held)
-    whole, blocks = (
-        json.loads(whole),
-        json.loads(run("tx40", "tx40", "--json", "--block", 10000).stdout),
-    )
-    assert blocks["settings"].pop("stream") == {"block": 10000}
-    for key in ("X", "sigma", "sigma_corrected"):
-        np.testing.assert_allclose(
-            blocks[key], whole[key], rtol=0, atol=1e-9 * np.abs(whole[key]).max()
-        )
-    assert blocks["settings"] == whole["settings"] and blocks["verdict"] == whole["verdict"]
-    assert blocks["essential"]["names"] == whole["essential"]["names"]
-    for key, fit in whole["coupling"].items():
-        np.testing.assert_allclose(
-            blocks["coupling"][key]["relative_error"], fit["relative_error"], rtol=1e-9
-        )
-
-
-@campaign
-def test_workers_give_the_same_bytes(tmp_path):
-    """The plausibility checks, which another process makes meanwhile, included."""
-    t = np.arange(20_000) / 1000
-    np.savez(
-        tmp_path / "axis.npz",
-        t=t,
-        q1=0.2 * np.sin(6 * t) + 0.1 * np.sin(17 * t),
-        tau1=20 * np.cos(6 * t),
-    )
-    one, two = (
-        run("emps", tmp_path / "axis.npz", "--json", "--block", 5000, "--workers", count).stdout
-        for count in (1, 2)
-    )
-    assert one == two and json.loads(one)["plausibility"]["checks"]
-
-
-def test_large_files_are_read_by_blocks(tmp_path, monkeypatch):
-    """Unless the study says otherwise; the result says so."""
-    t = np.arange(3000) / 1000
-    np.savez(tmp_path / "axis.npz", t=t, q1=0.2 * np.sin(6 * t), tau1=20 * np.cos(6 * t))
-    monkeypatch.setattr("runtime.records.reading_by_blocks.LARGE", 1000)
-    settings = json.loads(run("emps", tmp_path / "axis.npz", "--json").stdout)["settings"]
-    assert settings["stream"] == {"block": 65536}
-    (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: off\n")
-    assert (
-        "stream"
-        not in json.loads(run("emps", tmp_path / "study.yaml", "--json").stdout)["settings"]
-    )
-    assert run("emps", tmp_path / "study.yaml", "--block", "3").exit_code == 2
-
-
-@campaign
-def test_report_says_what_its_figures_leave_out(tx40_data, tmp_path, monkeypatch):
-    monkeypatch.setattr("runtime.rows.by_blocks.SHOWN", 300)
-    monkeypatch.setattr("runtime.rows.observe.HELD", 0)
-    assert run("tx40", "tx40", "--block", 20000, "-o", tmp_path).exit_code == 0
-    assert "figures show the first 1782 of 5592 rows" in (tmp_path / "report.html").read_text(
-        encoding="utf-8"
-    )  # 6 (300 - 3), 6 (938 - 6)
+def test_a_study_that_asks_for_blocks_is_told_what_to_do(tmp_path):
+    (tmp_path / "study.yaml").write_text("record: {files: axis.npz}\nstream: 65536\n")
+    result = run("emps", tmp_path / "study.yaml")
+    assert result.exit_code == 2
+    assert "study.yaml, line 2: stream: gone, every record is read whole" in result.stderr

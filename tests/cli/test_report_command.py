@@ -105,13 +105,6 @@ def test_encoders_at_the_motors(emps_data, tmp_path):
     assert bad.exit_code == 2 and "cestac.side: 'shaft'; expected joint or motor" in bad.stderr
 
 
-@campaign
-def test_read_by_blocks(record, tmp_path):
-    (tmp_path / "study.yaml").write_text("symgen: 1\nrecord: {files: [record.csv]}\nstream: 1000\n")
-    result = run("planar_2r", tmp_path / "study.yaml", "-o", tmp_path / "out")
-    assert "they need whole records; set stream: off" in result.stderr
-
-
 def test_bad_step_is_told(record, tmp_path):
     result = run("planar_2r", record, "-o", tmp_path / "out", "--encoder", "-1")
     assert (

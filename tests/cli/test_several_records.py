@@ -13,7 +13,7 @@ from runtime import load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.identification.validation import record_errors
-from runtime.records.reading_by_blocks import open_streams
+from runtime.records.reading import read_records
 from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
@@ -107,39 +107,16 @@ def test_the_record_that_does_not_fit_is_seen(folder, tmp_path):
     assert [record["name"] for record in again["by_record"]] == ["a", "b", "c"]
 
 
-@pytest.mark.campaign
-def test_errors_by_blocks_are_those_in_memory(folder):
-    whole, blocks = (
-        identified(folder / "also.yaml"),
-        identified(folder / "also.yaml", "--block", 300),
-    )
-    for one, other in zip(whole["by_record"], blocks["by_record"], strict=True):
-        assert (one["name"], one["rows"]) == (other["name"], other["rows"])
-        np.testing.assert_allclose(
-            [one["relative_error"], *one["per_joint"]],
-            [other["relative_error"], *other["per_joint"]],
-            rtol=1e-7,
-        )
-
-
-def test_errors_of_records_add_up(folder, monkeypatch):
+def test_errors_of_records_add_up(folder):
     """Squares of the residuals of the records are that of all."""
     model = load_model(folder / "planar_2r.py", trust=True)
     record = {"files": ["a.csv"], "also": ["b.csv", "c.csv"], "units": {"q": "deg"}}
-    study = study_from_mapping({"record": record, "stream": 1000})
-    streams = open_streams(study.record, model, folder=folder)
-    monkeypatch.setattr("runtime.rows.observe.HELD", 0)
-    reduction = observe(model, streams, study)
-    fit = essential_of(reduction, study.essential, study.estimate, model=model).all_parameters
-    parts = record_errors(reduction, fit, [stream.name for stream in streams])
-    sizes = [
-        np.linalg.norm(
-            np.concatenate(
-                [j.R[:, -1] for s in reduction.reduced.segments if s.record == k for j in s.joints]
-            )
-        )
-        for k in range(3)
-    ]
+    study = study_from_mapping({"record": record})
+    records = read_records(study.record, model, folder=folder)
+    observation = observe(model, records, study)
+    fit = essential_of(observation, study.essential, study.estimate, model=model).all_parameters
+    parts = record_errors(observation, fit, [record.name for record in records])
+    sizes = [np.linalg.norm(observation.of_record(k).Y) for k in range(3)]
     total = np.sqrt(
         sum(
             (part.relative_error / 100 * size) ** 2 for part, size in zip(parts, sizes, strict=True)

@@ -113,7 +113,7 @@ def serve(pipe, folder: Path) -> None:
         "h5py",
         "mujoco",
         "symgen.emit",
-        "runtime.records.reading_by_blocks",
+        "runtime.records.reading",
         "runtime.estimators.estimate",
         "runtime.model.generated",
     ):

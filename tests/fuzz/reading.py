@@ -14,8 +14,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from runtime.settings.study import Columns
 
@@ -74,36 +72,11 @@ def two_joints() -> object:
 
 
 def read_record(path: Path) -> object:
-    """Whole and, where the format has it, by blocks: both give the same samples or both refuse."""
-    from runtime.errors import InputError
-    from runtime.records.formats.table import format_of
     from runtime.records.reading import read_record as read
-    from runtime.records.reading_by_blocks import open_stream
     from runtime.settings.study import RecordSettings
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))
-    whole: object = None
-    refused: InputError | None = None
-    try:
-        whole = read(settings, folder=path.parent)
-    except InputError as e:
-        refused = e
-    if format_of(path).by_blocks and path.suffix != ".gz":
-        try:
-            stream = open_stream(settings, folder=path.parent, block=10)
-            blocks = [q for _, q, _, _ in stream.blocks()]
-        except InputError:
-            if refused is None:
-                raise
-        else:
-            if refused is None and not np.array_equal(np.concatenate(blocks), whole.q):  # type: ignore[attr-defined]
-                raise AssertionError("blocks and whole file differ")
-    try:
-        if refused is not None:
-            raise refused
-    finally:
-        del refused  # an error that holds its own frame would hold what was read
-    return whole
+    return read(settings, folder=path.parent)
 
 
 def columns_of(path: Path) -> Columns:

@@ -218,7 +218,6 @@ def study_tables() -> tuple[dict, ...]:
         "symgen": 1,
         "record": {"files": ["a.csv"], "rate": 1000},
         "cestac": {"delta": ["2*pi/10000"], "runs": 3},
-        "stream": "off",
     }
     rich = small | {
         "payload": {"record": {"files": ["b.csv"]}, "known": {"M": 2.0}, "gains": True},

@@ -19,7 +19,6 @@ from runtime.errors import InputError
 from runtime.files import read_bytes
 from runtime.model.generated import load_model
 from runtime.records.reading import read_record
-from runtime.records.reading_by_blocks import open_stream
 from runtime.settings.files import load_study
 from runtime.settings.study import RecordSettings
 from symgen.description import load_robot
@@ -312,9 +311,6 @@ def test_what_is_no_file(tmp_path, kind):
         path = special(kind, tmp_path, ending)
         with pytest.raises(expected):
             read_record(RecordSettings(files=(str(path),)))
-        if ending in (".csv", ".npz", ".npy", ".parquet"):
-            with pytest.raises(expected):
-                open_stream(RecordSettings(files=(str(path),)))
     with pytest.raises(expected):
         load_model(special(kind, tmp_path, ".py"))
 

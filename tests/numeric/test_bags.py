@@ -13,7 +13,6 @@ from campaign import campaign, some
 from runtime import read_record
 from runtime.errors import InputError
 from runtime.records.formats.table import open_table
-from runtime.records.reading_by_blocks import are_large, open_stream
 from runtime.settings.study import study_from_mapping
 
 N, RATE = 40, 200
@@ -198,13 +197,6 @@ def test_a_stamp_that_goes_back_is_found(tmp_path):
     with pytest.raises(InputError, match=r"message 21 of /j: time goes from 0\.095 s to -0\.9 s"):
         read_record(settings(bag(tmp_path, topics={"/j": messages}, logged=STAMPS.tolist())))
     np.testing.assert_array_equal(read_record(settings(tmp_path / "run", rate=RATE)).q, Q)
-
-
-def test_bags_are_read_whole(tmp_path):
-    path = bag(tmp_path)
-    with pytest.raises(InputError, match="bags are read whole"):
-        open_stream(settings(path))
-    assert not are_large([settings(path)])
 
 
 def test_without_its_library(tmp_path, monkeypatch):

@@ -20,11 +20,9 @@ from runtime.model.generated import drives_of
 from runtime.records.datasets import dataset_study
 from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.records.stream import RecordStream
 from runtime.rows.observe import observe
-from runtime.rows.pieces import pieces
 from runtime.rows.prepared import decimated_torque, observation_from_states, prepared
-from runtime.rows.selection import UNCERTAIN, certain_rows, instants_of, select_rows
+from runtime.rows.selection import UNCERTAIN, certain_rows, select_rows
 from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from runtime.signals.counts.boxes import box_moments
 from runtime.signals.counts.lattice import lattice
@@ -286,9 +284,9 @@ def test_counts_in_multiples_of_four_wrap_where_the_counter_does(step):
 
 
 @pytest.mark.parametrize("bits", [16, pytest.param(32, marks=campaign)])
-def test_wraps_by_blocks_as_a_whole(planar, record, monkeypatch, bits):
-    """Counts that wrap within a stretch, within its margins and while samples are missing: the
-    numbers of the whole record, and its sentences.
+def test_wraps_across_stretches(planar, record, monkeypatch, bits):
+    """Counts that wrap within a stretch, within its margins and while samples are missing: rows and
+    sentences.
     """
     monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1500)
     monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", 400)
@@ -299,31 +297,16 @@ def test_wraps_by_blocks_as_a_whole(planar, record, monkeypatch, bits):
     missing[at[0] - 3 : at[0] + 4, 0] = True
     study = replace(STUDY, signals=replace(STUDY.signals, step=fine))
     changed = Record(record.t[half], wrapped, record.tau[half], rate=1000.0, missing=missing)
-    whole, blocks = (
-        observe(planar, changed, study),
-        observe(planar, RecordStream(changed, 700), study),
-    )
-    said = [
-        [text for text in own.findings if "wraps" in text or "missing" in text]
-        for own in (whole, blocks)
-    ]
-    assert whole.rows == blocks.rows and said[0] == said[1]
-    assert sum(f"the count wraps at 2^{bits} " in text for text in said[0]) == 2, whole.findings
-    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+    whole = observe(planar, changed, study)
+    assert sum(f"the count wraps at 2^{bits} " in text for text in whole.findings) == 2
+    assert "samples are missing" in " ".join(whole.findings)
     reset = wrapped.copy()
     reset[3000:, 1] -= 1234567 * fine
-    refused = []
-    for source in (replace(changed, q=reset), RecordStream(replace(changed, q=reset), 700)):
-        with pytest.raises(
-            InputError,
-            match=(
-                r"encoder 2: the count jumps by -123\d+ at sample 3000; it was reset or lost "
-                r"there"
-            ),
-        ) as told:
-            observe(planar, source, study)
-        refused.append(str(told.value))
-    assert refused[0] == refused[1]
+    with pytest.raises(
+        InputError,
+        match=r"encoder 2: the count jumps by -123\d+ at sample 3000; it was reset or lost there",
+    ):
+        observe(planar, replace(changed, q=reset), study)
 
 
 def test_an_encoder_at_rest_is_told():
@@ -418,67 +401,11 @@ def test_no_direction_is_known_while_a_joint_stands():
     assert (np.abs(reading.qd) < UNCERTAIN * reading.s_qd).mean() < 0.05
 
 
-def test_by_blocks_as_a_whole(planar, record, monkeypatch):
+def test_a_coarser_step_of_the_record_is_told(planar, record, monkeypatch):
     monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 3000)
     study = replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3))
-    whole, blocks = (
-        observe(planar, record, study),
-        observe(planar, RecordStream(record, 700), study),
-    )
-    assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
-    assert (
-        whole.findings == blocks.findings
-        and "multiples of 2; the step of the record is 0.005" in whole.findings[0]
-    )
-    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
-
-
-@pytest.mark.parametrize(
-    ("step", "wrap"), [pytest.param(5e-3, 2**32, marks=pytest.mark.campaign), (4e-5, 2**16)]
-)
-@campaign
-def test_in_pieces_as_a_whole(planar, monkeypatch, step, wrap):
-    """Pieces with the stretches that their filters reach, gaps in all and one over a cut, counts
-    that wrap in the first piece too.
-    """
-    t = np.arange(9000) / 250.0
-    states = motion(t)
-    torque = planar.inverse_dynamics(*states, planar.base_parameters(planar.VALUES))
-    q = (np.round(states[0] / step) + wrap / 2) % wrap * step
-    for samples in (slice(1000, 1003), slice(4600, 4640), slice(8000, 8020)):
-        q[samples, 1] = np.nan
-    record = Record(t, q, torque, rate=250.0, missing=np.isnan(q))
-    for name, value in (
-        ("signals.counts.reading.STRETCH", 1024),
-        ("signals.counts.reading.MARGIN", 128),
-        ("rows.pieces.STRETCH", 1024),
-        ("rows.pieces.PIECE", 4 * 1024),
-    ):
-        monkeypatch.setattr(f"runtime.{name}", value)
-    study = replace(
-        STUDY, rows=replace(STUDY.rows, low_speed=0.05), signals=replace(STUDY.signals, step=step)
-    )
-    cut = pieces(
-        0,
-        RecordStream(record, 700),
-        study.signals,
-        instants_of([record.t], record.rate, study.signals, study.rows, record.name),
-    )
-    assert len(cut) == 2 and cut[1].begin > 0 and cut[0].end < len(t)
-    whole, blocks = (
-        observe(planar, record, study),
-        observe(planar, RecordStream(record, 700), study),
-    )
-    assert whole.rows == blocks.rows and whole.dropped == blocks.dropped
-    assert [x for x in whole.findings if "changes by" not in x] == [
-        x for x in blocks.findings if "changes by" not in x
-    ]
-    assert "63 samples are missing" in " ".join(blocks.findings) and (
-        "wraps" in " ".join(blocks.findings)
-    ) == (wrap < 2**20)
-    np.testing.assert_array_equal(blocks.t, whole.t)
-    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-9 * np.abs(whole.W).max())
-    np.testing.assert_allclose(blocks.Y, whole.Y, atol=1e-11 * np.abs(whole.Y).max())
+    found = observe(planar, record, study).findings[0]
+    assert "multiples of 2; the step of the record is 0.005" in found
 
 
 def test_identify_prints_what_the_reader_says_of_the_encoders(planar, record):
@@ -562,9 +489,6 @@ def test_motor_counts_are_counts_whatever_the_coupling(coupling, tmp_path):
     (record,) = read_records(study.record, model, folder=tmp_path)
     assert record.origin.drives.coupling == coupling
     assert prepared(model, record, study).states.errors.known.all()
-    stream = RecordStream(record, 700)
-    whole, blocks = (observe(model, source, study) for source in (record, stream))
-    np.testing.assert_allclose(blocks.W, whole.W, rtol=0, atol=1e-9 * np.abs(whole.W).max())
     coarse = replace(
         study, cestac=CestacSettings(side="motor", rounding="phase", delta=6 * step, runs=2)
     )

@@ -5,7 +5,6 @@ import pytest
 
 import runtime
 import symgen
-from runtime.records.stream import RecordStream
 from runtime.rows.prepared import resolved
 from runtime.settings.study import Signals, Study
 from runtime.signals.cutoff import cutoff
@@ -59,12 +58,11 @@ def records() -> list[runtime.Record]:
     ]
 
 
-def test_one_value_for_all_records_in_memory_and_by_blocks(records):
+def test_one_value_for_all_records(records):
     study, why = resolved(Study(), records)
     alone = [resolved(Study(), [record])[0].signals.lowpass.cutoff for record in records]
     assert alone[0] < study.signals.lowpass.cutoff < alone[1]
     assert f"{study.signals.lowpass.cutoff:g} Hz" in why and "joint 1 decides" in why
-    assert resolved(Study(), [RecordStream(r, 700) for r in records]) == (study, why)
     assert resolved(study, records) == (study, "")
 
 
@@ -104,10 +102,9 @@ def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
     whole = [np.linalg.norm(x, axis=0) for x in blocks]
     assert share[1] == pytest.approx((whole[0] / whole[1])[1], rel=0.1)
     record = runtime.Record(T, np.round(q / 0.1) * 0.1, driven)
-    for one in (record, RecordStream(record, 3000)):
-        study, why = resolved(Study(), [one])
-        assert study.signals.window_of_torques == 1 and study.signals.median == 5
-        assert "Torques without a median" in why
+    study, why = resolved(Study(), [record])
+    assert study.signals.window_of_torques == 1 and study.signals.median == 5
+    assert "Torques without a median" in why
     assert resolved(Study(), [runtime.Record(T, q, torque)])[0].signals.window_of_torques == 5
     asked = Study(signals=Signals(torque_median=3))
     assert resolved(asked, [record])[0].signals.window_of_torques == 3

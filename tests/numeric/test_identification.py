@@ -19,7 +19,6 @@ from runtime import InputError
 from runtime.identification.identification import assess
 from runtime.records.provenance import origin, record_names
 from runtime.records.record import Origin
-from runtime.records.stream import RecordStream
 from runtime.settings.location import located, study_text
 from runtime.settings.study import Lowpass, Signals, study_from_mapping
 
@@ -105,16 +104,6 @@ def test_work_is_done_once(model, monkeypatch):
     W = result.observation.W
     assert [Y is result.observation.Y for of, Y, *_ in factored if of is W] == [True]
     assert sum(len(of) == len(W) for of, *_ in factored) == 1
-
-
-def test_records_and_streams_are_fitted_together(model):
-    """The streams of a mixed list were dropped without a word."""
-    first, second = measured(model, 1, "a"), measured(model, 2, "b")
-    whole = runtime.identify(model, [first, second], STUDY)
-    mixed = runtime.identify(model, [first, RecordStream(second, 500)], STUDY)
-    assert mixed.estimate.rows == whole.estimate.rows and mixed.name == "a, b"
-    np.testing.assert_allclose(mixed.estimate.X, whole.estimate.X, rtol=1e-9, atol=1e-9)
-    assert [one.rows for one in mixed.record_errors] == [one.rows for one in whole.record_errors]
 
 
 def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):

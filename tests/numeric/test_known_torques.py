@@ -12,8 +12,6 @@ import scipy.io
 
 from runtime import Record, read_record
 from runtime.errors import InputError
-from runtime.records.provenance import origin
-from runtime.records.reading_by_blocks import open_stream
 from runtime.settings.study import study_from_mapping
 
 T = np.arange(40) / 100
@@ -52,9 +50,6 @@ def test_known_torques_are_found_subtracted_and_said(tmp_path, place):
         record.subtracted
         == f"known torques subtracted: up to {BALANCE.max():.4g} of joint 2 (N m or N)"
     )
-    stream = open_stream(given, folder=tmp_path, block=16)
-    np.testing.assert_array_equal(np.vstack([tau for _, _, tau, _ in stream.blocks()]), LEFT)
-    assert origin([stream])["known_torques"] == origin([record])["known_torques"]
 
 
 def test_records_keep_what_was_subtracted_once():

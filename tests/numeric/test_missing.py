@@ -21,9 +21,7 @@ from runtime.model.drives import Drives
 from runtime.model.generated import drives_of
 from runtime.records.missing import Missing, bridged
 from runtime.records.reading import read_record
-from runtime.records.reading_by_blocks import open_stream
 from runtime.records.record import Record
-from runtime.records.stream import RecordStream
 from runtime.resolution.cestac import cestac
 from runtime.rows.observe import observe
 from runtime.settings.record import RecordSettings
@@ -93,13 +91,7 @@ def test_every_format(tmp_path, kind):
     np.testing.assert_array_equal(record.missing.samples, MISSING[:200])
     np.testing.assert_array_equal(record.q[~MISSING[:200]], RECORD.q[:200][~MISSING[:200]])
     if kind in {"mat", "parquet"}:
-        return  # read by a process of their own, as are their blocks
-    _, q, _, missing = (
-        np.concatenate(x)
-        for x in zip(*open_stream(settings, block=37, missing=True).blocks(), strict=True)
-    )
-    np.testing.assert_array_equal(missing, MISSING[:200])
-    np.testing.assert_array_equal(q[~missing], record.q[~MISSING[:200]])
+        return
     with pytest.raises(
         InputError,
         match=(
@@ -143,27 +135,24 @@ def test_arrays():
         Record(T, np.where(MISSING, np.nan, Q), TAU)
     with pytest.raises(InputError, match=r"missing bool \(4000,\).*|missing bool \(4000, 1\)"):
         Record(T, Q, TAU, missing=MISSING[:, 0])
-    for source in (RECORD, RecordStream(RECORD, 500)):
-        with pytest.raises(
-            InputError,
-            match=(
-                "reader: lowpass needs all of them: repair or cut the record; where positions "
-                "are counts"
-            ),
-        ):
-            observe(planar, source, replace(STUDY, signals=replace(SIGNALS, reader="lowpass")))
+    with pytest.raises(
+        InputError,
+        match=(
+            "reader: lowpass needs all of them: repair or cut the record; where positions are counts"
+        ),
+    ):
+        observe(planar, RECORD, replace(STUDY, signals=replace(SIGNALS, reader="lowpass")))
     with pytest.raises(InputError, match="encoder 2: no sample is known"):
         observe(planar, replace(RECORD, missing=MISSING | [False, True]), STUDY)
     rare = replace(RECORD, missing=MISSING | ((np.arange(N) % 500 > 0)[:, None] & [True, False]))
-    for source in (rare, RecordStream(rare, 500)):
-        with pytest.raises(
-            InputError,
-            match=(
-                r"none of its 200 rows per joint is used: rows.trim leaves out 40, positions "
-                r"that are missing leaves? out"
-            ),
-        ):
-            observe(planar, source, replace(STUDY, signals=replace(SIGNALS, step=STEP)))
+    with pytest.raises(
+        InputError,
+        match=(
+            r"none of its 200 rows per joint is used: rows.trim leaves out 40, positions "
+            r"that are missing leaves? out"
+        ),
+    ):
+        observe(planar, rare, replace(STUDY, signals=replace(SIGNALS, step=STEP)))
 
 
 def test_short_gaps_are_filled_and_long_ones_left_out():
@@ -190,23 +179,14 @@ def test_short_gaps_are_filled_and_long_ones_left_out():
 
 
 @pytest.mark.parametrize("margin", [pytest.param(1000, marks=campaign), 100])
-def test_by_blocks_as_a_whole(monkeypatch, margin):
-    """Gaps across blocks and stretches, with the small margin one that holds a whole stretch and
+def test_gaps_across_stretches(monkeypatch, margin):
+    """Gaps across stretches, with the small margin one that holds a whole stretch and
     its margins.
     """
     monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1500 if margin == 1000 else 300)
     monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", margin)
     study = replace(STUDY, signals=replace(SIGNALS, step=STEP))
-    whole, blocks = (
-        observe(planar, RECORD, study),
-        observe(planar, RecordStream(RECORD, 700), study),
-    )
-    assert (
-        whole.rows == blocks.rows
-        and whole.dropped == blocks.dropped
-        and whole.findings == blocks.findings
-    )
-    np.testing.assert_allclose(blocks.W, whole.W, atol=1e-6 * np.abs(whole.W).max())
+    whole = observe(planar, RECORD, study)
     X, *_ = np.linalg.lstsq(whole.W, whole.Y, rcond=None)
     np.testing.assert_allclose(
         X, planar.base_parameters(planar.VALUES), atol=0.1 if margin == 1000 else 0.5
@@ -214,20 +194,12 @@ def test_by_blocks_as_a_whole(monkeypatch, margin):
 
 
 def test_a_first_stretch_without_a_sample(monkeypatch):
-    """The whole record takes step and phase from later samples; by blocks they cannot be known."""
+    """Step and phase are those of later samples."""
     monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1000)
     monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", 200)
     late = replace(RECORD, missing=MISSING | ((T < 1.3)[:, None] & [True, False]))
     observation = observe(planar, late, STUDY)
     assert observation.t.min() > 1.3 and np.isfinite(observation.W).all()
-    with pytest.raises(
-        InputError,
-        match=(
-            "encoder 1: no sample is known among the first 1200, which tell the step; set "
-            "stream: off"
-        ),
-    ):
-        observe(planar, RecordStream(late, 700), STUDY)
 
 
 def test_coupled_motors():

@@ -19,7 +19,6 @@ from runtime.errors import InputError
 from runtime.identification.uncertainty import block_bootstrap
 from runtime.identification.validation import weak_directions
 from runtime.records.record import Origin
-from runtime.records.stream import RecordStream
 from runtime.rows.factor import factor
 from runtime.rows.observation import stack
 from runtime.rows.prepared import decimated_torque, observation_from_states
@@ -101,7 +100,7 @@ def test_equal_signals_are_filtered_once():
     assert len(entries.k) == planar.STRUCTURE.sum() == 13
     assert len(entries.source) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
-    signals = Columns(planar).signals(states, None)
+    ((_, signals),) = Columns(planar).signals(states, None)
     D = planar.regressor(states.q, states.qd, states.qdd)
     for k, j, which, sign in zip(entries.k, entries.j, entries.which, entries.sign, strict=True):
         np.testing.assert_array_equal(sign * signals[which], D[:, j, k])
@@ -179,14 +178,17 @@ def test_signals_are_those_found_over_a_finite_field():
     )  # one to one, the sign of each signal apart
 
 
-def test_blocks_equal_the_whole(record):
+def test_pieces_of_the_regressor_equal_the_whole():
     entries = distinct_entries(planar, {})
-    states = States(*motion(np.arange(10000) / RATE))  # longer than two blocks
+    states = States(*motion(np.arange(10000) / RATE))  # longer than two pieces
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
-    np.testing.assert_array_equal(
-        Columns(planar).signals(states, None),
-        D[entries.k[entries.source], entries.j[entries.source]],
-    )
+    expected = D[entries.k[entries.source], entries.j[entries.source]]
+    end = 0
+    for part, signals in Columns(planar).signals(states, None):
+        assert part.start == end
+        np.testing.assert_array_equal(signals, expected[:, part])
+        end = part.stop
+    assert end == len(states)
 
 
 def test_rows_left_out_are_counted(record):
@@ -288,25 +290,16 @@ def test_columns_and_windows(record):
         o.between(100, 200)
 
 
-def test_records_and_streams_in_one_list_are_all_read(record):
+def test_several_records_are_stacked(record):
     s = study(rows={"low_speed": 0.2})
-    both, alone = (
-        observe(planar, [record, RecordStream(record, 500)], s),
-        observe(planar, record, s),
-    )
-    assert (
-        both.rows == tuple(2 * k for k in alone.rows)
-        and set(both.record) == {0, 1}
-        and both.reduced is None
-    )
+    both, alone = observe(planar, [record, record], s), observe(planar, record, s)
+    assert both.rows == tuple(2 * k for k in alone.rows) and set(both.record) == {0, 1}
     for k in range(2):
-        np.testing.assert_allclose(
-            both.of_record(k).W, alone.W, rtol=0, atol=1e-10 * np.abs(alone.W).max()
-        )
+        np.testing.assert_array_equal(both.of_record(k).W, alone.W)
     assert np.array_equal(observe(planar, [record, record], s).W, stack([alone, alone]).W)
     with pytest.raises(InputError, match="no record"):
         observe(planar, [], s)
-    with pytest.raises(InputError, match="one record in memory"):
+    with pytest.raises(InputError, match="2 records; keep goes with one"):
         observe(planar, [record, record], s, keep=np.ones(N, dtype=bool))
 
 

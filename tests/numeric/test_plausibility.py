@@ -21,9 +21,8 @@ from runtime.loop.methods import estimate_of
 from runtime.model.inertia import physical_model
 from runtime.plausible.fits import Barrier, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
-from runtime.plausible.samples import Samples, excerpts, samples_of
-from runtime.records.reading_by_blocks import records_or_streams
-from runtime.records.stream import RecordStream
+from runtime.plausible.samples import Samples, samples_of
+from runtime.records.reading import read_records
 from runtime.settings.study import Rows, Study, study_from_mapping
 from symgen.description.yaml import parse_robot
 
@@ -165,7 +164,7 @@ def pendulum_record(model) -> runtime.Record:
     )
 
 
-def test_changes_that_no_fit_can_tell_are_found_by_computing_and_by_blocks_alike() -> None:
+def test_changes_that_no_fit_can_tell_are_found_by_computing() -> None:
     """One pendulum: every change of frame or sense, since another ZZ1, MX1, MY1 does the same; a
     factor of all torques; not a unit of angle.
     """
@@ -185,27 +184,6 @@ def test_changes_that_no_fit_can_tell_are_found_by_computing_and_by_blocks_alike
     assert not any(
         "degrees" in text or "torque of joint 1" in text or "+z0" in text
         for text in found.equivalent
-    )
-    assert (
-        runtime.plausibility(model, RecordStream(record, 512), variants=free).equivalent
-        == found.equivalent
-    )
-
-
-def test_excerpts_of_a_long_stream_are_spread_over_its_window(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    t = np.arange(5000) / 500
-    monkeypatch.setattr(LIMIT, "EXCERPTS", (3, 400))
-    parts = excerpts(
-        RecordStream(runtime.Record(t, t, t**2), 777),
-        study_from_mapping({"rows": {"window": [1.0, 9.0]}}),
-    )
-    assert [len(part) for part in parts] == [400] * 3
-    assert parts[0].t[0] == pytest.approx(1.0) and parts[2].t[-1] == pytest.approx(9.0)
-    assert all(
-        np.allclose(part.tau[:, 0], part.q[:, 0] ** 2) and np.allclose(np.diff(part.t), 0.002)
-        for part in parts
     )
 
 
@@ -340,8 +318,8 @@ def test_samples_hold_the_motion_and_the_known_torque(right: slips.Case) -> None
     assert len(samples) <= 500
 
 
-def test_an_excerpt_has_the_jitter_of_its_record(tmp_path: Path) -> None:
-    """Stamps off the grid by 0.3 periods, allowed by the study, are no finding of the excerpts."""
+def test_jitter_that_the_study_allows_is_no_finding(tmp_path: Path) -> None:
+    """Stamps off the grid by 0.3 periods."""
     model, rng = symgen.model("emps"), np.random.default_rng(3)
     t = np.arange(6000) / 500
     stamps = t + rng.uniform(-0.25, 0.25, len(t)) / 500
@@ -349,10 +327,10 @@ def test_an_excerpt_has_the_jitter_of_its_record(tmp_path: Path) -> None:
     rows = np.column_stack([stamps, q, 95 * -16 * q + 20 * np.sign(np.cos(4 * t))])
     np.savetxt(tmp_path / "emps.csv", rows, delimiter=",", header="t,q1,tau1", comments="")
     settings = {"files": [str(tmp_path / "emps.csv")], "rate": 500, "jitter": 0.3}
-    study = study_from_mapping({"record": settings, "stream": 1000})
-    (stream,) = records_or_streams(study.record, model, study.stream)
-    assert stream.origin.jitter == 0.3 and excerpts(stream, study)[0].origin.jitter == 0.3
-    runtime.identify(model, stream, study, plausible=True)
+    study = study_from_mapping({"record": settings})
+    (record,) = read_records(study.record, model)
+    assert record.origin.jitter == 0.3
+    runtime.identify(model, record, study, plausible=True)
 
 
 def test_the_speed_of_the_remedy_leaves_out_what_stands() -> None:

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from campaign import campaign
 
 from runtime.blas import BLAS_THREADS
 from runtime.errors import InputError
-from runtime.parallel import Workers, in_order, results
+from runtime.parallel import Workers, results
 
 
 def threads(context, key):
@@ -126,11 +125,6 @@ def test_what_still_runs_ends_when_the_caller_stops():
     assert time.monotonic() - start < 30
 
 
-@campaign
-def test_results_in_the_order_of_the_keys():
-    assert list(in_order(late, 1.0, range(4), 2)) == [0, 1, 4, 9]
-
-
 def test_here_in_order():
     own = {"offset": 10, "own": os.getpid()}
     for workers in (0, 1):
@@ -153,16 +147,6 @@ def test_here_and_elsewhere_with_one_blas_thread(tmp_path):
             others.append(other)
     assert others[0] == others[1] and not Path(f"/proc/{other}").exists()
     assert {name: os.environ.get(name) for name in BLAS_THREADS} == before
-
-
-def test_a_value_is_computed_meanwhile_by_another_process():
-    """By this one where no other one is there, or it dies."""
-    with Workers(2) as workers:
-        assert workers.meanwhile(os.getpid)() == os.getpid()
-        workers.start()
-        assert workers.meanwhile(os.getpid)() != os.getpid()
-        assert workers.meanwhile(partial(dying_elsewhere, os.getpid(), 7))() == 7
-        assert sorted(results(pow, 2, range(4), workers)) == [1, 2, 4, 8]
 
 
 @pytest.mark.parametrize("workers", [0, 2])

@@ -17,7 +17,6 @@ from runtime import Record, read_record
 from runtime.errors import InputError, SettingsError
 from runtime.model.drives import Drives
 from runtime.records.reading import read_records
-from runtime.records.reading_by_blocks import open_stream
 from runtime.records.record import Origin
 from runtime.settings.study import RecordSettings, study_from_mapping
 
@@ -215,21 +214,19 @@ def test_folders_are_texts_or_paths(tmp_path, monkeypatch, folder):
     write_csv(tmp_path / "run.csv")
     monkeypatch.chdir(tmp_path)
     assert len(read_records([settings(files="run.csv")], folder=folder)) == 1
-    assert len(open_stream(settings(files="run.csv"), folder=folder)) == N
 
 
 def test_errors_name_the_file(tmp_path):
     write_csv(tmp_path / "short.csv", rows=np.column_stack([T, Q, TAU])[:5])
     write_csv(tmp_path / "run.csv")
-    for read in (read_record, open_stream):
-        with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record has at least 10"):
-            read(settings(files="short.csv"), folder=tmp_path)
-        with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
-            read(
-                settings(files="run.csv"),
-                SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None),
-                folder=tmp_path,
-            )
+    with pytest.raises(InputError, match=r"^short\.csv: 5 samples; a record has at least 10"):
+        read_record(settings(files="short.csv"), folder=tmp_path)
+    with pytest.raises(InputError, match=r"^run\.csv: 2 joints; arm has 3"):
+        read_record(
+            settings(files="run.csv"),
+            SimpleNamespace(NAME="arm", JOINTS=(1, 2, 3), DRIVES=None),
+            folder=tmp_path,
+        )
 
 
 # --- by a path alone
@@ -470,9 +467,7 @@ def test_two_files_are_the_two_halves_of_one_record(tmp_path):
 @pytest.mark.parametrize("delimiter", [";", "\t", " "])
 @pytest.mark.parametrize("header", [True, False])
 def test_decimal_commas(tmp_path, delimiter, header):
-    """Decimal commas where `record.decimal` says so, in memory and by blocks; the names in a header
-    keep theirs.
-    """
+    """Decimal commas where `record.decimal` says so; the names in a header keep theirs."""
     rows = [
         [format(x, ".17g").replace(".", ",") for x in row]
         for row in np.column_stack([1000 * T, Q, TAU])
@@ -485,13 +480,9 @@ def test_decimal_commas(tmp_path, delimiter, header):
         else {"t": "1", "q": ["2", "3"], "tau": ["4", "5"]}
     )
     given = settings(files="a.csv", columns=columns, units={"t": "ms"}, decimal=",")
-    whole, stream = (
-        read_record(given, folder=tmp_path),
-        open_stream(given, folder=tmp_path, block=25),
-    )
+    whole = read_record(given, folder=tmp_path)
     np.testing.assert_array_equal(whole.q, Q)
     np.testing.assert_array_equal(whole.tau, TAU)
-    np.testing.assert_array_equal(np.concatenate([q for _, q, _, _ in stream.blocks()]), Q)
 
 
 NAMES = "t;q1;q2;tau1;tau2\n"
@@ -731,11 +722,10 @@ def test_settings_have_at_most_two_files():
         RecordSettings(files=("a", "b", "c"))
 
 
-@pytest.mark.parametrize("read", [read_record, open_stream])
-def test_a_quotation_mark_that_stays_open_is_told_with_its_line(tmp_path, read) -> None:
-    """It took the next line into its field: blocks ended in a ValueError of zip()."""
+def test_a_quotation_mark_that_stays_open_is_told_with_its_line(tmp_path) -> None:
+    """It took the next line into its field."""
     rows = ["t,q1,tau1", *(f"{k / 100},{k % 3},1" for k in range(20))]
     rows[7] = '0.06,2,"'
     (tmp_path / "run.csv").write_text("\n".join([*rows, ""]))
     with pytest.raises(InputError, match=r"run\.csv, line 8: a quotation mark"):
-        read(RecordSettings(files=["run.csv"]), folder=tmp_path)
+        read_record(RecordSettings(files=["run.csv"]), folder=tmp_path)

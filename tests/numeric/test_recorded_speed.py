@@ -14,7 +14,6 @@ from planar_data import TRUE, motion
 from runtime import identify
 from runtime.plausible.plausibility import plausibility
 from runtime.records.record import Record
-from runtime.records.stream import RecordStream
 from runtime.rows.observe import observe
 from runtime.rows.prepared import resolved
 from runtime.settings.study import Lowpass, Signals, Study
@@ -88,13 +87,6 @@ def test_good_velocities_are_told_so():
     told = plausibility(planar, record(), STUDY)
     (check,) = (c for c in told.checks if "recorded velocities" in c.question)
     assert check.state == "good" and "1.000 of that" in check.finding
-
-
-def test_by_blocks_as_in_memory():
-    given = record()
-    whole = observe(planar, given, STUDY)
-    parts = observe(planar, RecordStream(given, 700), STUDY)
-    np.testing.assert_allclose(parts.W, whole.W, rtol=1e-9, atol=1e-9 * np.abs(whole.W).max())
 
 
 def test_without_recorded_velocities_nothing_changes():

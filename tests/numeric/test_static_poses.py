@@ -10,7 +10,6 @@ import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime.errors import InputError, SettingsError
-from runtime.records.stream import RecordStream
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 from symgen.description import load_robot
@@ -107,7 +106,6 @@ def test_what_poses_cannot_do_is_refused():
         lambda: runtime.plausibility(model, record, study),
         lambda: runtime.identify(model, record, study, friction=True),
         lambda: runtime.identify(model, record, at_rest(model, estimate={"method": "iv"})),
-        lambda: runtime.identify(model, RecordStream(record, 10), study),
     ):
         with pytest.raises(SettingsError, match=r"poses at rest.*needs records of a motion"):
             ask()

@@ -88,7 +88,6 @@ def test_written_settings_read_back(study):
         "validate",
         "cestac",
         "payload",
-        "stream",
         "controller",
         "excitation",
     }
@@ -339,7 +338,6 @@ def test_settings_made_in_python_are_checked():
         (lambda: Lowpass(frequency=50), "unknown key frequency; known: cutoff, order, on, padding"),
         (lambda: Rows((0, 1), 3, 0.0, 5), "Unexpected positional argument"),
         (lambda: Signals(lowpass=3), "lowpass: 3; expected a mapping with some of cutoff"),
-        (lambda: replace(Study(), stream=3), "stream: 3; expected auto or off or at least 10"),
     ):
         with pytest.raises(SettingsError) as e:
             make()
@@ -361,14 +359,3 @@ def test_settings_are_values():
     assert replace(study, rows=replace(study.rows, trim=0)).rows == Rows(window=(0, 7.5), trim=0)
     with pytest.raises(FrozenInstanceError):
         study.rows = Rows()
-
-
-def test_blocks_of_the_records():
-    assert [study_from_mapping({"stream": value}).stream for value in ("auto", "off", 5000)] == [
-        "auto",
-        "off",
-        5000,
-    ]
-    for value in (9, "always", 0.5):
-        with pytest.raises(SettingsError, match=r"stream: .*expected auto"):
-            study_from_mapping({"stream": value})

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from runtime import estimate, observe, read_record, resample
 from runtime.errors import InputError
 from runtime.records.reading import read_records
-from runtime.records.reading_by_blocks import are_large, open_stream, records_or_streams
 from runtime.records.record import Record
 from runtime.records.remedies import remedies
 from runtime.records.resampling import resampled
@@ -307,18 +306,6 @@ def test_tolerable_jitter_is_stated(tmp_path):
         and "jitter up to 4" in record.origin.time
     )
     assert read_record(study(rate=RATE).record[0], folder=tmp_path).origin.time == ""
-
-
-def test_streams_refuse_to_resample(tmp_path, monkeypatch):
-    write(tmp_path, T)
-    asked = study(resample={})
-    with pytest.raises(
-        InputError, match=r"record\.resample needs the whole record; set stream: off"
-    ):
-        open_stream(asked.record[0], folder=tmp_path)
-    monkeypatch.setattr("runtime.records.reading_by_blocks.LARGE", 10)
-    assert not are_large(asked.record, tmp_path) and are_large(study().record, tmp_path)
-    assert isinstance(records_or_streams(asked.record, planar, "auto", folder=tmp_path)[0], Record)
 
 
 def test_resampled_record_identifies_as_the_regular_one(tmp_path):

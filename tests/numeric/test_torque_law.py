@@ -17,8 +17,6 @@ from scipy.integrate import solve_ivp
 from runtime import InputError, identify
 from runtime.errors import SettingsError
 from runtime.records.reading import read_records
-from runtime.records.reading_by_blocks import open_streams
-from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping, to_mapping
 
 RATE, N = 200.0, 3000
@@ -84,13 +82,10 @@ def law_torque(log=None):
 
 
 @campaign
-def test_the_law_is_the_torque_whole_and_by_blocks(tmp_path):
+def test_the_law_is_the_torque(tmp_path):
     study = written(tmp_path)
     (record,) = read_records(study.record)
     np.testing.assert_allclose(record.tau, law_torque(), rtol=1e-12, atol=1e-12)
-    (stream,) = open_streams(study.record, block=170)
-    np.testing.assert_array_equal(np.vstack([x[2] for x in stream.blocks()]), record.tau)
-    np.testing.assert_array_equal(np.vstack([x[2] for x in stream.blocks(801)]), record.tau[801:])
     assert study_from_mapping(to_mapping(study)) == study
 
 
@@ -107,18 +102,14 @@ def test_without_recorded_velocities_differences_stand_for_them(tmp_path):
             },
         }
     )
-    (record,), (stream,) = read_records(study.record), open_streams(study.record, block=100)
+    (record,) = read_records(study.record)
     qd = np.diff(q, axis=0, prepend=q[:1]) * record.rate
     expected = np.clip(600 * (r - q) - 16 * qd, [-50, -9], [50, 9])
     np.testing.assert_allclose(record.tau, expected, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(np.vstack([x[2] for x in stream.blocks()]), record.tau)
-    np.testing.assert_array_equal(np.vstack([x[2] for x in stream.blocks(55)]), record.tau[55:])
 
 
 def test_parameters_of_an_arm_whose_torque_is_its_law(tmp_path):
-    """Its own integration returns the truth; the same by blocks, and predicted by a study's
-    further record.
-    """
+    """Its own integration returns the truth, also predicted by a study's further record."""
     study = written(
         tmp_path,
         signals={"median": 1, "lowpass": {"cutoff": 20}},
@@ -127,8 +118,6 @@ def test_parameters_of_an_arm_whose_torque_is_its_law(tmp_path):
     records = read_records(study.record, planar)
     estimate = identify(planar, records, study, plausible=False).estimate
     np.testing.assert_allclose(estimate.X, FREE, atol=2e-3 * np.abs(TRUE).max())
-    whole, streamed = (observe(planar, x, study) for x in (records, open_streams(study.record)))
-    np.testing.assert_allclose(streamed.Y, whole.Y, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -238,11 +227,6 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
     found = result.estimate.provenance["law"]
     np.testing.assert_allclose(found["kd"], KD, rtol=1e-3)
     assert errors["fit"] == pytest.approx(errors[str(KD.tolist())], rel=0.02)
-
-
-def test_a_law_to_be_found_needs_the_whole_record(tmp_path):
-    with pytest.raises(SettingsError, match="needs the whole record"):
-        open_streams(logged_early(tmp_path, kd="fit").record)
 
 
 def test_what_identify_has_to_find_first_is_not_taken_for_a_torque(tmp_path):

@@ -20,7 +20,6 @@ import truth_simulator as world
 from truth_shared import Unseen, emitted, record_of, study
 
 import runtime
-from runtime.records.stream import RecordStream
 from runtime.signals.counts.reading import read_counts
 
 EVERY = pytest.mark.parametrize("name", list(world.ROBOTS))
@@ -117,7 +116,7 @@ def test_intervals_printed_first_hold_the_truth() -> None:
 
 @pytest.mark.parametrize("cutoff", [10.0, 20.0, 50.0])
 def test_ends_of_a_record_leave_nothing(cutoff: float) -> None:
-    """No noise, a motion that starts and ends at speed: in memory and in pieces."""
+    """No noise, a motion that starts and ends at speed."""
     robot = world.ROBOTS["planar"]
     body, move = world.Truth(robot, 5), world.fourier(robot, 5)
     record, model = record_of(move, body.torque(move)), emitted("planar")[0]
@@ -125,9 +124,6 @@ def test_ends_of_a_record_leave_nothing(cutoff: float) -> None:
     fit = runtime.estimate(model, record, asked)
     assert fit.relative_error < 0.1
     assert Unseen(body, 5).errors(fit.names, fit.X)[0] < 0.05
-    pieces = runtime.estimate(model, RecordStream(record, 2000), asked)
-    assert pieces.rows == fit.rows
-    np.testing.assert_allclose(pieces.X, fit.X, atol=1e-6)
     three = study(robot, "fourier", signals={"lowpass": {"cutoff": cutoff}}, rows={"trim": 3})
     assert runtime.estimate(model, record, three).relative_error > 5 * fit.relative_error
 

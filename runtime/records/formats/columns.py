@@ -138,10 +138,6 @@ class Table(ABC):
                 )
         check_names(names, self.names, self.file)
 
-    def in_any_order(self) -> bool:
-        """Whether samples are read without those before them, once their number is known."""
-        return True
-
     @abstractmethod
     def parts(
         self, names: Sequence[str], size: int, start: int = 0, stop: int | None = None

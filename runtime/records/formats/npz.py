@@ -113,19 +113,6 @@ class Stored:
 
 
 @dataclass(eq=False, kw_only=True)
-class ArchiveTable(ArrayTable):
-    """Arrays of a .npz file.
-
-    compressed : whether one of them has to be unpacked from its start.
-    """
-
-    compressed: bool = False
-
-    def in_any_order(self) -> bool:
-        return not self.compressed
-
-
-@dataclass(eq=False, kw_only=True)
 class MatrixTable(Table):
     """The array of a .npy file, shape (N,), (N, k) or (k, N): columns are called 1, 2 ..."""
 
@@ -141,14 +128,11 @@ class MatrixTable(Table):
 ARCHIVE, SINGLE = "an archive of plain arrays", "a file of one plain array"
 
 
-def open_npz(source: Source) -> ArchiveTable:
+def open_npz(source: Source) -> ArrayTable:
     """Table of a .npz file."""
     with refused(ARCHIVE, source.file):
         with zipfile.ZipFile(source.content()) as archive:
             members = _distinct(archive, source.file)
-            compressed = any(
-                member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()
-            )
         stored = {
             name: _stored(partial(_member, source, member), ARCHIVE, source.file)
             for name, member in members.items()
@@ -156,7 +140,7 @@ def open_npz(source: Source) -> ArchiveTable:
         if objects := [name for name, x in stored.items() if x.dtype.hasobject]:
             raise TypeError(f"{objects[0]} holds pickled objects")
     arrays = {name: x for name, x in stored.items() if is_numeric(x.dtype)}
-    return ArchiveTable(file=source.file, size=source.size, arrays=arrays, compressed=compressed)
+    return ArrayTable(file=source.file, size=source.size, arrays=arrays)
 
 
 def open_npy(source: Source) -> MatrixTable:

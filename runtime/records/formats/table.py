@@ -41,8 +41,6 @@ class Format:
         Modules that read it; none: it is read in this process.
     install : str
         Command that brings the libraries.
-    by_blocks : bool
-        Whether a file larger than memory can be read.
     packed : str
         How a file compressed by gzip is read: by parts, whole, or not at all ("").
     digest : callable
@@ -54,7 +52,6 @@ class Format:
     open: Callable[[Source], Table]
     libraries: tuple[str, ...] = ()
     install: str = ""
-    by_blocks: bool = True
     packed: Literal["parts", "whole", ""] = "whole"
     digest: Callable[[Path], str] = sha256_of
 
@@ -66,21 +63,13 @@ FORMATS = (
     Format(
         "a Parquet file", (".parquet",), open_parquet, ("polars",), "pip install symgen[tables]"
     ),
-    Format(
-        "a MATLAB file",
-        (".mat",),
-        open_mat,
-        ("scipy.io",),
-        "pip install symgen[tables]",
-        by_blocks=False,
-    ),
+    Format("a MATLAB file", (".mat",), open_mat, ("scipy.io",), "pip install symgen[tables]"),
     Format(
         "a whole bag",
         (".bag", ".mcap", ".db3"),
         open_bag,
         ("rosbags",),
         "pip install symgen[bags]",
-        False,
         "",
         digest_of,
     ),
@@ -90,9 +79,7 @@ KINDS = tuple(BY_ENDING)
 BAG = ".db3"  # a folder is read as one
 
 
-def open_table(
-    path: Path, topic: str | None = None, decimal: str = ".", *, by_blocks: bool = False
-) -> Table:
+def open_table(path: Path, topic: str | None = None, decimal: str = ".") -> Table:
     """Table of a measured file; its hash is computed first, so that nothing that unpacks to more
     than a record holds is opened.
 
@@ -105,11 +92,9 @@ def open_table(
         Of a bag; default: the only one that holds sensor_msgs/JointState.
     decimal : str
         "." or ",", of the numbers of a text file.
-    by_blocks : bool
-        Refuse formats that are read whole only.
     """
     format_ = format_of(path)
-    require_readable(path, format_, by_blocks)
+    require_readable(path, format_)
     if missing := [
         library for library in format_.libraries if find_spec(library.partition(".")[0]) is None
     ]:
@@ -132,27 +117,11 @@ def needed(format_: Format) -> str:
     return f"{format_.title} needs an optional library: {format_.install}"
 
 
-def require_readable(path: Path, format_: Format, by_blocks: bool) -> None:
-    """Raise InputError where there is no such file, or it cannot be read as asked."""
+def require_readable(path: Path, format_: Format) -> None:
+    """Raise InputError where there is no such file, or it cannot be read."""
     packed = path.suffix.lower() == ".gz"
-    if by_blocks and not format_.by_blocks:
-        what = "bags" if format_.digest is digest_of else f"{format_.endings[0]} files"
-        choices = ", ".join(ending for ending, other in BY_ENDING.items() if other.by_blocks)
-        raise InputError(
-            f"{what} are read whole; convert to {choices} to read by blocks, or set stream: off",
-            file=str(path),
-        )
     if packed and not format_.packed:
         raise InputError("a bag within .gz; uncompress it", file=str(path))
-    if by_blocks and not is_read_by_blocks(path):
-        raise InputError(
-            (
-                f"a {format_.endings[0]} file within .gz cannot be read by blocks; uncompress it, "
-                "or "
-                "set stream: off"
-            ),
-            file=str(path),
-        )
     if not path.exists():
         raise InputError("cannot be read: no such file", file=str(path))
     if path.is_dir() and not (path / "metadata.yaml").is_file():
@@ -164,12 +133,6 @@ def require_readable(path: Path, format_: Format, by_blocks: bool) -> None:
             ),
             file=str(path),
         )
-
-
-def is_read_by_blocks(path: Path) -> bool:
-    """Whether a file larger than memory can be read, as far as its name tells."""
-    format_, packed = format_of(path), path.suffix.lower() == ".gz"
-    return format_.by_blocks and not (packed and format_.packed != "parts")
 
 
 def is_measured(path: Path) -> bool:

@@ -52,9 +52,6 @@ class TextTable(Table):
             )
         return count
 
-    def in_any_order(self) -> bool:
-        return not self.source.packed
-
     def widths(self, groups: Groups) -> list[int]:
         return [len(group) for group in groups]
 

@@ -181,90 +181,49 @@ def shaken_share(counts: Array) -> float:
     return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
 
 
-class Unwrapping:
-    """Counts of a lattice without wraps of counters of WRAPS bits, by stretches that begin where
-    the one before has known samples.
-
-    Parameters
-    ----------
-    known : Lattice
-    name : str
-        What errors call the record.
-    """
-
-    def __init__(self, known: Lattice, name: str) -> None:
-        self.name, self.begin, self.end = name, 0, 0
-        self.turned = np.zeros(len(known.step))  # counts to be added at sample `begin`
-        self.wraps: dict[int, list[int]] = {}  # bits and number of wraps, by encoder
-        self.periods = [  # bits by period, steps
-            {2**bits / counted: bits for bits in WRAPS for counted in of} for of in known.counted
-        ]
-
-    def __call__(self, counts: Array, next_begin: int = 0) -> Array:
-        """Counts, shape (N, n), from sample `begin` on without wraps; the next stretch begins at
-        `next_begin`. InputError where they jump otherwise.
-        """
-        counts, N = counts + self.turned, len(counts)
-        for j in range(counts.shape[1]):
-            known = np.flatnonzero(np.isfinite(counts[:, j]))
-            k = counts[known, j]
-            change = np.diff(k)
-            near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
-            near = np.maximum(
-                near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2)))
-            )
-            near = (near + 2) * np.diff(known)
-            jumps = np.flatnonzero(np.abs(change) > JUMP * near)
-            if not len(jumps):
-                continue
-            size, moved, at = change[jumps], 2 * near[jumps], known[jumps + 1] + self.begin
-            periods = self.periods[j]
-            wrap = next((w for w in periods if (np.abs(np.abs(size) - w) <= moved).all()), None)
-            if wrap is None:
-                is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
-                first = int(np.argmin(is_wrap))
-                raise InputError(
-                    f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; "
-                    "it was reset or lost there, cut the record at "
-                    "such samples",
-                    file=self.name,
-                )
-            turns = np.zeros(len(k))
-            turns[jumps + 1] = -np.sign(size) * wrap
-            turns = np.cumsum(turns)
-            counts[known, j] = k + turns
-            self.wraps.setdefault(j, [periods[wrap], 0])[1] += int((at >= self.end).sum())
-            self.periods[j] = {wrap: periods[wrap]}
-            self.turned[j] += turns[
-                min(int(np.searchsorted(known, next_begin - self.begin)), len(known) - 1)
-            ]
-        self.begin, self.end = next_begin, self.begin + N
-        return np.asarray(counts)
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """What wrapped, a sentence for each encoder."""
-        return tuple(
-            (
-                f"encoder {j + 1}: the count wraps at 2^{bits} {times} times; it was "
-                "unwrapped from the first sample on, whose turn the zero of the joint must suit"
-            )
-            for j, (bits, times) in sorted(self.wraps.items())
-        )
-
-
 def unwrapped_counts(
     position: Array,
     step: Array | Sequence[float] | float | None = None,
     *,
     name: str = "record",
-) -> tuple[Lattice, Array, Unwrapping]:
-    """The lattice of positions (see `lattice`), their counts without wraps, shape (N, n), and what
-    wrapped.
+) -> tuple[Lattice, Array, tuple[str, ...]]:
+    """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS
+    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError where counts jump
+    otherwise.
     """
-    known = lattice(position, step, name=name)
-    unwrapping = Unwrapping(known, name)
-    return known, unwrapping(known.counts(position)), unwrapping
+    lattice_of_all = lattice(position, step, name=name)
+    counts = lattice_of_all.counts(position)
+    findings = []
+    for j, counted in enumerate(lattice_of_all.counted):
+        known = np.flatnonzero(np.isfinite(counts[:, j]))
+        k = counts[known, j]
+        change = np.diff(k)
+        near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
+        near = np.maximum(near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2))))
+        near = (near + 2) * np.diff(known)
+        jumps = np.flatnonzero(np.abs(change) > JUMP * near)
+        if not len(jumps):
+            continue
+        size, moved, at = change[jumps], 2 * near[jumps], known[jumps + 1]
+        periods = {2**bits / steps: bits for bits in WRAPS for steps in counted}  # bits by steps
+        wrap = next((w for w in periods if (np.abs(np.abs(size) - w) <= moved).all()), None)
+        if wrap is None:
+            is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
+            first = int(np.argmin(is_wrap))
+            raise InputError(
+                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; "
+                "it was reset or lost there, cut the record at "
+                "such samples",
+                file=name,
+            )
+        turns = np.zeros(len(k))
+        turns[jumps + 1] = -np.sign(size) * wrap
+        counts[known, j] = k + np.cumsum(turns)
+        findings.append(
+            f"encoder {j + 1}: the count wraps at 2^{periods[wrap]} {len(jumps)} times; it was "
+            "unwrapped from the first sample on, whose turn the zero of the joint must suit"
+        )
+    return lattice_of_all, counts, tuple(findings)
 
 
 def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, list[str]]:

@@ -179,8 +179,8 @@ def read_counts(
         No count changes; a step that is not positive or larger than the motion; positions off the
         lattice; counts that jump.
     """
-    known, counts, unwrapping = unwrapped_counts(position, step, name=name)
-    return _reading(counts, rate, known, uneven, unwrapping.findings, starts or {})
+    known, counts, wraps = unwrapped_counts(position, step, name=name)
+    return _reading(counts, rate, known, uneven, wraps, starts or {})
 
 
 def _reading(
@@ -289,7 +289,7 @@ def _moved(
 
 
 class Gaps:
-    """Samples without a count of n encoders, as they come by."""
+    """Samples without a count of n encoders, stretch by stretch."""
 
     def __init__(self, n: int) -> None:
         self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
