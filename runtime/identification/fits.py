@@ -148,7 +148,9 @@ def _validation(
         missing.append(f"validation between windows of the record: {e}")
     if unseen:
         validation.append(
-            cross_validation(observation, unseen, choices, name=name, model=model, fitted=known)
+            cross_validation(
+                observation, unseen, choices, name=name, model=model, fitted=known, further=True
+            )
         )
     missing += [text for part in validation for text in part.missing]
     return tuple(validation), tuple(missing)

@@ -5,7 +5,6 @@ them.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -60,10 +59,6 @@ from runtime.table import IN_LINE, Table, in_lines, notebook, with_intervals
 
 if TYPE_CHECKING:
     from runtime.estimators.feasibility import Feasibility
-
-
-PART_NUMBER = re.compile(r" \(\d+ of \d+\)$")
-"""What the name of a record that was split at gaps ends in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,8 +182,12 @@ class Identification:
         parts = dict.fromkeys(
             p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted
         )
-        further = len(self.validation) > 1 or not any(part.startswith("[") for part in parts)
-        return f"{', '.join(parts)}" if further else "a part of the record that it has not seen"
+        return ", ".join(parts) if self.by_records else "a part of the record that it has not seen"
+
+    @property
+    def by_records(self) -> bool:
+        """Whether the sets are judged by records of their own, not by a part of the records."""
+        return bool(self.validation) and self.validation[-1].further
 
     @property
     def model_columns(self) -> SetName:
@@ -249,7 +248,7 @@ class Identification:
         known torques that were subtracted.
         """
         texts = {
-            (PART_NUMBER.sub("", record.name), record.origin.time): None
+            (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
             if record.origin.time
         }
@@ -316,7 +315,7 @@ class Identification:
             if self.model_columns == "essential"
             else {},
             prediction_error=self.prediction_error,
-            halves=self.unseen.startswith("a part"),
+            halves=bool(self.validation) and not self.by_records,
             negative=self.negative if self.determined else (),
             feasibility=self.feasibility,
             homogeneity=self.homogeneity,

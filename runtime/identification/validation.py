@@ -117,11 +117,14 @@ class Prediction:
 
 @dataclass(frozen=True)
 class CrossValidation(Result):
-    """Predictions for every part and set of columns; `missing`: sets that could not be fitted."""
+    """Predictions for every part and set of columns; `missing`: sets that could not be fitted;
+    `further`: the parts that are predicted are records of their own.
+    """
 
     joints: tuple[str, ...]
     predictions: tuple[Prediction, ...]
     missing: tuple[str, ...] = ()
+    further: bool = False
 
     def errors(self) -> dict[str, float]:
         """Largest relative error on unseen data, %, by set of columns."""
@@ -135,7 +138,8 @@ class CrossValidation(Result):
         """The predictions of both, of the same parts of the data."""
         predictions = (*self.predictions, *other.predictions)
         joints = self.joints or other.joints
-        return CrossValidation(joints, predictions, (*self.missing, *other.missing))
+        missing = (*self.missing, *other.missing)
+        return CrossValidation(joints, predictions, missing, self.further)
 
     def table(self, form: str = ".3f") -> Table:
         """One line per part and set of columns, errors in %."""
@@ -216,6 +220,7 @@ def cross_validation(
     name: str = "fit",
     model: GeneratedModel | None = None,
     fitted: Mapping[Any, Estimate] | None = None,
+    further: bool = False,
 ) -> CrossValidation:
     """Fit every set of columns on one observation, predict others; a set whose fit fails is left
     out and told.
@@ -234,6 +239,8 @@ def cross_validation(
         For methods that need it.
     fitted : mapping of str to Estimate
         Estimates of `fit` that exist already, by set.
+    further : bool
+        Whether `predict` are records of their own, not parts of those of `fit`.
     """
     predictions = []
     missing: list[str] = []
@@ -255,7 +262,7 @@ def cross_validation(
             predictions.append(
                 Prediction(part, columns, len(estimate.names), observation is fit, total, errors)
             )
-    return CrossValidation(labels, tuple(predictions), tuple(missing))
+    return CrossValidation(labels, tuple(predictions), tuple(missing), further)
 
 
 def split_validation(

@@ -13,7 +13,7 @@ from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels, joint_units
-from runtime.records.record import Record
+from runtime.records.record import Origin, Record
 from runtime.table import Table
 
 Array = np.ndarray
@@ -80,7 +80,13 @@ class Simulation(Result):
     def record(self) -> Record:
         """What was measured, with its reference."""
         return Record(
-            self.t, self.q_measured, self.tau_measured, rate=self.rate, name=self.name, q_r=self.q_r
+            self.t,
+            self.q_measured,
+            self.tau_measured,
+            rate=self.rate,
+            name=self.name,
+            origin=Origin(simulated=True),
+            q_r=self.q_r,
         )
 
     def to_csv(self) -> str:

@@ -38,7 +38,6 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
 from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
 from runtime.model.generated import GeneratedModel, constants_of, require_no_channels
-from runtime.records.provenance import SIMULATED
 from runtime.records.reading import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study
@@ -345,7 +344,7 @@ def simulate(
     reference = reference_of(controller, model, records=records, folder=folder)
     start = records[index].q[0] if index is not None and controller.start is None else None
     return Simulator(model, controller).run(
-        X, reference, ideal=ideal, start=start, name=name or f"{SIMULATED} {model.NAME}"
+        X, reference, ideal=ideal, start=start, name=name or f"SIMULATED {model.NAME}"
     )
 
 

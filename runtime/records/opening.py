@@ -82,8 +82,15 @@ class RecordFiles:
 
     def origin(self, time: str = "") -> Origin:
         """How the record was read; time : what its stamps were like."""
-        side, jitter = self.side, self.settings.jitter
-        return Origin(self.hashes, time, jitter, side.drives, side.constant, self.joints)
+        return Origin(
+            files=self.hashes,
+            time=time,
+            jitter=self.settings.jitter,
+            drives=self.side.drives,
+            torque_constant=self.side.constant,
+            joints=self.joints,
+            simulated=self.settings.simulated,
+        )
 
     @property
     def first(self) -> Table:

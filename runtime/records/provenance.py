@@ -11,9 +11,6 @@ from typing import Any
 
 from runtime.records.record import Record
 
-SIMULATED = "SIMULATED"
-"""First word of the name of a record that was not measured."""
-
 
 def record_names(records: Sequence[Record]) -> tuple[str, ...]:
     """The name of each record, each name once: of equal ones the second is called "name (2)"."""
@@ -32,7 +29,7 @@ def origin(records: Sequence[Record]) -> dict[str, Any]:
     their time stamps in words.
     """
     names = record_names(records)
-    simulated = any(record.name.startswith(SIMULATED) for record in records)
+    simulated = any(record.origin.simulated for record in records)
     note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
     named = list(zip(names, records, strict=True))
     said = {

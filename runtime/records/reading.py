@@ -11,6 +11,7 @@ Bad input raises InputError, which names file, column and line or sample.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +125,7 @@ def read_pieces(opened: RecordFiles) -> list[Record]:
             rate=rate,
             name=opened.name if K == 1 else f"{opened.name} ({k} of {K})",
             missing=Missing(own["missing"], opened.side.follows) if "missing" in own else None,
-            origin=opened.origin(text),
+            origin=replace(opened.origin(text), whole="" if K == 1 else opened.name),
         )
         for k, (stretch, own) in enumerate(zip(stretches, signals, strict=True), start=1)
     ]

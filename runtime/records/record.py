@@ -51,6 +51,10 @@ class Origin:
         are those of the robot file.
     joints : tuple of str
         What results call the joints; none: by their place, from 1.
+    whole : str
+        Name of the record that was split at gaps and this is a piece of; "": it is whole.
+    simulated : bool
+        Whether nothing was measured.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -59,6 +63,8 @@ class Origin:
     drives: Drives | None = None
     torque_constant: Array | None = None
     joints: tuple[str, ...] = ()
+    whole: str = ""
+    simulated: bool = False
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -153,7 +153,9 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
 def _(result: Simulation, folder: Path, study: Study) -> Files:
     """The record, a study that reads it back, figures of merit, the figure."""
     figure = simulation_figure(joint_labels(result.model), result, result.units)
-    record = RecordSettings(files=(str(folder / RECORD),), rate=result.rate, name=result.name)
+    record = RecordSettings(
+        files=(str(folder / RECORD),), rate=result.rate, name=result.name, simulated=True
+    )
     return {
         RECORD: result.to_csv(),
         "study.yaml": study_text(replace(study, record=(record,)), folder),

@@ -37,7 +37,6 @@ from runtime.loop.methods import CLOSED_LOOP
 from runtime.loop.reference import Reference, reference_of
 from runtime.model.casadi import SymbolicModel
 from runtime.model.generated import GeneratedModel
-from runtime.records.provenance import SIMULATED
 from runtime.records.record import Record
 from runtime.resolution.rounding import stream
 from runtime.resolution.runs import Level
@@ -140,7 +139,7 @@ class Loop:
         told them, and needs some.
         """
         record = simulator.run(
-            self.truth, self.reference, seed=seed, name=f"{SIMULATED} {self.model.NAME}"
+            self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"
         ).record()
         signals, step = self.study.signals, delta or self.simulator.controller.encoder.step
         if signals.reader == "counts" and step:

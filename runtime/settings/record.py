@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from runtime.settings.controller import Controller
 from runtime.settings.schema import (
+    Flag,
     Many,
     NotNegative,
     PerJoint,
@@ -242,6 +243,8 @@ class RecordSettings(Settings):
         Public dataset that holds the files.
     name : str or None
         Name of the record in results; default: that of its first file.
+    simulated : bool
+        Nothing was measured, and results say so.
     topic : str or None
         Topic of a bag that holds several of sensor_msgs/JointState.
     decimal : str
@@ -269,6 +272,7 @@ class RecordSettings(Settings):
     jitter: Annotated[Positive, Field(lt=0.5)] = 0.1
     dataset: Text | None = None
     name: Text | None = None
+    simulated: Flag = False
     topic: Text | None = None
     decimal: Literal[".", ","] = "."
     resample: Resample | None = None

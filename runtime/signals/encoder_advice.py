@@ -71,7 +71,7 @@ def _steps(
             share = _attenuation(record.rate, signals, motion, found, drives)
         except (InputError, SettingsError):
             continue
-        if not any("as if rounded" in text for text in found.findings):
+        if not found.rounded:
             return found.step, share, side
     return None
 

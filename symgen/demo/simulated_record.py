@@ -24,7 +24,6 @@ import runtime
 from runtime import Record, Study
 from runtime.loop.reference import Reference
 from runtime.model.drives import Drives
-from runtime.records.provenance import SIMULATED
 from runtime.settings.study import Columns, RecordSettings
 
 FILE = "simulated_record.csv.gz"
@@ -88,7 +87,8 @@ def simulated_record(
         columns=Columns(None, q, t),
         side="joint" if model.DRIVES is None else "motor",
         rate=path.rate,
-        name=f"{SIMULATED} {model.NAME}",
+        name=f"SIMULATED {model.NAME}",
+        simulated=True,
     )
     with TemporaryDirectory(prefix="symgen-") as folder:
         (Path(folder) / FILE).write_bytes(content)

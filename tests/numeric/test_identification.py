@@ -299,13 +299,31 @@ def test_the_status_of_every_method_decides(model):
 
 
 def test_a_number_in_the_name_of_a_record_is_kept(model):
-    """ "run (2)" was reported as "run"; pieces of one record at gaps share its sentence."""
+    """A record called "run (1 of 2)" is no piece of another; pieces of one record at gaps share its sentence."""
     first = measured(model, 1)
-    names = ("run (2)", "gap (1 of 2)", "gap (2 of 2)")
-    stamps = [replace(first, name=name, origin=Origin(time="regular")) for name in names]
+    stamps = [replace(first, name="run (1 of 2)", origin=Origin(time="regular"))]
+    for piece in ("gap (1 of 2)", "gap (2 of 2)"):
+        stamps.append(replace(first, name=piece, origin=Origin(time="regular", whole="gap")))
     result = runtime.identify(model, stamps)
     assert [text.split(":")[0] for text in result.time_stamps] == [
-        "Time stamps of run (2)",
+        "Time stamps of run (1 of 2)",
         "Time stamps of gap",
         "Low-pass at 11 Hz (cutoff",
     ]
+
+
+@pytest.mark.parametrize("name", ["b", "a part of the day", "[3] run"])
+def test_the_name_of_a_validation_record_decides_nothing(model, name):
+    """A record called "a part of the day" was judged by the limit of half a record."""
+    bad = replace(measured(model, 2), tau=1.6 * measured(model, 2).tau, name=name)
+    result = runtime.identify(model, measured(model, 1), STUDY, further=[bad])
+    check = next(c for c in result.checklist.checks if c.question.startswith("Does it predict"))
+    assert check.state == "no" and check.limit.startswith("2.0 %") and result.unseen == name
+
+
+def test_the_name_of_a_measured_record_makes_it_no_simulated_one(model):
+    named = measured(model, 1, "SIMULATED? no, measured")
+    result = runtime.identify(model, named, STUDY)
+    assert result.source == "measured" and "note" not in result.estimate.provenance
+    made = replace(named, origin=Origin(simulated=True))
+    assert runtime.identify(model, made, STUDY).source == "simulated"

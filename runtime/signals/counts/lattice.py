@@ -62,6 +62,7 @@ class Lattice:
     phase: Array
     findings: tuple[str, ...] = ()
     counted: tuple[tuple[int, ...], ...] = ()
+    rounded: bool = False
 
     def counts(self, position: Array) -> Array:
         """Counts, shape (N, n), as floats; nan where the position is missing."""
@@ -103,6 +104,7 @@ def lattice(
             file=name,
         )
     steps, phases, shares, findings = np.empty(n), np.empty(n), np.zeros(n), []
+    rounded = False
     for j in range(n):
         x, label = position[np.isfinite(position[:, j]), j], f"encoder {j + 1}"
         if not len(x):
@@ -122,6 +124,7 @@ def lattice(
         if off > OFF:
             raise InputError(f"{label}: {_off(x, off, steps[j], step is None)}", file=name)
         if off > OFF / 5:
+            rounded = True
             findings.append(
                 f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step "
                 f"{steps[j]:.6g}, as if rounded to few digits"
@@ -135,16 +138,14 @@ def lattice(
             "{reader: lowpass}: neither is always nearer to the truth there"
         )
     if step is None:
-        unequal = (
-            steps.max() > UNEQUAL * steps.min()
-            and len({text for text in findings if "never changes" in text}) < n - 1
-        )
+        moving = sum(bool(np.nanmax(x) > np.nanmin(x)) for x in position.T)
+        unequal = steps.max() > UNEQUAL * steps.min() and moving > 1
         text = f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}"
         findings.insert(
             0, f"{text}; the encoders differ, compare with their data sheets" if unequal else text
         )
     counted = [INTERPOLATED] * n if step is None else [(round(x),) for x in steps / step]
-    return Lattice(steps, phases, tuple(findings), tuple(counted))
+    return Lattice(steps, phases, tuple(findings), tuple(counted), rounded)
 
 
 def smallest_step(x: Array) -> float:
