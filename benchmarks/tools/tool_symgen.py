@@ -31,7 +31,7 @@ def fit(job):
     result = runtime.identify(model, records, study, variants=variants)
     if result.plausibility:
         for trial in result.plausibility.named:
-            print(trial.alternative.cause)
+            print(trial.cause.says)
         for check in result.plausibility.checks:
             if check.state in ("no", "doubtful"):
                 print(check.finding)

@@ -4,6 +4,10 @@
             P >= least S of every condition, rows, chi in a Space
     margin      max t                                  subject to
             P >= t S of every condition, rows, chi in a Space
+    Quadratic   min 1/2 chi'A chi - g'chi              subject to
+            P >= 0 of every condition, rows chi >= 0, for many A and g
+    Quadratic   min 1/2 chi'A chi - g'chi              subject to
+            P >= 0 of every condition, rows chi >= 0, for many A and g
 
 S = diag(size) of the condition: the cones hold S^-1/2 P S^-1/2, whose entries are near one.
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of
@@ -196,8 +200,7 @@ class Program:
         sizes = [c.B.shape[1] for c in conditions]
         ends = np.cumsum([n * (n + 1) // 2 for n in sizes])[:-1]
         for n, of_A, of_b in zip(sizes, np.split(A, ends), np.split(b, ends), strict=False):
-            cone = clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1)
-            self.constraints.append((cone, of_A, of_b))
+            self.constraints.append((_cone(n), of_A, of_b))
         A, b = self.of_chi(rows.A)
         for sign, bound in ((1.0, rows.lower), (-1.0, rows.upper)):
             given = np.isfinite(bound)
@@ -306,6 +309,69 @@ def margin(conditions: Sequence[Condition], rows: LinearBounds, space: Space) ->
     program.at_least_zero(-np.eye(program.m + 1), bounds)
     program.at_least_zero(np.eye(program.m + 1)[:-1], bounds[:-1])
     return program.solve()
+
+
+class Quadratic:
+    """The minimum of 1/2 chi'A chi - g'chi with P >= 0 of every condition and rows chi >= 0.
+
+    The cones are set up once, for many A and g.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    rows : ndarray, shape (k, p)
+        Of sizes near one where chi has its size.
+    scale : ndarray, shape (p,), SI
+        Sizes of the parameters.
+    """
+
+    def __init__(self, conditions: Sequence[Condition], rows: Array, scale: Array) -> None:
+        p = len(scale)
+        self.scale = scale
+        column, row = np.tril_indices(p)
+        self.upper = (row, column)  # of the upper triangle, column by column
+        self.starts = np.concatenate([[0], np.cumsum(np.arange(1, p + 1))])
+        triangles, _ = _triangles(tuple(conditions), p)
+        self.A = sparse.csc_matrix(-scale * np.vstack([triangles, rows]))
+        self.cones = [_cone(c.B.shape[1]) for c in conditions]
+        if len(rows):
+            self.cones.append(clarabel.NonnegativeConeT(len(rows)))
+        self.solver: Any = None
+
+    def minimum(self, A: Array, g: Array) -> Array:
+        """chi, shape (p,); zeros where Clarabel finds none."""
+        squares = (A * self.scale * self.scale[:, None])[self.upper]
+        linear = -g * self.scale
+        if self.solver is None:
+            self.solver = self._solver(squares, linear, scaled=True)
+        else:
+            self.solver.update(P=squares, q=linear)
+        solution = self.solver.solve()
+        if STATUS.get(str(solution.status)) not in SOLVED:
+            solution = self._solver(squares, linear, scaled=False).solve()
+        x = np.array(solution.x)
+        return self.scale * np.where(np.isfinite(x), x, 0.0)
+
+    def _solver(self, squares: Array, linear: Array, *, scaled: bool) -> Any:
+        """Clarabel, which may take nothing out of a program whose criterion changes. Unknowns that
+        are near one need no scaling of its own: half of the time.
+        """
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.presolve_enable = False
+        settings.chordal_decomposition_enable = False
+        settings.input_sparse_dropzeros = False
+        settings.equilibrate_enable = not scaled
+        settings.iterative_refinement_enable = not scaled
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-7
+        p, b = len(linear), np.zeros(self.A.shape[0])
+        Q = sparse.csc_matrix((squares, self.upper[0], self.starts), shape=(p, p))
+        return clarabel.DefaultSolver(Q, linear, self.A, b, self.cones, settings)
+
+
+def _cone(n: int) -> Any:
+    """The cone of a condition of n rows."""
+    return clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1)
 
 
 def triangle(B: Array) -> Array:

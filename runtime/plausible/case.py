@@ -12,12 +12,11 @@ from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.model.inertia import PhysicalModel, physical_model
-from runtime.plausible.delay import Delay, LatePositions, delays
-from runtime.plausible.fits import Grams
-from runtime.plausible.gravity import Gravity, gravity_direction
+from runtime.plausible.bodies import Grams
+from runtime.plausible.delay import Delay, delay
 from runtime.plausible.known import KnownValues, known_values
 from runtime.plausible.samples import Samples
-from runtime.plausible.trials import Problem, problem_of
+from runtime.plausible.trials import Baseline, baseline_of
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
@@ -129,44 +128,38 @@ class Case:
         return self.study.record[0].sides if self.study.record else ("joint", "joint")
 
     @cached_property
-    def problem(self) -> Problem | None:
+    def baseline(self) -> Baseline | None:
         """The study as it is, fitted; None where nothing is fitted."""
-        return None if self.silent else self._problem(values=True)
+        return None if self.silent else self._baseline(values=True)
 
     @cached_property
-    def alone(self) -> Problem | None:
+    def alone(self) -> Baseline | None:
         """The same without the values of the robot file."""
-        return self.problem if self.robot_values is None else self._problem(values=False)
+        return self.baseline if self.robot_values is None else self._baseline(values=False)
 
-    def _problem(self, *, values: bool) -> Problem:
-        return problem_of(
-            self.model, self.samples, self.variants, torque_side=self.sides[1], values=values
+    def _baseline(self, *, values: bool) -> Baseline:
+        return baseline_of(
+            self.model,
+            self.samples,
+            self.D,
+            self.variants,
+            torque_side=self.sides[1],
+            values=values,
         )
 
     @cached_property
     def robot_values(self) -> KnownValues | None:
         """Torque of the values of the robot file, where it has them."""
-        problem = self.problem
-        return known_values(problem) if problem and problem.barrier.near_values else None
+        baseline = self.baseline
+        return known_values(baseline) if baseline and baseline.bodies.near_values else None
 
     @cached_property
-    def gravity(self) -> Gravity | None:
-        """Direction of gravity fitted freely."""
-        return None if self.problem is None else gravity_direction(self.problem)
-
-    @property
     def late(self) -> Delay | None:
         """Delay of the torques of the longest record; None where it is too short."""
-        return self.delays[0]
-
-    @cached_property
-    def delays(self) -> tuple[Delay | None, LatePositions | None]:
-        """Delay of the torques of the longest record, and the positions that are late instead; None
-        where it is too short.
-        """
-        own = max(self.straight, key=lambda one: len(one.record))
-        longest = min(LIMIT.LONGEST_DELAY, float(own.record.t[-1] - own.record.t[0]) / 20)
+        record = max(self.straight, key=lambda one: len(one.record))
+        duration = float(record.record.t[-1] - record.record.t[0])
+        longest = min(LIMIT.LONGEST_DELAY, duration / 20)
         try:
-            return delays(self.model, own, self.study, longest)
+            return delay(self.model, record, self.study, longest=longest)
         except (InputError, ValueError):
-            return None, None
+            return None

@@ -1,41 +1,31 @@
-"""The time by which the torque of each joint is late against its position, estimated with its
-deviation.
+"""The time by which the torque of each joint is late against its position, estimated with its deviation.
 
-    Y_j(t) = [W_j X](t - delta_j) + rho:      Y_j(t + delta) = W_j X - (delta_j - delta) d/dt(W_j X)
-                                              + ...
+    Y_j(t) = [W_j X](t - delta_j) + rho
+    Y_j(t + delta) = W_j X - (delta_j - delta) d/dt(W_j X) + ...
 
 Gauss-Newton over X and every delta_j together: torques are shifted by the last delta (cubic
-interpolation of the filtered signal), W stays. The start is
-the best common shift of a grid. Rows near a reversal are left out, where sign(qd) has no derivative
-and the filter smears its step. Deviations are the larger of two, that of
-least squares and that of blocks of time taken as independent.
+interpolation of the filtered signal), W stays. The start is the best common shift of a grid. Rows
+near a reversal are left out, where sign(qd) has no derivative and the filter smears its step.
+Deviations are the larger of two, that of least squares and that of blocks of time taken as
+independent.
 
 A delay of a few ms is what controllers and field buses make of a record; at 1 Hz and 10 rad/s^2 it
 costs some per cent of the torque.
-
-Positions of some joints J that are late, alone or with their torques, are another delay, of one
-number:
-
-    Y_j(t + [j in J] delta) = W_j(q_J(t + delta), q(t)) X + rho
-
-Its first step tells which joints, one or all from some joint on, are searched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
-from scipy.optimize import minimize_scalar
 
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.plausible.fits import Grams, solved
+from runtime.plausible.bodies import Grams, solved
 from runtime.plausible.samples import lowpassed, usable
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared, prepared
@@ -90,27 +80,6 @@ class Delay(Result):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class LatePositions:
-    """Positions of some joints, recorded later than the others.
-
-    Attributes
-    ----------
-    joints : ndarray of bool, shape (n,)
-    torques : bool
-        Whether the torques of these joints are late by as much.
-    shift : float, s
-    before, after : ndarray, shape (n,), %
-        As those of `Delay`.
-    """
-
-    joints: Array
-    torques: bool
-    shift: float
-    before: Array
-    after: Array
-
-
 def delay(
     model: GeneratedModel,
     record: Record | Prepared,
@@ -139,20 +108,6 @@ def delay(
     InputError
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
     """
-    return delays(model, record, study, longest, positions=False)[0]
-
-
-def delays(
-    model: GeneratedModel,
-    record: Record | Prepared,
-    study: Study | None,
-    longest: float,
-    *,
-    positions: bool = True,
-) -> tuple[Delay, LatePositions | None]:
-    """As `delay`; also the positions that are late instead, those that leave least, None where none
-    leave less than the record as it is, or where they are not asked for.
-    """
     study = study or Study()
     require_motion(study.signals, "a delay")
     own = prepared(model, record, study)
@@ -160,33 +115,25 @@ def delays(
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
         raise InputError(
-            (
-                f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a "
-                "tenth "
-                "of it"
-            ),
+            f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a tenth of it",
             file=record.name,
         )
-    problem = _Problem(model, own, study, longest)
-    sigmas = [problem.fit(np.full(record.n, d))[1] for d in problem.grid]
-    start = problem.grid[int(np.argmin(np.log(sigmas).sum(axis=1)))]
+    shifts = Shifts(model, own, study, longest)
+    sigmas = [shifts.fit(np.full(record.n, d))[1] for d in shifts.grid]
+    start = shifts.grid[int(np.argmin(np.log(sigmas).sum(axis=1)))]
     shift = np.full(record.n, start)
     for _ in range(LIMIT.DELAY_PASSES):
-        step = np.clip(problem.step(shift)[0], -longest / 2, longest / 2)
+        step = np.clip(shifts.step(shift)[0], -longest / 2, longest / 2)
         shift = np.clip(shift + step, -longest, longest)
         if np.abs(step).max() < 1e-7:
             break
-    _, sigma, share = problem.step(shift)
+    _, sigma, share = shifts.step(shift)
     known = share & (np.abs(shift) < longest)
     shift, sigma = np.where(known, shift, np.nan), np.where(known, sigma, np.nan)
     common, sigma_common = _mean(shift[known], sigma[known])
     labels = joint_labels(model)
-    before, after = problem.errors(np.zeros(record.n)), problem.errors(np.where(known, shift, 0.0))
-    late = Delay(labels, shift, sigma, common, sigma_common, before, after)
-    try:
-        return late, problem.late_positions(before) if positions else None
-    except ValueError:  # a loop that does not close in other positions
-        return late, None
+    before, after = shifts.errors(np.zeros(record.n)), shifts.errors(np.where(known, shift, 0.0))
+    return Delay(labels, shift, sigma, common, sigma_common, before, after)
 
 
 def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
@@ -204,7 +151,7 @@ def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
     return mean, max(stated, scatter)
 
 
-class _Problem:
+class Shifts:
     """W and its rate at some instants, and torques that can be shifted."""
 
     def __init__(self, model: GeneratedModel, own: Prepared, study: Study, longest: float) -> None:
@@ -221,11 +168,7 @@ class _Problem:
         self.alike = max(1.0, record.rate / (LIMIT.NOISE_BAND * cutoff) / step)
         if len(kept) * self.n <= 2 * self.b:
             raise InputError(
-                (
-                    f"{len(kept)} instants for {self.b} parameters and {self.n} delays; use a "
-                    "longer "
-                    "record"
-                ),
+                f"{len(kept)} instants for {self.b} parameters and {self.n} delays; use a longer record",
                 file=record.name,
             )
         self.t, self.longest = record.t[kept], longest
@@ -244,14 +187,12 @@ class _Problem:
         def W(k: Array) -> Array:
             return np.asarray(model.regressor(states.q[k], states.qd[k], states.qdd[k]))
 
-        self.model = model
-        self.states = CubicSpline(record.t, np.stack([states.q, states.qd, states.qdd], axis=1))
         self.D = W(kept)
         self.rate = (W(kept + 1) - W(kept - 1)) * (record.rate / 2)
         # a step of dry friction is smeared by the filter of the torques: rows near a jump of a
         # column of signs are left out
         flat = np.isin(np.abs(self.D), (0.0, 1.0)).all(axis=0)
-        self.rate[:, flat], self.flat = 0.0, flat
+        self.rate[:, flat] = 0.0
         smeared = int(LIMIT.SMEARED * record.rate / cutoff)
         steps = [
             np.sign(W(kept + k)) != np.sign(self.D)
@@ -266,79 +207,22 @@ class _Problem:
             [torque(self.t + d) for torque, d in zip(self.torques, shift, strict=True)]
         )
 
-    def rows(self, shift: Array) -> tuple[Array, Array]:
-        """W with the positions of each joint taken a time later, shape (K, n, b), and its rows away
-        from jumps.
-        """
-        states, mask = self.states(self.t), self.mask.copy()
-        for j in np.flatnonzero(shift):
-            later = self.t + shift[j]
-            states[:, :, j] = self.states(later)[:, :, j]
-            mask[:, j] = self.mask[np.searchsorted(self.t, later).clip(max=len(self.t) - 1), j]
-        return np.asarray(self.model.regressor(*states.transpose(1, 0, 2))), mask
-
-    def late_positions(self, before: Array) -> LatePositions | None:
-        """The set of joints, one or all from some joint on, and the time by which their positions,
-        or positions and torques, are late, that leave least.
-        """
-        zero, number = np.zeros(self.n), np.arange(self.n)
-        X, sigma, e = self.fit(zero)
-        w = self.mask / sigma
-        slope = np.zeros((self.n, len(self.t), self.n))  # of the torques by the time of each joint
-        for j in number:
-            change = self.rows(LIMIT.DELAY_STEP * (number == j))[0] - self.D
-            change[:, self.flat] = 0.0
-            slope[j] = w * (change @ X) / LIMIT.DELAY_STEP
-        own = np.einsum("kj,kj,ji->jki", w, self.rate @ X, np.eye(self.n))
-        sets = [number == j for j in number]
-        sets += [number >= j for j in range(1, self.n - 1)]
-        which = [(joints, both) for joints in sets for both in (False, True)]
-        Z = np.stack([(slope - both * own)[joints].sum(axis=0).ravel() for joints, both in which])
-        D = (self.D * w[:, :, None]).reshape(-1, self.b)
-        Z = Z - Z @ D @ np.linalg.pinv(D.T @ D, rcond=1e-10, hermitian=True) @ D.T
-        size = np.maximum((Z * Z).sum(axis=1), 1e-12)
-        along = Z @ (e / sigma).ravel()
-        best = None
-        for k in np.argsort(-(along**2) / size)[: LIMIT.LATE_SETS]:
-            joints, both = which[k]
-
-            def left(d: float, joints: Array = joints, both: bool = both) -> Array:
-                return self.errors(d * joints if both else zero, d * joints)
-
-            def total(d: float, left: Callable[[float], Array] = left) -> float:
-                return float(np.log(np.maximum(left(d), 0.1)).sum())
-
-            first = float(np.clip(along[k] / size[k], -self.longest, self.longest))
-            near = min((0.5 * first, first, 1.5 * first), key=total)
-            bounds = sorted(np.clip((0.6 * near, 1.5 * near), -self.longest, self.longest))
-            d = float(
-                minimize_scalar(total, bounds=bounds, method="bounded", options={"maxiter": 10}).x
-            )
-            of = joints if d > 0 or not both else ~joints  # early ones are others that are late
-            found = LatePositions(of, both, abs(d) if both else d, before, left(d))
-            if best is None or total(d) < np.log(np.maximum(best.after, 0.1)).sum():
-                best = found
-        return best
-
-    def fit(self, shift: Array, late: Array | None = None) -> tuple[Array, Array, Array]:
-        """X, sigma by joint, and the residuals, shape (K, n). late : time of the positions."""
-        D, mask = (self.D, self.mask) if late is None else self.rows(late)
+    def fit(self, shift: Array) -> tuple[Array, Array, Array]:
+        """X, sigma by joint, and the residuals, shape (K, n)."""
         Y = self.shifted(shift)
-        grams, rows = Grams.of(D, Y, mask), np.maximum(mask.sum(axis=0), 1)
+        grams = Grams.of(self.D, Y, self.mask)
+        rows = np.maximum(self.mask.sum(axis=0), 1)
         sigma = np.sqrt(np.maximum(grams.measured, 1e-300) / rows)
         for _ in range(4):
             X = solved(*grams.weighted(sigma))
             sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)
-        return X, sigma, (Y - D @ X) * mask
+        return X, sigma, (Y - self.D @ X) * self.mask
 
-    def errors(self, shift: Array, late: Array | None = None) -> Array:
-        """Relative error by joint, %. late : time of the positions."""
-        Y = self.shifted(shift) * (self.mask if late is None else self.rows(late)[1])
-        return np.asarray(
-            100
-            * np.linalg.norm(self.fit(shift, late)[2], axis=0)
-            / np.maximum(np.linalg.norm(Y, axis=0), 1e-300)
-        )
+    def errors(self, shift: Array) -> Array:
+        """Relative error by joint, %."""
+        size = np.linalg.norm(self.shifted(shift) * self.mask, axis=0)
+        left = np.linalg.norm(self.fit(shift)[2], axis=0)
+        return np.asarray(100 * left / np.maximum(size, 1e-300))
 
     def step(self, shift: Array) -> tuple[Array, Array, Array]:
         """Gauss-Newton step of the delays, their deviations, and which of them the record

@@ -31,7 +31,7 @@ from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels
 from runtime.model.inertia import INERTIAL
-from runtime.plausible.trials import Problem
+from runtime.plausible.trials import Baseline
 from runtime.rows.observation import Observation
 from runtime.table import Table
 
@@ -104,9 +104,9 @@ class KnownValues(Result):
         return tuple(texts)
 
 
-def known_values(problem: Problem) -> KnownValues | None:
+def known_values(baseline: Baseline) -> KnownValues | None:
     """The comparison; None where no link has all its values."""
-    physical, s = problem.physical, problem.samples
+    physical, s = baseline.physical, baseline.samples
     given = [all(f"{family}{j}" in physical.values for family in INERTIAL) for j in physical.links]
     if not any(given):
         return None
@@ -117,17 +117,17 @@ def known_values(problem: Problem) -> KnownValues | None:
     chi[inertial] = [physical.values[physical.standard[k]] for k in inertial]
     for k, name in enumerate(physical.standard):
         if name.startswith("Ia"):
-            chi[k] = physical.values.get(name) or problem.given.X[k]  # a URDF has no place for it
+            chi[k] = physical.values.get(name) or baseline.given.X[k]  # a URDF has no place for it
     X = physical.K @ chi
     at_rest = np.zeros_like(s.q)
-    gravity = problem.model.regressor(s.q, at_rest, at_rest) @ X
-    whole = problem.model.regressor(s.q, s.qd, s.qdd) @ X
+    gravity = baseline.model.regressor(s.q, at_rest, at_rest) @ X
+    whole = baseline.model.regressor(s.q, s.qd, s.qdd) @ X
     Y, mask = s.tau - s.tau_known, s.moving()
-    columns = problem.model.regressor(s.q, s.qd, s.qdd) @ physical.K
+    columns = baseline.model.regressor(s.q, s.qd, s.qdd) @ physical.K
     beside = [
         k
         for k, name in enumerate(physical.standard)
-        if elements_of(problem.model).get(name, ("inertia",))[0] != "inertia"
+        if elements_of(baseline.model).get(name, ("inertia",))[0] != "inertia"
     ]
     ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
     for j in range(s.n):
@@ -146,7 +146,7 @@ def known_values(problem: Problem) -> KnownValues | None:
         shown = size > LIMIT.SMALL_PART * np.linalg.norm(y)
         if shown.any() and (shown.sum() == 1 or abs(left[:, 0] @ left[:, 1]) < 0.9 * size.prod()):
             ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
-    joints = joint_labels(problem.model)
+    joints = joint_labels(baseline.model)
     return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))
 
 

@@ -12,7 +12,7 @@ from runtime.checks.check import Answer, Question, State
 from runtime.limits import LIMIT
 from runtime.model.generated import elements_of
 from runtime.plausible.case import Case
-from runtime.plausible.delay import Delay, LatePositions
+from runtime.plausible.delay import Delay
 from runtime.plausible.trials import Trial, reach
 
 Array = np.ndarray
@@ -137,22 +137,9 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
     """Time shift between positions and torques; None where the record does not tell. What an
     alternative explains better is no delay.
     """
-    late = None if case.problem is None else case.late
+    late = None if case.baseline is None else case.late
     if late is None or not np.isfinite(late.sigma).any():
         return None
-    if (logged := late_positions(case)) is not None:
-        first = not named or gained(case, logged) >= explained(case, named[0])
-        columns = "Positions and torques" if logged.torques else "Positions"
-        sense, ms = "late" if logged.shift > 0 else "early", abs(1e3 * logged.shift)
-        j = int(np.argmax(logged.before - logged.after))
-        return Answer(
-            "doubtful" if first else "open",
-            f"{columns} of joint {case.joints(logged.joints)} are recorded {sense} by {ms:.1f} ms; "
-            f"correcting it changes the error of joint {case.labels[j]} from "
-            f"{logged.before[j]:.1f} to {logged.after[j]:.1f} %",
-            f"shift these columns by {-1e3 * logged.shift:+.1f} ms against the others before "
-            "reading the record, or mend the logger",
-        )
     own, gain = certain_joints(case), late.before - late.after
     which, shift, sigma = "Torques are", np.array([late.common]), late.sigma_common
     if own.any() and not own.all():
@@ -205,36 +192,22 @@ def late_joints(late: Delay) -> Array:
     return np.asarray(own & (late.shift * strongest > 0))
 
 
-def late_positions(case: Case) -> LatePositions | None:
-    """Positions that are certainly late: by more than LIMIT.LATE_JOINT, gaining LIMIT.RATE_GAIN
-    beyond LIMIT.DECISIVE, and more by LIMIT.DECISIVE than delays of the torques.
-    """
-    late, logged = case.delays
-    if logged is None or late is None or abs(logged.shift) < LIMIT.LATE_JOINT:
-        return None
-    visible = (logged.before > LIMIT.DELAY_VISIBLE * logged.after).any()
-    torques = gained(case, late) if certain_joints(case).any() else LIMIT.RATE_GAIN
-    return logged if visible and gained(case, logged) > torques + LIMIT.DECISIVE else None
-
-
-def gained(case: Case, late: Delay | LatePositions) -> float:
+def gained(case: Case, late: Delay) -> float:
     """What delays gain, nats."""
-    N = 0.0 if case.problem is None else case.problem.N
+    N = 0.0 if case.baseline is None else case.baseline.N
     return N * float(np.log(late.before / np.maximum(late.after, 0.1)).sum())
 
 
 def explained(case: Case, trial: Trial) -> float:
     """What an alternative gains, nats, rows counted as for a delay."""
-    assert case.problem is not None and trial.fit is not None
-    return case.problem.given.score - trial.fit.score
+    assert case.baseline is not None and trial.fit is not None
+    return case.baseline.given.score - trial.fit.score
 
 
 def late_gain(case: Case) -> float:
     """What certain delays gain, nats; 0 where there are none."""
-    if case.problem is None or case.late is None:
+    if case.baseline is None or case.late is None:
         return 0.0
-    if (logged := late_positions(case)) is not None:
-        return gained(case, logged)
     return gained(case, case.late) if certain_joints(case).any() else 0.0
 
 
@@ -244,28 +217,6 @@ def certain_joints(case: Case) -> Array:
     """
     assert case.late is not None
     return np.asarray(late_joints(case.late) & (gained(case, case.late) >= LIMIT.LATE_GAIN))
-
-
-@Question(
-    "Does gravity point where the robot file says?",
-    f"within {LIMIT.TILT:g} degrees",
-    "look at gravity in the robot file, at alpha and theta of the first frames, and at "
-    "how the robot is mounted",
-)
-def direction(case: Case, named: Sequence[Trial]) -> Answer | None:
-    """Direction of gravity fitted freely; what another alternative explains better is not told
-    twice.
-    """
-    gravity = case.gravity
-    if gravity is None:
-        return None
-    off = (
-        gravity.angle > max(LIMIT.TILT, LIMIT.CERTAIN_DELAY * gravity.sigma)
-        and gravity.gain > LIMIT.DECISIVE
-    )
-    first = not named or gravity.gain >= 0.9 * named[0].gain
-    state: State = "good" if not off else "doubtful" if first else "open"
-    return Answer(state, f"Fitted freely it is {gravity.text}")
 
 
 @Question(
@@ -281,15 +232,15 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
             "good",
             "No single change of signs, columns, units, angles or lengths explains it better",
         )
-    assert case.problem is not None and named[0].fit is not None
-    before, after = case.problem.given.errors, named[0].fit.errors
+    assert case.baseline is not None and named[0].fit is not None
+    before, after = case.baseline.given.errors, named[0].fit.errors
     j = int(np.argmax(before / np.maximum(after, 0.3)))
-    cause, *others = (t.alternative.cause for t in named)
-    friction = named[0].alternative.kind == "friction"
+    cause, *others = (t.cause.says for t in named)
+    friction = named[0].cause.kind == "friction"
     text = f"{'Friction alone' if friction else 'No'}: {cause}" + (
         f" (or: {'; '.join(others)})" if others else ""
     )
     text += _from_to(f"the error of joint {case.labels[j]} goes", before[j], after[j]) or (
         "; the errors stay, the parameters come nearer to the values of the robot file"
     )
-    return Answer("good" if friction else "no", text, named[0].alternative.remedy)
+    return Answer("good" if friction else "no", text, named[0].cause.remedy)

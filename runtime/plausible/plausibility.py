@@ -2,7 +2,7 @@
 for each question.
 
     CHECKS       of the record and the robot file, then of the fit: a family of slips a file
-    EXPLAINED    of the alternatives (`runtime.plausible.alternatives`), which are tried where
+    EXPLAINED    of the causes (`runtime.plausible.causes`), which are tried where
                  `variants`
                  is given, or where something else is doubtful
 
@@ -15,23 +15,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from runtime.checks.check import WORST, Check, worst_of
 from runtime.errors import InputError
 from runtime.json_documents import Result
-from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.plausible.case import Case
-from runtime.plausible.continuous import searched
 from runtime.plausible.delay import Delay
-from runtime.plausible.gravity import Gravity
+from runtime.plausible.jumps import cut_torques, jumps
 from runtime.plausible.known import KnownValues
 from runtime.plausible.motion import motion_excites, recorded_speeds, rest
 from runtime.plausible.physics import (
     better,
     delayed,
-    direction,
     explained,
     late_gain,
     measured,
@@ -50,8 +45,7 @@ from runtime.plausible.sizes import (
     times,
     torques,
 )
-from runtime.plausible.through_time import change, cut_torques, jumps
-from runtime.plausible.trials import Problem, Trial, decisive, tried
+from runtime.plausible.trials import Trial, decisive, regressor, tried
 from runtime.progress import at
 from runtime.rows.prepared import Source, prepared, record_of
 from runtime.settings.study import Study
@@ -71,7 +65,6 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     motion_excites,
     not_asked,
     cut_torques,
-    change,
     physics,
     measured,
     size,
@@ -79,14 +72,13 @@ CHECKS: tuple[Callable[[Case], Check | None], ...] = (
 )
 EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (
     delayed,
-    direction,
     better,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Plausibility(
-    Result, keys="checks named:named_causes equivalent delay gravity known_values:robot_values"
+    Result, keys="checks named:named_causes equivalent delay known_values:robot_values"
 ):
     """Checks of a record, a study and a robot file.
 
@@ -100,7 +92,6 @@ class Plausibility(
     equivalent : tuple of str
         Changes that no fit of this record can tell from the study as given.
     delay : Delay or None
-    gravity : Gravity or None
     robot_values : KnownValues or None
     """
 
@@ -109,7 +100,6 @@ class Plausibility(
     named: tuple[Trial, ...] = ()
     equivalent: tuple[str, ...] = ()
     delay: Delay | None = None
-    gravity: Gravity | None = None
     robot_values: KnownValues | None = None
 
     @property
@@ -121,8 +111,7 @@ class Plausibility(
     def named_causes(self) -> list[dict[str, Any]]:
         """Cause, remedy and gain of the changes that are named."""
         return [
-            {"cause": t.alternative.cause, "remedy": t.alternative.remedy, "gain": t.gain}
-            for t in self.named
+            {"cause": t.cause.says, "remedy": t.cause.remedy, "gain": t.gain} for t in self.named
         ]
 
     @property
@@ -147,7 +136,7 @@ class Plausibility(
     def table(self) -> Table:
         """The alternatives that come nearest, errors by joint in %."""
         rows = [
-            (t.alternative.cause, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors))
+            (t.cause.says, f"{t.gain:+.0f}", *(f"{e:.1f}" for e in t.fit.errors))
             for t in self.trials
             if t.fit is not None
         ]
@@ -192,7 +181,7 @@ def plausibility(
         return Plausibility((first, case))
     answers = {check: check(case) for check in CHECKS}
     checks = [first, *(found for found in answers.values() if found is not None)]
-    if case.problem is None:
+    if case.baseline is None:
         return Plausibility(tuple(checks))
     question = "Is the study the best explanation of the record?"
     for check, text in ((jumps, "the positions jump"), (cut_torques, "torques are cut off")):
@@ -203,28 +192,24 @@ def plausibility(
     trials: list[Trial] = []
     if variants is not None or worst_of(checks) is not None:
         at("what would explain the record better")
-        every = [*tried(case.problem, case.sides), *searched(case.problem, case.sides)]
-        trials = _ranked(every, case.problem)
+        trials = tried(case.baseline, case.sides)
         if case.robot_values is not None and case.robot_values.heavy:
-            trials = [t for t in trials if t.alternative.kind != "rate"]
+            trials = [t for t in trials if t.cause.kind != "rate"]
         if variants is not None and "free_alpha" not in " ".join(variants.CONSTANTS):
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = [t for t in decisive(trials, case.problem) if explained(case, t) > late_gain(case)]
-    wrong = [t for t in named if named[0].alternative.kind != "friction"]
-    if wrong and (moved := answers[change]) is not None:  # what a wrong study does to both parts
-        checks[checks.index(moved)] = replace(moved, state="open")
+    named = [t for t in decisive(trials, case.baseline) if explained(case, t) > late_gain(case)]
+    wrong = [t for t in named if named[0].cause.kind != "friction"]
     asked = EXPLAINED if trials else EXPLAINED[:-1]
     checks += [found for check in asked if (found := check(case, named)) is not None]
-    hidden = dict.fromkeys(trial.alternative.subject for trial in trials if trial.equivalent)
+    hidden = dict.fromkeys(trial.cause.subject for trial in trials if trial.equivalent)
     return Plausibility(
         tuple(checks),
         tuple(t for t in trials if t.fit is not None)[:10],
         tuple(wrong),
         tuple(hidden),
         case.late,
-        case.gravity,
         case.robot_values,
     )
 
@@ -249,7 +234,7 @@ def _case(
         question = "Do record and robot file suit each other?"
         return Check(question, "open", f"Not asked: {e.message}")
     try:
-        D = np.asarray(model.regressor(samples.q, samples.qd, samples.qdd))
+        D = regressor(model, (samples.q, samples.qd, samples.qdd))
     except ValueError as e:
         return Check(
             "Do the loops close in the positions of the record?",
@@ -260,31 +245,6 @@ def _case(
             "the start of the loop",
         )
     return Case(model, own, straight, study, samples, D, variants)
-
-
-def _ranked(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
-    """The best first; another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion
-    gives the parameters more room, and so has a coupling, the scale of a position, a constant
-    torque, and a spring unless it brings them nearer to the values of the robot file: that does not
-    count beside the known torque of its joint. What changes with time has to gain
-    LIMIT.VARYING_GAIN more.
-    """
-    known = problem.samples.tau_known.any(axis=0)
-
-    def price(trial: Trial) -> float:
-        kind, unmodelled = trial.alternative.kind, trial.alternative.unmodelled
-        nearer = 0.0 if trial.fit is None else problem.given.penalty - trial.fit.penalty
-        if np.ndim(trial.alternative.share):
-            return float(LIMIT.VARYING_GAIN)
-        beside = kind == "spring" and bool((known * np.transpose(unmodelled)).any())
-        dear = beside or kind in ("rate", "coupling", "offset", "scale")
-        dear |= kind == "spring" and nearer <= LIMIT.DECISIVE
-        return float(LIMIT.RATE_GAIN) * dear + beside * max(nearer, 0.0)
-
-    return sorted(
-        (replace(trial, gain=trial.gain - price(trial)) for trial in trials),
-        key=lambda trial: -trial.gain,
-    )
 
 
 __all__ = ["Plausibility", "plausibility"]

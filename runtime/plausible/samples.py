@@ -1,9 +1,8 @@
-"""Some instants of the records, filtered once: what every check and every alternative reads.
+"""Some instants of the records, filtered once: what every check reads, and every cause that is tried.
 
 Filters are linear: a sign, a scale or an exchange of columns acts on the filtered signals as on the
-measured ones, and a wrong rate
-scales velocities and accelerations. So an alternative costs the regressor at these instants and
-nothing else.
+measured ones, and a wrong rate scales velocities and accelerations. So a cause costs the regressor
+at these instants and nothing else, and none where it leaves the positions as they are.
 """
 
 from __future__ import annotations

@@ -1,47 +1,65 @@
-"""The alternatives of a study, tried on its samples: which of them explains the record decisively
-better with as few parameters.
+"""The causes of `runtime.plausible.causes`, tried on the samples of a study: which of them explains the
+record decisively better with as few parameters.
 
-Every alternative gets weighted least squares, which bounds from below what a physical robot of it
-can reach; only those whose bound beats the
-best so far are fitted under the conditions of a physical robot, near the values of the robot file
-where there are any.
+Every cause gets weighted least squares, which bounds from below what a physical robot of it can
+reach; only those whose bound beats the best so far are fitted under the conditions of a physical
+robot, near the values of the robot file where there are any.
+
+A number xi is tried where its first step is worth it. Around the fit chi of a physical robot, with A
+the weighted normal matrix, B the stiffness of bodies and values, J = d(W chi)/d xi its effect,
+
+    [A + B   W'J] [d chi]   [ 0  ]
+    [J'W     J'J] [d xi ] = [J'e ],      sigma_xi^2 = 1/(J'J - J'W (A + B)^-1 W'J),      gain = xi^2/(2 sigma_xi^2) nats,
+
+rows over their sigma; then xi is searched by fits of a physical robot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.linalg import qr
+from scipy.optimize import minimize_scalar
 
 from runtime.estimators.physical import frame_origins
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, drives_of
-from runtime.model.inertia import PhysicalModel, physical_model
-from runtime.plausible.alternatives import Alternative, alternatives, unchanged
-from runtime.plausible.fits import (
-    Barrier,
+from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.plausible.bodies import (
+    Bodies,
     Fit,
     Grams,
     fit_of,
     least_squares,
     physical_fit,
     quick_fit,
+    solved,
+)
+from runtime.plausible.causes import (
+    NUMBERS,
+    Cause,
+    Robot,
+    Row,
+    causes,
+    unchanged,
+    unmodelled_torques,
 )
 from runtime.plausible.samples import Samples, moving
 
 Array = np.ndarray
+Change = Callable[[float], Cause]
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An alternative, fitted.
+    """A cause, fitted.
 
     Attributes
     ----------
-    alternative : Alternative
+    cause : Cause
     bound : float, nats
         Score of least squares.
     fit : Fit or None
@@ -52,7 +70,7 @@ class Trial:
         Whether no fit can tell it from the study as given.
     """
 
-    alternative: Alternative
+    cause: Cause
     bound: float
     fit: Fit | None
     gain: float
@@ -60,8 +78,8 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """What is fitted again and again.
+class Baseline:
+    """The study as it is, fitted: what causes are compared with.
 
     Attributes
     ----------
@@ -69,107 +87,128 @@ class Problem:
         The emitted module, and that of `symgen.variants` or None.
     physical : PhysicalModel
     samples : Samples
+    D : ndarray, shape (K, n, b)
+        Regressor of the study at the samples.
     size : float, m
         Of the robot.
-    barrier : Barrier
+    bodies : Bodies
     N : float
         Rows of a joint that count.
     free, given : Fit
-        The study as it is: least squares, and under the conditions of a physical robot.
+        By least squares, and under the conditions of a physical robot.
     F : ndarray, shape (n, n)
         Torques of the files from those of the joints.
-    basis : ndarray, shape (K*n, rank)
-        Orthonormal basis of the span of W, rows over the residual of their joint.
     """
 
     model: GeneratedModel
     variants: GeneratedModel | None
     physical: PhysicalModel
     samples: Samples
+    D: Array
     size: float
-    barrier: Barrier
+    bodies: Bodies
     N: float
     free: Fit
     given: Fit
     F: Array
-    basis: Array
 
-    def regressor(self, alternative: Alternative) -> Array | None:
-        """D of an alternative, shape (K, n, b), over the standard parameters where its table
-        changes; None where it cannot be evaluated.
+    def regressor(self, cause: Cause) -> Array | None:
+        """D of a cause, shape (K, n, b), over the standard parameters where its table changes; None
+        where it cannot be evaluated.
         """
-        model = self.model if alternative.on_data else self.variants
+        if cause.on_torques:
+            return self.D
+        model = self.variants if cause.constants else self.model
         assert model is not None
-        q, qd, qdd = alternative.states(self.samples)
         try:
-            with np.errstate(all="ignore"):
-                D = np.asarray(model.regressor(q, qd, qdd, out=None, **alternative.constants))
+            return regressor(model, cause.states(self.samples), **cause.constants)
         except ValueError:  # a loop that does not close
             return None
-        size = np.abs(D).max(axis=(0, 1), initial=0.0)
-        D[:, :, size < LIMIT.COLUMN_ROUNDING * size.max(initial=0.0)] = 0.0
-        return D if np.isfinite(size).all() else None
 
-    def rows(self, alternative: Alternative) -> tuple[Array, Array, Array] | None:
+    def rows(self, cause: Cause) -> tuple[Array, Array, Array] | None:
         """F T^-1 W', F tau - F T^-1 known and the rows used, bool: T tau - known = W' X' in the
         torques of the files F tau.
 
-        So every alternative explains the same numbers, and the residuals of coupled motors are not
-        mixed.
+        So every cause explains the same numbers, and the residuals of coupled motors are not mixed.
         """
-        D = self.regressor(alternative)
+        D = self.regressor(cause)
         if D is None:
             return None
-        back = alternative.back(self.F)
-        still = ~moving(alternative.states(self.samples)[1])
-        still |= ~self.samples.steady @ (np.abs(alternative.P.T) > 1e-12)
-        used = (np.abs(back) > 1e-12).reshape(-1, *self.F.shape).any(axis=0)
-        known = np.einsum("...ij,...j->...i", back, alternative.subtracted(self.samples))
-        return back @ D, self.tau - known, still @ used.T == 0
+        back = self.F @ np.linalg.inv(cause.T)
+        still = ~moving(cause.states(self.samples)[1])
+        still |= ~self.samples.steady @ (np.abs(cause.P.T) > 1e-12)
+        known = cause.subtracted(self.samples) @ back.T
+        if not np.array_equal(back, np.eye(len(back))):
+            D = back @ D
+        return D, self.tau - known, still @ (np.abs(back) > 1e-12).T == 0
 
-    @property
+    @cached_property
     def tau(self) -> Array:
         """Torques on the side of the files, shape (K, n)."""
         return np.asarray(self.samples.tau @ self.F.T)
 
-    def grams(self, alternative: Alternative) -> Grams | None:
-        """Normal equations of an alternative; None where it cannot be evaluated."""
-        rows = self.rows(alternative)
+    @cached_property
+    def as_given(self) -> tuple[Array, Array, Array]:
+        """Rows of the study."""
+        rows = self.rows(unchanged(self.samples.n))
+        assert rows is not None
+        return rows
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis of the span of W, rows over the residual of their joint, (K*n, rank)."""
+        weighted = (self.as_given[0] / self.free.sigma[:, None]).reshape(-1, self.D.shape[2])
+        scale = np.linalg.norm(weighted, axis=0)
+        Q, R, _ = qr(weighted / np.where(scale > 0, scale, 1.0), mode="economic", pivoting=True)
+        return np.asarray(Q[:, np.abs(np.diag(R)) > 1e-9])
+
+    def grams(self, cause: Cause) -> Grams | None:
+        """Normal equations of a cause; None where it cannot be evaluated."""
+        rows = self.rows(cause)
         return None if rows is None else Grams.of(*rows, self.tau)
 
+    def standard(self, grams: Grams) -> Grams:
+        """Normal equations over the standard parameters."""
+        p = len(self.physical.standard)
+        return grams if grams.of_joints.shape[1] == p + 1 else grams.mapped(self.physical.K)
+
+    def bound(self, grams: Grams) -> Fit:
+        """Least squares, near the values of the robot file where it has them: what no physical robot
+        explains better.
+        """
+        if self.bodies.near_values:
+            return least_squares(self.standard(grams), self.N, self.bodies)
+        return least_squares(grams, self.N)
+
     def fit(
-        self,
-        grams: Grams,
-        how: Callable[..., Fit] = physical_fit,
-        sigma: Array | None = None,
-        **options: int,
+        self, grams: Grams, how: Callable[..., Fit] = physical_fit, sigma: Array | None = None
     ) -> Fit:
         """The parameters of a physical robot, over the standard parameters; weights begin at sigma,
         without it at those of least squares.
         """
-        standard = grams.of_joints.shape[1] == len(self.physical.standard) + 1
-        over = grams if standard else grams.mapped(self.physical.K)
-        sigma = least_squares(grams, self.N).sigma if sigma is None else sigma
-        return how(over, self.barrier, self.N, sigma, **options)
+        sigma = self.bound(grams).sigma if sigma is None else sigma
+        return how(self.standard(grams), self.bodies, self.N, sigma)
 
-    def fitted(self, alternative: Alternative, grams: Grams, bound: float = -np.inf) -> Trial:
-        """An alternative under the conditions of a physical robot. Rows count as much as they do
-        for the residuals of the study, or for its own: what it explains makes those of the study
-        alike.
+    def trial(self, cause: Cause, bound: float = -np.inf, sigma: Array | None = None) -> Trial:
+        """A cause under the conditions of a physical robot. Rows count as much as they do for the
+        residuals of the study, or for its own: what it explains makes those of the study alike.
+        sigma : first weights.
         """
-        fit, rows, N, nearer = self.fit(grams), self.rows(alternative), self.N, 0.0
-        if rows is not None:
-            D = rows[0] @ self.physical.K if alternative.on_data else rows[0]
-            N = max(N, counting_rows(D, *rows[1:], fit.X))
-            nearer = self.given.penalty - fit.penalty
+        rows = self.rows(cause)
+        if rows is None:
+            return Trial(cause, bound, None, -np.inf)
+        fit = self.fit(Grams.of(*rows, self.tau), sigma=sigma)
+        D = rows[0] if cause.constants else rows[0] @ self.physical.K
+        N = max(self.N, counting_rows(D, *rows[1:], fit.X))
+        nearer = self.given.penalty - fit.penalty
         gain = (self.given.score - fit.score - nearer) * N / self.N + nearer
-        return Trial(alternative, bound, fit, gain)
+        return Trial(cause, bound, fit, gain)
 
-    def unseen(self, alternative: Alternative) -> float:
-        """Score of an alternative in nats, each of two parts of the rows by the parameters of the
-        other; parts are blocks of time by turns.
+    def unseen(self, cause: Cause) -> float:
+        """Score of a cause in nats, each of two parts of the rows by the parameters of the other;
+        parts are blocks of time by turns.
         """
-        rows = self.rows(alternative)
+        rows = self.rows(cause)
         if rows is None:
             return np.inf
         D, Y, mask = rows
@@ -178,12 +217,7 @@ class Problem:
         score = 0.0
         for part, other in (parts, parts[::-1]):
             fit = self.fit(part)
-            over = (
-                other
-                if len(fit.X) == len(other.of_joints[0]) - 1
-                else other.mapped(self.physical.K)
-            )
-            score += fit_of(over, fit.X, self.N / 2, fit.penalty / 2).score
+            score += fit_of(self.standard(other), fit.X, self.N / 2, fit.penalty / 2).score
         return score
 
     def beyond(self, V: Array) -> float:
@@ -195,72 +229,128 @@ class Problem:
         left = np.linalg.norm(rows - self.basis @ (self.basis.T @ rows), axis=0)
         return float((left / np.where(size > 0, size, 1.0)).max(initial=0.0))
 
-    def hides(self, alternative: Alternative) -> bool:
-        """Whether no fit can tell an alternative from the study: its rows lie in the span of W, and
-        physics asks the same of both.
+    def hides(self, cause: Cause) -> bool:
+        """Whether no fit can tell a cause from the study: its rows lie in the span of W, and physics
+        asks the same of both.
 
         The columns are tested on random combinations of them, beside the difference of the known
         torques.
         """
-        rows = self.rows(alternative)
+        rows = self.rows(cause)
         if rows is None:
             return False
         D, Y, _ = rows
         scale = np.sqrt((D**2).sum(axis=(0, 1)))
-        V = (D / np.where(scale > 0, scale, 1.0)) @ np.random.default_rng(0).standard_normal(
-            (D.shape[2], 3)
-        )
+        mixed = np.random.default_rng(0).standard_normal((D.shape[2], 3))
+        V = (D / np.where(scale > 0, scale, 1.0)) @ mixed
         known = Y - self.tau + self.samples.tau_known @ self.F.T
         known[np.abs(known) < 1e3 * LIMIT.COLUMN_ROUNDING * np.abs(self.tau).max()] = 0.0
         if self.beyond(np.concatenate([V, known[:, :, None]], axis=2)) > LIMIT.WITHIN_SPAN:
             return False
-        barrier = _barrier(
-            self.physical, self.size, alternative.torque(self.samples), self.barrier.near_values
-        )  # bodies as large as the torques
-        other = replace(self, barrier=barrier).fitted(alternative, Grams.of(*rows, self.tau))
+        torque = cause.torque(self.samples)  # bodies as large as the torques
+        bodies = bodies_of(self.physical, self.size, torque, self.bodies.near_values)
+        other = replace(self, bodies=bodies).trial(cause, sigma=self.given.sigma)
         return bool(abs(other.gain) < LIMIT.SAME_SCORE)
 
+    @cached_property
+    def normal(self) -> tuple[Array, Array, Array, Array]:
+        """W over the standard parameters, shape (K, n, p), the torques it explains (K, n), and over
+        sigma the residuals e (K, n) and A + B.
+        """
+        D, Y, mask = self.as_given
+        W = D @ self.physical.K
+        explained = W @ self.given.X
+        e = (Y - explained) / self.given.sigma * mask
+        A, _ = Grams.of(W, Y, mask).weighted(self.given.sigma)
+        return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
-def problem_of(
+    def effect(self, change: Callable[[float], Cause]) -> Array:
+        """J of a number, shape (K, n): what the torques of the study become, by xi."""
+        explained = self.normal[1]
+        cause = change(LIMIT.DIFFERENCE_STEP)
+        rows = self.rows(cause)
+        if rows is None:  # a loop that does not close
+            return np.zeros_like(explained)
+        D, Y, _ = rows
+        chi = self.given.X if cause.constants else self.physical.K @ self.given.X
+        moved = D @ chi + self.tau - Y
+        plain = explained + self.tau - self.as_given[1]
+        return (moved - plain) / LIMIT.DIFFERENCE_STEP
+
+    def first_step(self, J: Array) -> tuple[Array, Array] | None:
+        """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance; None
+        where the samples do not tell them from it.
+        """
+        W, _, e, H = self.normal
+        mask = self.as_given[2]
+        weight = mask / self.given.sigma
+        WJ = np.einsum("kjp,akj->pa", W * weight[:, :, None], J * weight)
+        J = J * weight
+        size = np.einsum("akj,bkj->ab", J, J)
+        left = size - WJ.T @ np.column_stack([solved(H, column) for column in WJ.T])
+        share = max(self.N / max(float(mask.sum(axis=0).mean()), 1.0), LIMIT.LEAST_SHARE)
+        eigenvalues, V = np.linalg.eigh(left)
+        least = max(0.1 / share, LIMIT.NEARLY_HIDDEN**2 * float(np.diag(size).max()))
+        if not eigenvalues[-1] > least:
+            return None
+        variances = 1 / eigenvalues.clip(1e-9 * eigenvalues[-1])
+        step = (V * variances * (eigenvalues > least)) @ V.T @ np.einsum("akj,kj->a", J, e)
+        return step, (V * variances) @ V.T / share
+
+
+def baseline_of(
     model: GeneratedModel,
     samples: Samples,
+    D: Array,
     variants: GeneratedModel | None = None,
     *,
     torque_side: str = "joint",
     values: bool = True,
-) -> Problem:
-    """The study as it is, fitted. torque_side : that of the files, motor or joint."""
+) -> Baseline:
+    """The study as it is, fitted.
+
+    D : regressor at the samples, shape (K, n, b). torque_side : that of the files, motor or joint.
+    """
     physical, drives = physical_model(model), drives_of(model)
-    F = (
-        np.linalg.inv(drives.ratio.T)
-        if drives is not None and torque_side == "motor"
-        else np.eye(samples.n)
-    )
+    F = np.eye(samples.n)
+    if drives is not None and torque_side == "motor":
+        F = np.linalg.inv(drives.ratio.T)
     size = reach(model, samples.q)
     size = size if size < LIMIT.FARTHEST_REACH else 1.0
-    barrier = _barrier(physical, size, samples.tau - samples.tau_known, values)
+    bodies = bodies_of(physical, size, samples.tau - samples.tau_known, values)
     none = Fit(np.zeros(0), np.ones(samples.n), np.zeros(samples.n), 0.0)
-    problem = Problem(
-        model, variants, physical, samples, size, barrier, 1.0, none, none, F, np.zeros((0, 0))
-    )
-    rows = problem.rows(unchanged(samples.n))
-    assert rows is not None
-    base = Grams.of(*rows, problem.tau)
-    N = counting_rows(*rows, least_squares(base, 1.0).X)
-    free = least_squares(base, N)
-    given = physical_fit(base.mapped(physical.K), barrier, N, free.sigma)
-    weighted = (rows[0] / free.sigma[:, None]).reshape(-1, rows[0].shape[2])
-    scale = np.linalg.norm(weighted, axis=0)
-    Q, R, _ = qr(weighted / np.where(scale > 0, scale, 1.0), mode="economic", pivoting=True)
-    return replace(problem, N=N, free=free, given=given, basis=Q[:, np.abs(np.diag(R)) > 1e-9])
+    baseline = Baseline(model, variants, physical, samples, D, size, bodies, 1.0, none, none, F)
+    grams = Grams.of(*baseline.as_given, baseline.tau)
+    N = counting_rows(*baseline.as_given, least_squares(grams, 1.0).X)
+    free = least_squares(grams, N)
+    given = physical_fit(grams.mapped(physical.K), bodies, N, free.sigma)
+    return replace(baseline, N=N, free=free, given=given)
 
 
-def _barrier(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Barrier:
+def regressor(
+    model: GeneratedModel, states: tuple[Array, Array, Array], **constants: float
+) -> Array:
+    """D at states, shape (K, n, b), without columns that are rounding, such as cos(pi/2).
+
+    Raises
+    ------
+    ValueError
+        A loop that does not close, or numbers that are not finite.
+    """
+    with np.errstate(all="ignore"):
+        D = np.asarray(model.regressor(*states, out=None, **constants))
+    size = np.abs(D).max(axis=(0, 1), initial=0.0)
+    if not np.isfinite(size).all():
+        raise ValueError("the regressor is not finite")
+    D[:, :, size < LIMIT.COLUMN_ROUNDING * size.max(initial=0.0)] = 0.0
+    return D
+
+
+def bodies_of(physical: PhysicalModel, size: float, Y: Array, values: bool) -> Bodies:
     """Bodies of the size, m, that torques Y, shape (K, n), ask for."""
     torque = float(np.sqrt((Y**2).mean(axis=0)).max()) or 1.0
-    return Barrier(
-        physical, max(torque / (9.81 * size), 1e-3), 0.3 * size, 0.01 * torque, values=values
-    )
+    mass = max(torque / (9.81 * size), 1e-3)
+    return Bodies(physical, mass, 0.3 * size, 0.01 * torque, values=values)
 
 
 def counting_rows(D: Array, Y: Array, mask: Array, X: Array) -> float:
@@ -287,106 +377,193 @@ def reach(model: GeneratedModel, q: Array) -> float:
     return float(np.clip(np.nanmax(distance), 0.1, 1e6)) if np.isfinite(distance).any() else 1.0
 
 
-def tried(problem: Problem, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
-    """All alternatives, the best first; those that cannot win are not fitted under the conditions
+def tried(baseline: Baseline, sides: Sequence[str] = ("joint", "joint")) -> list[Trial]:
+    """All causes, the best first.
+
+    Another sampling rate has to gain LIMIT.RATE_GAIN more, since a slower motion gives the
+    parameters more room, and so has a coupling, the scale of a position and a constant torque.
+    """
+    robot = Robot(
+        baseline.model, baseline.variants, sides, baseline.samples, slow_friction(baseline)
+    )
+    trials = [*_of_causes(baseline, causes(robot)), *_of_numbers(baseline, robot)]
+    priced = [
+        replace(trial, gain=trial.gain - LIMIT.RATE_GAIN)
+        if trial.cause.kind in ("rate", "coupling", "offset", "scale")
+        else trial
+        for trial in trials
+    ]
+    return sorted(priced, key=lambda trial: -trial.gain)
+
+
+def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
+    """Trials of causes without a number; those that cannot win are not fitted under the conditions
     of a physical robot.
     """
-    given, rows = problem.given, problem.samples.moving().sum(axis=0)
-    bounds: list[tuple[float, Alternative, Grams]] = []
-    known = np.flatnonzero(problem.samples.tau_known.any(axis=0)).tolist()
-    for alternative in alternatives(problem.model, problem.variants, sides, known):
-        grams = problem.grams(alternative)
-        if grams is not None and (grams.rows >= rows // 2).all():
-            bounds.append((least_squares(grams, problem.N).score, alternative, grams))
+    given, least = baseline.given, baseline.samples.moving().sum(axis=0) // 2
+    trials: list[Trial] = []
+    bounds: list[tuple[float, Cause, Grams]] = []
+    unchanged_bound = baseline.bound(Grams.of(*baseline.as_given, baseline.tau)).score
+    for cause in which:
+        grams = baseline.grams(cause)
+        if grams is None or (grams.rows < least).any():
+            continue
+        bound = baseline.bound(grams).score
+        if abs(bound - unchanged_bound) < LIMIT.SAME_SCORE and baseline.hides(cause):
+            trials.append(Trial(cause, bound, None, -np.inf, equivalent=True))
+        else:
+            bounds.append((bound, cause, grams))
     bounds.sort(key=lambda item: item[0])
-    quick: list[tuple[float, float, Alternative, Grams]] = []
+    quick: list[tuple[Fit, float, Cause]] = []
     best = given.score - LIMIT.DECISIVE
-    for bound, alternative, grams in bounds:
+    for bound, cause, grams in bounds:
         promising = bound < best + LIMIT.GAIN_ALIKE * (given.score - best)
-        if len(quick) < LIMIT.ALTERNATIVES_FITTED and promising:
-            score = problem.fit(grams, quick_fit).score
-            best = min(best, score)
-            quick.append((score, bound, alternative, grams))
-    quick.sort(key=lambda item: item[0])
-    trials = {}
-    for bound, alternative, _ in bounds:
-        alike = abs(bound - problem.free.score) < LIMIT.SAME_SCORE and problem.hides(alternative)
-        trials[id(alternative)] = Trial(alternative, bound, None, -np.inf, alike)
-    for _, bound, alternative, grams in quick[: LIMIT.ALTERNATIVES_REFINED]:
-        if not trials[id(alternative)].equivalent:
-            trials[id(alternative)] = problem.fitted(alternative, grams, bound)
-    return sorted(trials.values(), key=lambda trial: -trial.gain)
+        if not promising or len(quick) == LIMIT.ALTERNATIVES_FITTED:
+            break
+        fit = baseline.fit(grams, quick_fit)
+        best = min(best, fit.score)
+        quick.append((fit, bound, cause))
+    quick.sort(key=lambda item: item[0].score)
+    refined = quick[: LIMIT.ALTERNATIVES_REFINED]
+    trials += [baseline.trial(cause, bound, fit.sigma) for fit, bound, cause in refined]
+    chosen = {id(cause) for _, _, cause in refined}
+    trials += [
+        Trial(cause, bound, None, -np.inf) for bound, cause, _ in bounds if id(cause) not in chosen
+    ]
+    return trials
 
 
-def decisive(trials: Sequence[Trial], problem: Problem) -> list[Trial]:
+def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
+    """Trials of the numbers whose first step is worth it, each at its best value, and those that no
+    fit can tell.
+    """
+    trials: list[Trial] = []
+    steps: list[tuple[float, float, Row, Change]] = []
+    for row in NUMBERS:
+        for item in row.of(robot):
+            change = partial(row.cause, robot, item)
+            J = baseline.effect(change)
+            flat = np.linalg.norm(J) < LIMIT.DIFFERENCE_STEP**2 * np.linalg.norm(baseline.tau)
+            if flat or baseline.beyond(J[:, :, None]) < LIMIT.NEARLY_HIDDEN:
+                small = change(LIMIT.SMALLEST_CHANGE[row.kind])
+                # a model may have the column of a constant torque
+                if row.kind != "offset" and baseline.hides(small):
+                    trials.append(Trial(small, -np.inf, None, -np.inf, equivalent=True))
+                continue
+            step = baseline.first_step(J[None])
+            if step is None:
+                continue
+            xi, variance = float(step[0][0]), float(step[1][0, 0])
+            gain = 0.5 * xi**2 / variance
+            if gain >= LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE:
+                steps.append((gain, xi, row, change))
+    steps.sort(key=lambda item: -item[0])
+    for _, xi, row, change in steps[: LIMIT.NUMBERS_SEARCHED]:
+        trial = _searched(baseline, row, change, xi)
+        if trial is not None:
+            trials.append(trial)
+    return trials
+
+
+def _searched(baseline: Baseline, row: Row, change: Change, first: float) -> Trial | None:
+    """A number at its best value, which pays half of log N for each parameter.
+
+    A coarse grid, weights those of the study, then golden section, weights those of each value by
+    itself: far from the best these may be worse than none.
+    """
+    scores: dict[float, float] = {}
+    sigma = baseline.given.sigma
+
+    def score(xi: float, sigma: Array | None = None) -> float:
+        grams = baseline.grams(change(xi))
+        if grams is None:
+            return np.inf
+        scores[xi] = baseline.fit(grams, quick_fit, sigma).score
+        return scores[xi]
+
+    near = far = float(np.clip(first, -row.span, row.span))
+    for xi in (near * 0.25, near * 0.5):
+        score(xi, sigma)
+    while score(far, sigma) <= min(scores.values(), default=-np.inf) and abs(far) < row.span:
+        far = float(np.clip(1.6 * far, -row.span, row.span))
+    enough = baseline.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
+    if min(scores.values(), default=np.inf) > enough:
+        return None
+    best = min(scores, key=scores.__getitem__)
+    bounds = np.clip(best + 0.5 * abs(best) * np.array([-1, 1]), -row.span, row.span)
+    scores.clear()
+    minimize_scalar(
+        score, bounds=bounds, method="bounded", options={"maxiter": 9, "xatol": 0.02 * abs(best)}
+    )
+    xi = min(scores, key=scores.__getitem__, default=best)
+    if abs(xi) < LIMIT.SMALLEST_CHANGE[row.kind]:
+        return None
+    trial = baseline.trial(change(xi))
+    parameters = max(int(np.count_nonzero(trial.cause.unmodelled)), 1)
+    return replace(trial, gain=trial.gain - 0.5 * parameters * float(np.log(baseline.N)))
+
+
+def slow_friction(baseline: Baseline) -> Array | None:
+    """Friction at low speed that the model lacks, by joint, N m or N, to first order: of joints
+    that have it for certain; None without such joints.
+    """
+    samples = baseline.samples
+    size = np.sqrt((samples.tau**2).mean(axis=0))
+    effect = size * unmodelled_torques(samples)[:, :, 1]
+    step = baseline.first_step(np.einsum("kj,ij->jki", effect, baseline.F))
+    if step is None:
+        return None
+    xi, covariance = step
+    certain = np.abs(xi) >= LIMIT.CERTAIN_FRICTION * np.sqrt(np.diag(covariance))
+    return size * xi * certain if certain.any() else None
+
+
+def decisive(trials: Sequence[Trial], baseline: Baseline) -> list[Trial]:
     """Those that explain the record decisively better than the study as given, rows too that did
     not give their parameters: the best, and those like it.
     """
-    given, better = problem.given, []
+    given, better = baseline.given, []
     for trial in trials:
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
-            fewer, ratio = (
-                given.errors - trial.fit.errors,
-                given.errors / trial.fit.errors.clip(0.1),
-            )
+            fewer = given.errors - trial.fit.errors
+            ratio = given.errors / trial.fit.errors.clip(0.1)
             visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2)).any()
-            if visible.any() or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
+            if visible or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
                 better.append(trial)
-    better = [trial for trial in better if explains_change(trial, problem)]
     if not better:
         return []
-    simpler = {t.alternative.subject: t.gain for t in better if np.ndim(t.alternative.share)} | {
-        t.alternative.subject.replace("constant torque", "spring or counterbalance"): t.gain
-        for t in reversed(better)
-        if t.alternative.kind == "offset"
-    }
-    alike = [
-        trial
-        for trial in better
-        if trial.gain >= (1 - LIMIT.GAIN_ALIKE) * better[0].gain
-        and trial.gain >= simpler.get(trial.alternative.subject, 0.0)
-    ]
-    before = problem.unseen(unchanged(problem.samples.n))
+    least = (1 - LIMIT.GAIN_ALIKE) * better[0].gain
+    alike = [trial for trial in better if trial.gain >= least]
+    before = baseline.unseen(unchanged(baseline.samples.n))
     named = [
         trial
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
-        if before - problem.unseen(trial.alternative) > np.log(len(trials))
+        if before - baseline.unseen(trial.cause) > np.log(len(trials))
     ]
     if not named or named[0].fit is None or (given.errors - named[0].fit.errors > 0.2).any():
         return named
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
-    named += [load for load in loads(problem) if load.gain > least]
+    named += [trial for trial in loads(baseline) if trial.gain > least]
     return sorted(named, key=lambda trial: -trial.gain)
 
 
-def explains_change(trial: Trial, problem: Problem) -> bool:
-    """Whether what changes with time leaves 1/LIMIT.CHANGE of what the study leaves of a joint, and
-    about as little of every joint as all parameters that change likewise do: a load that was put on
-    is no factor of a torque.
-    """
-    share, rows = trial.alternative.share, problem.rows(unchanged(problem.samples.n))
-    if np.ndim(share) == 0 or trial.fit is None or rows is None:
-        return True
-    (D, Y, mask), before, after = rows, problem.given.errors, trial.fit.errors
-    if not ((before - after > LIMIT.LEAST_CHANGE) & (before > LIMIT.CHANGE * after)).any():
-        return False
-    both = np.concatenate([D, np.reshape(share, (-1, 1, 1)) * D], axis=2)
-    least = least_squares(Grams.of(both, Y, mask, problem.tau), problem.N).errors
-    return bool((after < LIMIT.CHANGE * least + LIMIT.LEAST_CHANGE).all())
-
-
-def loads(problem: Problem) -> list[Trial]:
+def loads(baseline: Baseline) -> list[Trial]:
     """The study with other values of the last link than those of the robot file, as a load has
     them; its ten parameters cost half of log N each. None where the file does not give them.
     """
-    plain, barrier = unchanged(problem.samples.n), problem.barrier
-    grams = problem.grams(plain)
-    if grams is None or not barrier.known_links[-1:].any():
+    if not baseline.bodies.known_links[-1:].any():
         return []
-    link, freed = problem.physical.links[-1], copy(barrier)
-    freed.known_links = np.append(barrier.known_links[:-1], False)
-    cause = f"link {link} has other values than those of the robot file: a load?"
-    remedy = f"say what link {link} carries: payload, or values of the file that hold it"
-    load = replace(plain, kind="load", cause=cause, remedy=remedy)
-    trial = replace(problem, barrier=freed).fitted(load, grams)
-    return [replace(trial, gain=trial.gain - 5 * float(np.log(problem.N)))]
+    link = baseline.physical.links[-1]
+    load = unchanged(
+        baseline.samples.n,
+        kind="load",
+        says=f"link {link} has other values than those of the robot file: a load?",
+        remedy=f"say what link {link} carries: payload, or values of the file that hold it",
+    )
+    known = {f"{family}{link}" for family in INERTIAL}
+    values = {name: x for name, x in baseline.physical.values.items() if name not in known}
+    physical = replace(baseline.physical, values=values)
+    torque = baseline.samples.tau - baseline.samples.tau_known
+    freed = replace(baseline, bodies=bodies_of(physical, baseline.size, torque, values=True))
+    trial = freed.trial(load)
+    return [replace(trial, gain=trial.gain - 5 * float(np.log(baseline.N)))]

@@ -249,8 +249,6 @@ def plausibility_section(found: Plausibility) -> Section:
     top; here is what they rest on.
     """
     text = [f"No record can tell: {change}." for change in found.equivalent]
-    if found.gravity is not None:
-        text.append(f"Gravity fitted freely: {found.gravity.text}.")
     return Section("Record, study and robot file", tuple(text), tables=found.tables())
 
 

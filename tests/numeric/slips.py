@@ -23,9 +23,9 @@ import symgen
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.plausible.alternatives import unchanged
+from runtime.plausible.causes import unchanged
 from runtime.plausible.samples import samples_of
-from runtime.plausible.trials import Problem, problem_of
+from runtime.plausible.trials import Baseline, baseline_of, regressor
 from runtime.settings.study import study_from_mapping
 from symgen.description.yaml import parse_robot
 from symgen.errors import SymgenError
@@ -82,11 +82,13 @@ class Case:
         except (InputError, SymgenError) as e:
             return str(e)
 
-    def problem(self) -> Problem | None:
+    def baseline(self) -> Baseline | None:
         """What is fitted; None where an error stops the study."""
         try:
             model, record, study, _ = self.parts()
-            return problem_of(model, samples_of([record], study), torque_side=self.torque_side)
+            samples = samples_of([record], study)
+            D = regressor(model, (samples.q, samples.qd, samples.qdd))
+            return baseline_of(model, samples, D, torque_side=self.torque_side)
         except (InputError, SymgenError):
             return None
 
@@ -117,7 +119,7 @@ def told(right: Case, case: Case, slip: Slip, usual: set[str]) -> tuple[str, str
         ]
     )
     text = " | ".join(findings)
-    if equivalent(right.problem(), case.problem()):
+    if equivalent(right.baseline(), case.baseline()):
         return "equivalent", text
     if any(re.search(slip.cause, finding, re.IGNORECASE) for finding in findings):
         return "named", text
@@ -128,7 +130,7 @@ def _bad(check: Any) -> bool:
     return check.state in ("no", "doubtful")
 
 
-def equivalent(right: Problem | None, slipped: Problem | None) -> bool:
+def equivalent(right: Baseline | None, slipped: Baseline | None) -> bool:
     """Whether no fit can tell a slip: its W spans every torque of the right study, as the slip maps
     them, and physics asks the same of both.
     """

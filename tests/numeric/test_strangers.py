@@ -7,14 +7,14 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from campaign import sampled, some
+from campaign import sampled
 from typer.testing import CliRunner
 
 import runtime
 import symgen
 from runtime.checks.check import Check
 from runtime.model.drives import Drives
-from runtime.plausible.alternatives import alternatives
+from runtime.plausible.causes import Robot, causes
 from runtime.records.likely_columns import likely_columns
 from runtime.settings.units import torque_unit
 from symgen.cli.main import app
@@ -43,7 +43,7 @@ def test_alternatives_keep_what_constraints_tie() -> None:
     """
     robot = parse_robot(TIED.encode(), "tied.yaml")
     model, free = symgen.model(robot), symgen.variants(robot)
-    tables = [a.constants for a in alternatives(model, free) if a.constants]
+    tables = [a.constants for a in causes(Robot(model, free)) if a.constants]
     q = np.random.default_rng(0).uniform(-1, 1, (9, 4))
     for constants in tables:
         T = np.asarray(free.frame_poses(q, **constants))  # frame j at j - 1
@@ -169,7 +169,7 @@ def test_other_units_of_all_torques_are_named(unit) -> None:
     t, q, tau = motion(model)
     record = runtime.Record(t, q, tau / torque_unit(unit)[1], name="run")
     named = runtime.plausibility(model, record, variants=free).named
-    assert named[0].alternative.cause == f"torques: {unit} are read as N*m"
+    assert named[0].cause.says == f"torques: {unit} are read as N*m"
 
 
 def test_few_samples_beside_the_bound_are_doubtful_and_two_levels_alone_are_not() -> None:
@@ -197,24 +197,6 @@ def test_motors_that_are_clipped_behind_a_coupling_are_told(tmp_path) -> None:
     motors[:, 1] = np.clip(motors[:, 1], -bound, bound)
     check = judged(model, t, q, drives.joint_torque(motors))[FULL]
     assert check.state == "no" and "of a motor that moves it" in check.finding
-
-
-def test_a_change_is_not_judged_where_no_half_gives_enough_rows() -> None:
-    """Bug 10: "One fit serves all of it", good, of a record that was never split: joint 2 moves in
-    its first seconds alone, and no later part says anything of it.
-    """
-    model = symgen.model("planar_2r")
-    question = "Is the robot the same from beginning to end?"
-    t = np.arange(4000) / 200
-    for end, state in ((2.2, "open"), (20.0, "good")):
-        shown = np.where(t < end, np.sin(np.pi * t / end) ** 4, 0.0)
-        q = np.stack([np.sin(2.1 * t) + 0.3 * np.sin(5.3 * t), shown * np.sin(9.7 * t)], axis=1)
-        qd = np.gradient(q, t, axis=0)
-        X = model.base_parameters(model.VALUES)
-        tau = model.inverse_dynamics(q, qd, np.gradient(qd, t, axis=0), X)
-        tau += 0.05 * np.random.default_rng(0).standard_normal(tau.shape)
-        check = judged(model, t, q, tau)[question]
-        assert check.state == state and (state == "good" or "Not judged" in check.finding)
 
 
 @pytest.mark.parametrize("resample", [False, True])
@@ -432,7 +414,7 @@ def test_currents_read_as_torques_are_no_wrong_rate() -> None:
     found = runtime.plausibility(
         model, runtime.Record(t, q, tau / [11.7, 6.4], name="run"), variants=free
     )
-    assert not any(trial.alternative.kind == "rate" for trial in found.trials)
+    assert not any(trial.cause.kind == "rate" for trial in found.trials)
     assert found.robot_values.heavy and "gravity torque of joint 1 0.0" in found.to_text()
 
 
@@ -523,24 +505,6 @@ def test_names_of_joints_stand_in_limits_and_advice() -> None:
         check_limits(far, {"q": [[-3, 3], [-3, 3]]}, joint_labels(model))
 
 
-@pytest.mark.parametrize("kind", ["none", "counterbalance", "spring"])
-def test_a_torque_by_position_that_nobody_told_is_named(kind) -> None:
-    """A forgotten counterbalance was told as "d of frame 2 is 0.043 m rather than 0.1 m", or not at
-    all.
-    """
-    model, free = symgen.model("planar_2r"), symgen.variants("planar_2r")
-    t, q, tau = motion(model)
-    forgotten = {
-        "none": 0 * t,
-        "counterbalance": -9 * np.cos(q[:, 0] + 0.3),
-        "spring": -6 * q[:, 0],
-    }
-    tau[:, 0] += forgotten[kind]
-    found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"), variants=free)
-    named = [trial.alternative.subject for trial in found.named]
-    assert named[:1] == ([] if kind == "none" else ["a spring or counterbalance of joint 1"]), named
-
-
 def swung(model, low: float, seed: int, amplitudes, friction, noise: float):
     """20 s of a robot with the values of its file and this friction: t, q and joint torques, noise
     relative to their deviation.
@@ -556,33 +520,6 @@ def swung(model, low: float, seed: int, amplitudes, friction, noise: float):
     return t, q, tau + noise * tau.std(axis=0) * rng.standard_normal(tau.shape)
 
 
-LEVEL = """
-symgen: 1
-name: level
-gravity: [0, 0, -g]
-constants: {D2: 0.2, g: 9.81}
-values: {ZZ1: 0.05, M2: 1.5, MX2: 0.2, MY2: 0.03, MZ2: 0.05, XX2: 0.01, YY2: 0.06, ZZ2: 0.06, XY2: -0.004, XZ2: -0.006}
-frames:
-  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}
-  2: {ant: 1, sigma: 0, alpha: pi/2, d: D2, theta: q2, r: 0}
-elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
-"""  # gravity of joint 2 depends on q2 alone
-
-
-def test_a_spring_over_a_small_range_is_named() -> None:
-    """Over 0.3 rad a q, b sin q and the gravity of MX2, MY2 are nearly one: a counterbalance was
-    told as "d and r of frame 2 are exchanged (or: the sampling rate is 1/2.5 of the stated one)".
-    """
-    robot = parse_robot(LEVEL.encode(), "level.yaml")
-    model, friction = symgen.model(robot), {"FV1": 0.1, "FV2": 0.1, "FS1": 0.2, "FS2": 0.2}
-    t, q, tau = swung(model, 0.5, 1, (1.2, 0.2), friction, 0.005)
-    tau[:, 1] += np.sin(q[:, 1])
-    record = runtime.Record(t, q, tau, name="run")
-    found = runtime.plausibility(model, record, variants=symgen.variants(robot))
-    subjects = [trial.alternative.subject for trial in found.named]
-    assert subjects == ["a spring or counterbalance of joint 2"]
-
-
 SLIDE = """
 symgen: 1
 name: slider
@@ -596,22 +533,16 @@ elements: {FV: {kind: viscous, along: all}, FS: {kind: coulomb, along: all}}
 """
 
 
-@pytest.mark.parametrize(
-    ("slope", "force", "cause"),
-    [(0, 0, ""), (0, 4, "a constant torque of joint 2"), (12, 2, "a spring")],
-)
-@some(2)
-def test_a_spring_of_a_slide_is_named(slope, force, cause) -> None:
-    """It was silent, or "the torque of joint 2 is off by 0.66 N"; a constant force is no spring."""
+@pytest.mark.parametrize(("force", "cause"), [(0, ""), (4, "a constant torque of joint 2")])
+def test_a_constant_force_of_a_slide_is_named(force, cause) -> None:
     robot = parse_robot(SLIDE.encode(), "slider.yaml")
     model = symgen.model(robot)
     t, q, tau = swung(model, 0.8, 0, (0.6, 0.15), {}, 0.02)
-    tau[:, 1] += slope * q[:, 1] + force
+    tau[:, 1] += force
     record = runtime.Record(t, q, tau, name="run")
     found = runtime.plausibility(model, record, variants=symgen.variants(robot))
-    subjects = [trial.alternative.subject for trial in found.named]
+    subjects = [trial.cause.subject for trial in found.named]
     assert any(subject.startswith(cause) for subject in subjects) == bool(cause), subjects
-    assert not (slope == 0 and any("spring" in subject for subject in subjects))
 
 
 def test_friction_that_the_model_lacks_is_no_slip() -> None:
@@ -625,6 +556,6 @@ def test_friction_that_the_model_lacks_is_no_slip() -> None:
     tau += np.array([0.0, 0.1]) * tau.std(axis=0) * slow
     found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"), variants=free)
     (check,) = (c for c in found.checks if c.question.startswith("Is the study the best"))
-    assert found.named == () and found.trials[0].alternative.kind == "friction"
+    assert found.named == () and found.trials[0].cause.kind == "friction"
     assert check.state == "good"
     assert check.finding.startswith("Friction alone: the friction of joint 2 at low speed is not")

@@ -1,4 +1,4 @@
-"""Along the record: positions that jump, torques that are cut off, a robot that changes.
+"""Along the record: positions that jump, torques that are cut off.
 
 jumps      a step of q between two samples that differs from those around it by LIMIT.JUMP times
            what is usual, and by more than any robot accelerates: an encoder that dropped out,
@@ -7,15 +7,10 @@ frozen     a joint in motion that holds one value for LIMIT.HELD samples from on
 cut        the largest or the smallest torque holds for many samples, and the model that is fitted
            to the others goes beyond it: a clipped signal. It meets a torque that saturates the
            drive and is recorded as it acted
-change     Y = W X + [t > t0] W K x, K all parameters or those of one link and its joint, leaves
-           less than 1/LIMIT.CHANGE of what Y = W X leaves, of unseen rows too
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -25,8 +20,8 @@ from runtime.checks.check import Answer, Question
 from runtime.errors import instant
 from runtime.limits import LIMIT
 from runtime.model.generated import drives_of
+from runtime.plausible.bodies import least_squares
 from runtime.plausible.case import Case
-from runtime.plausible.fits import Grams, least_squares
 from runtime.plausible.samples import moving as in_motion
 from runtime.signals.filters import median_filtered
 
@@ -220,72 +215,3 @@ def _held(tau: Array) -> Array:
         ):
             held |= x == levels[-1]
     return held
-
-
-@Question(
-    "Is the robot the same from beginning to end?",
-    f"other parameters from some instant on leave more than 1/{LIMIT.CHANGE:g} of what one fit "
-    "leaves, of unseen rows too",
-    "a load, a gain or friction changed there, or two records are joined: use one part "
-    "(rows.window), or name them as records of their own",
-)
-def change(case: Case) -> Answer | None:
-    """The instant from which other parameters, all of them or those of one link and its joint,
-    leave least, beside one fit, of the rows that gave them and of others.
-    """
-    if case.silent or case.physical is None:
-        return None
-    samples, moving = case.samples, case.samples.moving()
-    of_links = [
-        [k for k, name in enumerate(case.physical.standard) if re.search(rf"\D{link}$", name)]
-        for link in case.physical.links
-    ]
-    groups = [np.eye(case.D.shape[2]), *(case.physical.K[:, own] for own in of_links)]
-    turns = np.arange(len(samples)) * LIMIT.TURNS // len(samples) % 2
-    best, text = 0.0, "One fit serves all of it"
-    for number in np.unique(samples.record):
-        own = samples.record == number
-        t = case.straight[number].record.t
-        for split in np.linspace(t[0], t[-1], LIMIT.SPLITS + 2)[1:-1]:
-            masks = [moving & (own & (turns == k))[:, None] for k in (0, 1)]
-            since = (samples.t >= split)[:, None]
-            parts = [(case.grams(mask), case.grams(mask & since)) for mask in masks]
-            rows = sum(np.minimum(whole.rows - later.rows, later.rows) for whole, later in parts)
-            together = _left(parts, groups[0][:, :0])
-            for K in groups:
-                few = rows.sum() < LIMIT.PART_ROWS * np.linalg.matrix_rank(K)
-                if few or rows.min() < 2 * LIMIT.PART_ROWS:
-                    continue
-                best, apart = max(best, 1.0), _left(parts, K)
-                clear = together - apart > LIMIT.LEAST_CHANGE
-                ratio = np.where(clear, together / np.maximum(apart, 0.3), 0.0).min(axis=0)
-                j = int(np.argmax(ratio))
-                if ratio[j] > best:
-                    best = float(ratio[j])
-                    text = (
-                        f"Before and after {instant(round(float(split), 1))} s, fitted apart, "
-                        f"{apart[0, j]:.1f} % of the torque of joint {case.labels[j]} stay "
-                        f"unexplained, fitted together {together[0, j]:.1f} %"
-                    )
-    if not best:
-        few = f"fewer than {LIMIT.PART_ROWS:g} rows a parameter before or after every instant"
-        return Answer("open", f"Not judged: {few}", "a longer record")
-    return Answer("doubtful" if best > LIMIT.CHANGE else "good", text)
-
-
-def _left(parts: Sequence[tuple[Grams, Grams]], K: Array) -> Array:
-    """Errors of each joint, %, of Y = [D, D K since an instant] X, shape (2, n): of all rows, and
-    of each of two parts by the parameters of the other. parts : normal equations of all their rows,
-    and of the later ones.
-    """
-    M = np.vstack([K, np.zeros((1, K.shape[1]))])
-    both = []
-    for whole, later in parts:
-        beside = later.of_joints @ M
-        rows = [[M.T @ beside, beside.transpose(0, 2, 1)], [beside, whole.of_joints]]
-        both.append(replace(whole, of_joints=np.block(rows)))
-    one, two = both
-    joined = Grams(one.of_joints + two.of_joints, one.rows + two.rows, one.measured + two.measured)
-    X, X_one, X_two = (least_squares(grams, 1.0).X for grams in (joined, *both))
-    left = np.array([joined.squares(X), one.squares(X_two) + two.squares(X_one)])
-    return np.asarray(100 * np.sqrt(left / np.maximum(joined.measured, 1e-300)))

@@ -1,0 +1,307 @@
+"""How well a model explains the samples: by any parameters, and by those of bodies that exist, near
+the values that are known.
+
+Rows are weighed by joint with their own residuals, so that a wrist counts as much as a shoulder.
+The score is the negative logarithm of the likelihood with those weights profiled out, in nats,
+
+    score = N sum_j log(sigma_j) + D(chi),   sigma_j^2 = max(||Y_j - W_j chi||^2 / N_j, floor_j^2)
+
+N the rows of a joint that count (residuals are coloured); a difference of 5 is a likelihood ratio of 150.
+Rows j are those of a torque as it was measured, whatever map of the torques is tried (`runtime.plausible.trials`).
+
+`Bodies` minimises half the weighted squares and D over the standard parameters of a physical robot
+(`runtime.model.inertia`): every pseudo-inertia P >= 0, motor inertias and frictions c >= 0, and
+M R^2 >= tr S, S the second moments of a link and R its largest extent.
+
+    D(chi) = sum_links 1/2 ||P0^-1/2 (P - P0) P0^-1/2||^2 / tolerance^2
+             + sum_elements 1/2 (c/c0 - 1)^2 / tolerance^2 + price sum_links M/M0
+
+the first two over links and motor inertias whose values P0, c0 the robot file gives, the price of
+the masses over the other links. A weak price of all that no value bounds keeps small what the samples leave open.
+
+Reference: Lee, Wensing and Park (2020) for the distance, the constant pullback of the entropic one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg.lapack import dposv
+
+from runtime.estimators.semidefinite import Quadratic
+from runtime.limits import LIMIT
+from runtime.model.inertia import Condition, PhysicalModel
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Grams:
+    """Normal equations of every torque.
+
+    Attributes
+    ----------
+    of_joints : ndarray, shape (n, b + 1, b + 1)
+        [W_j Y_j]'[W_j Y_j].
+    rows : ndarray of int, shape (n,)
+    measured : ndarray, shape (n,)
+        ||tau_j||^2 over the same rows.
+    """
+
+    of_joints: Array
+    rows: Array
+    measured: Array
+
+    @classmethod
+    def of(cls, D: Array, Y: Array, mask: Array, tau: Array | None = None) -> Grams:
+        """Of a regressor (K, n, b), torques (K, n) and the rows used, bool (K, n). tau : measured
+        torques; default: Y.
+        """
+        grams = []
+        for j in range(Y.shape[1]):
+            A = np.column_stack([D[:, j], Y[:, j]])[mask[:, j]]
+            grams.append(A.T @ A)
+        return cls(
+            np.array(grams), mask.sum(axis=0), ((Y if tau is None else tau) ** 2 * mask).sum(axis=0)
+        )
+
+    def mapped(self, K: Array) -> Grams:
+        """With the columns W K, K of shape (b, p)."""
+        M = np.zeros((K.shape[0] + 1, K.shape[1] + 1))
+        M[:-1, :-1], M[-1, -1] = K, 1.0
+        return Grams(M.T @ self.of_joints @ M, self.rows, self.measured)
+
+    def squares(self, X: Array) -> Array:
+        """||Y_j - W_j X||^2, shape (n,)."""
+        v = np.append(X, -1.0)
+        return np.asarray(np.maximum(np.einsum("i,jik,k->j", v, self.of_joints, v), 0.0))
+
+    def sigma(self, X: Array) -> Array:
+        """Root mean square residual of each joint, at least LIMIT.RESIDUAL_FLOOR of its torque,
+        shape (n,); 1 of a joint without rows.
+        """
+        N = np.maximum(self.rows, 1)
+        square = np.maximum(self.squares(X), LIMIT.RESIDUAL_FLOOR**2 * self.measured) / N
+        return np.asarray(np.where(square > 0, np.sqrt(square), 1.0), dtype=float)
+
+    def weighted(self, sigma: Array) -> tuple[Array, Array]:
+        """A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2."""
+        G = np.einsum("j,jik->ik", sigma**-2.0, self.of_joints)
+        return G[:-1, :-1], G[:-1, -1]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters, residuals by joint, and the score in nats.
+
+    Attributes
+    ----------
+    X : ndarray, shape (b,) or (p,), SI
+    sigma : ndarray, shape (n,), N m or N
+    errors : ndarray, shape (n,)
+        100 ||Y_j - W_j X|| / ||tau_j||, %.
+    score : float, nats
+        Smaller is better.
+    penalty : float, nats
+        Part of the score that is the distance from the values of the robot file.
+    """
+
+    X: Array
+    sigma: Array
+    errors: Array
+    score: float
+    penalty: float = 0.0
+
+
+def fit_of(grams: Grams, X: Array, N: float, penalty: float = 0.0) -> Fit:
+    """The Fit of given parameters. N : rows of a joint that count."""
+    sigma, measured = grams.sigma(X), grams.measured
+    errors = 100 * np.sqrt(grams.squares(X) / np.where(measured > 0, measured, 1.0))
+    return Fit(X, sigma, errors, float(N * np.log(sigma[grams.rows > 0]).sum() + penalty), penalty)
+
+
+def solved(A: Array, g: Array, ridge: float = LIMIT.RIDGE) -> Array:
+    """A^-1 g, A positive semidefinite, its columns scaled."""
+    d = np.diag(A)
+    D = 1 / np.sqrt(np.where(d > 0, d, 1.0))
+    scaled = A * D * D[:, None]
+    scaled.flat[:: len(A) + 1] += ridge
+    _, x, failed = dposv(scaled, D * g)
+    return np.asarray(D * (np.linalg.lstsq(scaled, D * g, rcond=1e-9)[0] if failed else x))
+
+
+def least_squares(grams: Grams, N: float, bodies: Bodies | None = None) -> Fit:
+    """Weighted least squares, weights by joint from their own residuals; near the values of the
+    robot file where `bodies` is given, over the standard parameters then.
+    """
+    sigma = grams.sigma(np.zeros(grams.of_joints.shape[1] - 1))
+    for _ in range(LIMIT.WEIGHT_PASSES):
+        A, g = grams.weighted(sigma)
+        X = solved(A, g) if bodies is None else solved(A + bodies.H, g + bodies.h)
+        before, sigma = sigma, grams.sigma(X)
+        if np.abs(np.log(sigma / before)).max() < LIMIT.SAME_WEIGHTS:
+            break
+    return fit_of(grams, X, N, 0.0 if bodies is None else bodies.distance(X))
+
+
+class Bodies:
+    """The standard parameters of a physical robot, near the values that are known.
+
+    Parameters
+    ----------
+    physical : PhysicalModel
+    mass, length : float, kg, m
+        Size of a link without values: P0 = mass diag(length^2, length^2, length^2, 1).
+    element : float, SI
+        Size c0 of a motor inertia or a friction.
+    values : bool
+        Whether links and motor inertias stay near the values of the robot file.
+
+    Attributes
+    ----------
+    known_links : ndarray of bool, shape (links,)
+        Links near their values.
+    H, h, constant
+        Distance from the values: 1/2 chi'H chi - h'chi + constant.
+    heavy : ndarray, shape (p,), nats
+        Price of the masses of links without values.
+    price : ndarray, shape (p,), nats
+        Weak price of what no value bounds.
+    """
+
+    def __init__(
+        self,
+        physical: PhysicalModel,
+        mass: float,
+        length: float,
+        element: float,
+        *,
+        values: bool = False,
+    ) -> None:
+        self.physical = physical
+        self.links = [c for c in physical.conditions if c.name.startswith("link ")]
+        self.elements = [c for c in physical.conditions if c not in self.links]
+        extent = max(LIMIT.LINK_EXTENT * length, LIMIT.LEAST_EXTENT) ** 2
+        usual = mass * np.diag([length**2, length**2, length**2, 1.0])
+        given = [self._of_file(link, length) if values else None for link in self.links]
+        self.known_links = np.array([P is not None for P in given], dtype=bool)
+        self.P0 = [usual if P is None else P for P in given]
+        self.c0 = np.full(len(self.elements), element)
+        p = len(physical.standard)
+        self.H, self.h, self.constant = np.zeros((p, p)), np.zeros(p), 0.0
+        self.heavy, self.price = np.zeros(p), np.zeros(p)
+        scale, inside = np.full(p, element), np.zeros((len(self.links), p))
+        for k, (link, P0) in enumerate(zip(self.links, self.P0, strict=True)):
+            numbers = list(link.numbers)
+            second, M0 = np.trace(P0[:3, :3]), P0[3, 3]
+            scale[numbers] = [second] * 6 + [np.sqrt(second * M0)] * 3 + [M0]
+            largest = max(extent, 4 * second / M0 if self.known_links[k] else 0.0)
+            inside[k, numbers] = np.array([-0.5, 0, 0, -0.5, 0, -0.5, 0, 0, 0, largest]) / (
+                M0 * largest
+            )
+            scaled = np.linalg.solve(P0, link.B)
+            traces = np.einsum("kaa->k", scaled)
+            if self.known_links[k]:
+                near = np.einsum("kab,mba->km", scaled, scaled) / LIMIT.LINK_TOLERANCE**2
+                self._pull(numbers, near, traces / LIMIT.LINK_TOLERANCE**2, 4.0)
+            else:
+                self.heavy[numbers[-1]] = LIMIT.MASS_PRICE / mass
+                self.price[numbers] += LIMIT.WEAK_PRICE * traces
+        for k, element_of in enumerate(self.elements):
+            numbers = list(element_of.numbers)
+            value = self._motor_inertia(element_of) if values else 0.0
+            if value > 0:
+                self.c0[k] = value
+                near = np.array([[(LIMIT.LINK_TOLERANCE * value) ** -2.0]])
+                self._pull(numbers, near, near[0] * value, 1.0)
+            else:
+                self.price[numbers] += (
+                    LIMIT.WEAK_PRICE * np.einsum("kaa->k", element_of.B) / element
+                )
+        conditions = [
+            replace(c, size=size)
+            for c, size in (
+                *zip(self.links, map(np.diag, self.P0), strict=True),
+                *(
+                    (c, np.full(c.B.shape[1], c0))
+                    for c, c0 in zip(self.elements, self.c0, strict=True)
+                ),
+            )
+        ]
+        self.program = Quadratic(conditions, inside, scale)
+
+    def _of_file(self, link: Condition, length: float) -> Array | None:
+        """P0 of the robot file; None where it does not give all ten parameters of a body."""
+        known = self.physical.values
+        ten = np.array([known.get(self.physical.standard[k], np.nan) for k in link.numbers])
+        if not np.isfinite(ten).all() or ten[-1] <= 0:
+            return None
+        P = np.tensordot(ten, link.B, axes=1)
+        spread = np.trace(P[:3, :3]) / 3 + ten[-1] * (0.1 * length) ** 2
+        P = P + LIMIT.ROUNDNESS * spread * np.diag([1.0, 1.0, 1.0, 0.0])
+        return P if np.linalg.eigvalsh(P)[0] > 0 else None
+
+    def _motor_inertia(self, element: Condition) -> float:
+        """The value of a motor inertia in the robot file; 0 of other elements and without it."""
+        names = [self.physical.standard[k] for k in element.numbers]
+        single = len(names) == 1 and names[0].startswith("Ia")
+        return self.physical.values.get(names[0], 0.0) if single else 0.0
+
+    def _pull(self, numbers: list[int], near: Array, linear: Array, size: float) -> None:
+        """1/2 x'near x - linear'x + size/2/tolerance^2 of the parameters x of these numbers."""
+        self.H[np.ix_(numbers, numbers)] += near
+        self.h[numbers] += linear
+        self.constant += size / 2 / LIMIT.LINK_TOLERANCE**2
+
+    @property
+    def near_values(self) -> bool:
+        """Whether the robot file holds values of links that pull."""
+        return bool(self.known_links.any())
+
+    def distance(self, chi: Array) -> float:
+        """From the values of the robot file, nats."""
+        return float(0.5 * chi @ self.H @ chi - self.h @ chi + self.constant)
+
+    def penalty(self, chi: Array) -> float:
+        """D(chi), nats."""
+        return self.distance(chi) + float(self.heavy @ chi)
+
+    def minimum(self, A: Array, g: Array) -> Array:
+        """chi of the smallest 1/2 chi'A chi - g'chi + D(chi) + price'chi."""
+        return self.program.minimum(A + self.H, g + self.h - self.heavy - self.price)
+
+    def stiffness(self, chi: Array) -> Array:
+        """Curvature of D and of the conditions, as a barrier of LIMIT.WEAK_PRICE has it: what keeps
+        parameters at their bounds.
+        """
+        B = self.H.copy()
+        sizes = [
+            *self.P0,
+            *(c0 * np.eye(c.B.shape[1]) for c, c0 in zip(self.elements, self.c0, strict=True)),
+        ]
+        for condition, size in zip([*self.links, *self.elements], sizes, strict=True):
+            P = condition.matrix(chi) + LIMIT.WEAK_PRICE * size
+            scaled = np.linalg.solve(P, condition.B)
+            numbers = list(condition.numbers)
+            B[np.ix_(numbers, numbers)] += LIMIT.WEAK_PRICE * np.einsum(
+                "kab,mba->km", scaled, scaled
+            )
+        return B
+
+
+def physical_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array, rounds: int = 8) -> Fit:
+    """Fit of a physical robot, near the values that `bodies` holds. sigma : first weights, which
+    those of the residuals follow, at most `rounds` times.
+    """
+    for _ in range(rounds):
+        chi = bodies.minimum(*grams.weighted(sigma))
+        before, sigma = sigma, grams.sigma(chi)
+        if np.abs(np.log(sigma / before)).max() < LIMIT.SAME_WEIGHTS:
+            break
+    return fit_of(grams, chi, N, bodies.penalty(chi))
+
+
+def quick_fit(grams: Grams, bodies: Bodies, N: float, sigma: Array) -> Fit:
+    """About what `physical_fit` gives, to a few nats above it."""
+    return physical_fit(grams, bodies, N, sigma, rounds=1)

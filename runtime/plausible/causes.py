@@ -1,0 +1,983 @@
+"""What may be wrong with a study, a robot file or a log, one thing at a time: two tables of causes.
+
+A row says of what kind a cause is, of what it is tried (joints, pairs of them, frames, ...), how the
+finding and its remedy read, and what it does to the samples and to the table of frames:
+
+    q' = P q + p,  qd' = f P qd,  qdd' = f^2 P qdd,    tau' = T tau - s known - rho,    free_... = another value
+
+    CAUSES     a sign, an order, a unit: one change each, some 10 n^2 of a robot of n joints
+    NUMBERS    a factor, a zero, a length: one number xi each, zero in the study as given
+
+A new cause is a row (docs/contributing/finding.md). `runtime.plausible.trials` tries them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, drives_of, joint_labels, joint_units
+from runtime.plausible.samples import Samples
+from runtime.settings.units import torque_unit
+
+Array = np.ndarray
+Item = Mapping[str, Any]
+"""What a cause is tried of: words of its sentence, and what its maps read."""
+Maps = dict[str, Any]
+"""Fields of a Cause: what it does."""
+
+DEGREE = np.pi / 180
+TURNS = {"90 degrees": np.pi / 2, "-90 degrees": -np.pi / 2, "180 degrees": np.pi}
+LENGTHS = {"1000": 1e3, "1/1000": 1e-3}
+TORQUE_UNITS = ("kN*m", "N*mm", "N*cm", "kgf*cm", "lbf*inch", "ozf*inch")
+GUESSES = {
+    2**0.5: "1.41: effective for peak values",
+    3**0.5: "1.73: phase for line values",
+    2.0: "2: half of a pair of motors",
+    9.81: "9.81: kp m for N m",
+}
+"""What a factor on a torque may be."""
+GRAVITY = ("free_gx", "free_gy", "free_gz")
+ENTRY = re.compile(r"free_(alpha|[drb])(\d+)")
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """One thing changed in the study.
+
+    Attributes
+    ----------
+    kind : str
+        Family: sign, exchange, order, unit, side, rate, angle, zero, gravity, length, table, coupling, ...
+    says, remedy : str
+        What would be wrong, as an engineer says it, and what to change.
+    subject : str
+        The number that is changed, where other amounts of it are causes too; else what it says.
+    P, p : ndarray, shape (n, n) and (n,)
+        Map of the positions.
+    T : ndarray, shape (n, n)
+        Map of the torques.
+    rate : float
+        Factor f on the sampling rate.
+    known_factor : float or ndarray, shape (n,)
+        Factor s on the known torques.
+    unmodelled : ndarray, shape (n, 2), or 0
+        Factors of `unmodelled_torques` for each joint, N m or N: rho.
+    constants : mapping of str to float
+        Entries of the table of frames, SI.
+    """
+
+    kind: str
+    says: str
+    remedy: str
+    subject: str
+    P: Array
+    p: Array
+    T: Array
+    rate: float = 1.0
+    known_factor: Array | float = 1.0
+    unmodelled: Array | float = 0.0
+    constants: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def on_torques(self) -> bool:
+        """Whether positions, rate and table of frames stay as they are: W does too."""
+        still = np.array_equal(self.P, np.eye(len(self.p))) and not self.p.any()
+        return still and self.rate == 1 and not self.constants
+
+    def states(self, samples: Samples) -> tuple[Array, Array, Array]:
+        """q, qd, qdd, shape (K, n) each."""
+        q = samples.q @ self.P.T + self.p
+        qd = self.rate * samples.qd @ self.P.T
+        qdd = self.rate**2 * samples.qdd @ self.P.T
+        return q, qd, qdd
+
+    def torque(self, samples: Samples) -> Array:
+        """Torques left for the model, shape (K, n)."""
+        return np.asarray(samples.tau @ self.T.T - self.subtracted(samples))
+
+    def subtracted(self, samples: Samples) -> Array:
+        """Torques known beside the model, shape (K, n)."""
+        known = np.asarray(self.known_factor * samples.tau_known)
+        if np.ndim(self.unmodelled) == 0:
+            return known
+        return known + (self.unmodelled * unmodelled_torques(samples)).sum(axis=2)
+
+
+def unmodelled_torques(samples: Samples) -> Array:
+    """What the model may lack, shape (K, n, 2): 1, and sign(qd) exp(-(qd/v)^2), dry friction at low
+    speed, v the share LIMIT.SLOW of the largest speed.
+    """
+    qd = samples.qd
+    v = np.maximum(LIMIT.SLOW * np.abs(qd).max(axis=0), 1e-12)
+    slow = np.sign(qd) * np.exp(-((qd / v) ** 2))
+    return np.stack([np.ones_like(qd), slow], axis=2)
+
+
+def unchanged(n: int, **changed: Any) -> Cause:
+    """The study of n joints as it is, but for what is given."""
+    plain = {"kind": "", "says": "", "remedy": "", "subject": ""}
+    return Cause(**plain | {"P": np.eye(n), "p": np.zeros(n), "T": np.eye(n)} | changed)
+
+
+class Robot:
+    """What causes are made of: joints, drives and table of frames of a study of n joints.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`, whose table of frames is free; without it, the table stays.
+    sides : (str, str)
+        Sides of positions and torques in the files: motor or joint.
+    samples : Samples, optional
+        Which joints have known torques, and how large torques are.
+    friction : ndarray, shape (n,), N m or N, optional
+        Friction at low speed that the model lacks, to first order; None: of no joint for certain.
+    """
+
+    def __init__(
+        self,
+        model: GeneratedModel,
+        variants: GeneratedModel | None = None,
+        sides: Sequence[str] = ("joint", "joint"),
+        samples: Samples | None = None,
+        friction: Array | None = None,
+    ) -> None:
+        self.n = n = len(model.JOINTS)
+        self.labels, self.units = joint_labels(model), joint_units(model)
+        self.turning = np.array([unit == "rad" for unit in self.units])
+        self.links = getattr(model, "LINKS", ())
+        self.free = {} if variants is None else dict(variants.CONSTANTS)
+        self.sides, self.samples, self.friction = sides, samples, friction
+        drives = drives_of(model)
+        self.drives = drives
+        self.R = np.eye(n) if drives is None else drives.ratio
+        self.offset = np.zeros(n) if drives is None else drives.offset
+        self.constant = np.eye(n) if drives is None else np.diag(drives.torque_constant)
+
+    def one(self, j: int, value: float, others: float = 1.0) -> Array:
+        """value at joint j, shape (n,)."""
+        return np.where(np.arange(self.n) == j, value, others)
+
+    def positions(self, E: Array) -> Maps:
+        """The map E of the columns of positions, on the side of the files: of motors
+        q' = R^-1 E R (q - offset) + offset.
+        """
+        if self.sides[0] == "motor":
+            E = np.linalg.inv(self.R) @ E @ self.R
+            return {"P": E, "p": self.offset - E @ self.offset}
+        return {"P": E}
+
+    def torques(self, E: Array) -> Maps:
+        """The map E of the columns of torques, on the side of the files."""
+        if self.sides[1] == "motor":
+            E = self.R.T @ E @ np.linalg.inv(self.R.T)
+        return {"T": E}
+
+    @property
+    def gravity(self) -> Array:
+        """Gravity of the robot file in frame 0, shape (3,), m/s^2; zeros without variants."""
+        return np.array([self.free.get(key, 0.0) for key in GRAVITY])
+
+    @property
+    def frames(self) -> list[int]:
+        """Frames whose entries are free: those that constraints tie keep theirs."""
+        entries = (ENTRY.fullmatch(key) for key in self.free)
+        return sorted(int(entry[2]) for entry in entries if entry and entry[1] == "alpha")
+
+    @property
+    def whole_table(self) -> bool:
+        """Whether the entries of all frames with links are free."""
+        return {*self.links} <= {*self.frames} and bool(self.frames)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the tables.
+
+    Attributes
+    ----------
+    kind : str
+    of : function of the Robot
+        Items that the cause is tried of.
+    says, remedy, subject : str
+        Sentences with the words of an item in braces; without a subject, what it says is one.
+    maps : function of the Robot, the item and, in NUMBERS, xi
+        What it does.
+    span : float
+        In NUMBERS, the largest |xi| that is searched.
+    words : function of the Robot, the item and xi
+        In NUMBERS, words of the sentences that depend on xi.
+    """
+
+    kind: str
+    of: Callable[[Robot], Iterator[Item]]
+    says: str
+    remedy: str
+    maps: Callable[..., Maps]
+    subject: str = ""
+    span: float = 0.0
+    words: Callable[..., Item] = lambda robot, item, xi: {}
+
+    def cause(self, robot: Robot, item: Item, *xi: float) -> Cause:
+        """The cause of one item."""
+        words = {**item, **(self.words(robot, item, *xi) if xi else {})}
+        says = self.says.format(**words)
+        return unchanged(
+            robot.n,
+            kind=self.kind,
+            says=says,
+            remedy=self.remedy.format(**words),
+            subject=self.subject.format(**words) or says,
+            **self.maps(robot, item, *xi),
+        )
+
+
+# What causes are tried of
+
+
+def study(robot: Robot) -> Iterator[Item]:
+    """The study as a whole."""
+    yield {}
+
+
+def several_joints(robot: Robot) -> Iterator[Item]:
+    """The study of more than one joint."""
+    yield from [{}] if robot.n > 1 else []
+
+
+def joints(robot: Robot) -> Iterator[Item]:
+    """Every joint."""
+    for j, label in enumerate(robot.labels):
+        yield {"j": j, "joint": label}
+
+
+def senses(robot: Robot) -> Iterator[Item]:
+    """Every joint in the other sense."""
+    for item in joints(robot):
+        yield {**item, "E": np.diag(robot.one(item["j"], -1.0))}
+
+
+def joints_of_several(robot: Robot) -> Iterator[Item]:
+    """Every joint of more than one."""
+    yield from joints(robot) if robot.n > 1 else ()
+
+
+def turning_joints(robot: Robot) -> Iterator[Item]:
+    """Every revolute joint."""
+    yield from (item for item in joints(robot) if robot.turning[item["j"]])
+
+
+def turns(robot: Robot) -> Iterator[Item]:
+    """Turns of every revolute joint."""
+    for item in turning_joints(robot):
+        for text, angle in TURNS.items():
+            yield {**item, "turn": text, "angle": angle}
+
+
+def pairs(robot: Robot) -> Iterator[Item]:
+    """Two joints."""
+    for i, k in combinations(range(robot.n), 2):
+        E = np.eye(robot.n)
+        E[[i, k]] = E[[k, i]]
+        yield {"i": i, "k": k, "E": E, "one": robot.labels[i], "other": robot.labels[k]}
+
+
+def orders(robot: Robot) -> Iterator[Item]:
+    """All columns in another order."""
+    E = np.eye(robot.n)
+    if robot.n > 2:
+        yield {"E": E[::-1], "moved": "come in reverse order"}
+        yield {"E": np.roll(E, 1, axis=0), "moved": "are moved by one joint back"}
+        yield {"E": np.roll(E, -1, axis=0), "moved": "are moved by one joint on"}
+
+
+def torque_units(robot: Robot) -> Iterator[Item]:
+    """Units of torques of turning joints."""
+    for unit in TORQUE_UNITS if robot.turning.all() else ():
+        yield {"unit": unit, "factor": torque_unit(unit)[1]}
+
+
+def position_units(robot: Robot) -> Iterator[Item]:
+    """Units of all positions that turn, or slide."""
+    for unit, factor, turning, mistake in (
+        ("deg", DEGREE, True, "degrees are read as rad"),
+        ("rad", 1 / DEGREE, True, "rad are read as degrees"),
+        ("rev", 2 * np.pi, True, "turns are read as rad"),
+        ("mm", 1e-3, False, "mm are read as m"),
+        ("m", 1e3, False, "m are read as mm"),
+    ):
+        chosen = robot.turning == turning
+        if chosen.any():
+            yield {"unit": unit, "factor": factor, "chosen": chosen, "mistake": mistake}
+
+
+def position_unit_of_joints(robot: Robot) -> Iterator[Item]:
+    """Units of one position among several of its kind."""
+    for item in position_units(robot):
+        for j in np.flatnonzero(item["chosen"]) if item["chosen"].sum() > 1 else ():
+            yield {**item, "chosen": np.arange(robot.n) == j, "joint": robot.labels[j]}
+
+
+def rates(robot: Robot) -> Iterator[Item]:
+    """Factors of LIMIT.RATE_FACTORS."""
+    for factor in LIMIT.RATE_FACTORS:
+        yield {"factor": factor, "times": times(factor)}
+
+
+def times(factor: float) -> str:
+    """A factor in words: 2 times, 1/4 of, 0.752 of."""
+    if factor > 1:
+        return f"{factor:.3g} times"
+    return f"1/{1 / factor:g} of" if np.isclose(2 / factor % 1, 0) else f"{factor:.3g} of"
+
+
+def neighbours(robot: Robot) -> Iterator[Item]:
+    """A joint and the next one of the same unit, with the sense in which its motor turns with it."""
+    for k in range(1, robot.n):
+        if robot.units[k - 1] == robot.units[k]:
+            for share, sense, back in ((1.0, "plus", "minus"), (-1.0, "minus", "plus")):
+                pair = {"i": k - 1, "k": k, "one": robot.labels[k - 1], "other": robot.labels[k]}
+                yield {**pair, "share": share, "sense": sense, "back": back}
+
+
+def known_torques(robot: Robot) -> Iterator[Item]:
+    """Joints with known torques."""
+    if robot.samples is not None:
+        for j in np.flatnonzero(robot.samples.tau_known.any(axis=0)):
+            yield {"j": j, "joint": robot.labels[j]}
+
+
+def geared(robot: Robot) -> Iterator[Item]:
+    """The study of a robot with gears."""
+    yield from [{}] if not np.allclose(robot.R, np.eye(robot.n)) else []
+
+
+def with_constants(robot: Robot) -> Iterator[Item]:
+    """The study of a robot with torque constants."""
+    yield from [{}] if not np.allclose(robot.constant, np.eye(robot.n)) else []
+
+
+def with_offsets(robot: Robot) -> Iterator[Item]:
+    """The study of a robot whose drives have offsets."""
+    yield from [{}] if robot.offset.any() else []
+
+
+def other_ratios(robot: Robot) -> Iterator[Item]:
+    """Two joints of other ratios, of files on the side of the motors."""
+    ratio = np.diag(robot.R)
+    for item in pairs(robot) if "motor" in robot.sides else ():
+        i, k = item["i"], item["k"]
+        if not np.isclose(abs(ratio[i]), abs(ratio[k])):
+            yield {
+                **item,
+                "factors": robot.one(i, ratio[k] / ratio[i]) * robot.one(k, ratio[i] / ratio[k]),
+            }
+
+
+def other_gravity(robot: Robot) -> Iterator[Item]:
+    """Gravity of another size than on earth."""
+    size = float(np.linalg.norm(robot.gravity))
+    if size and abs(size / 9.81 - 1) > LIMIT.GRAVITY_VARIES:
+        yield {"size": f"{size:.4g}", "g": 9.81 / size * robot.gravity}
+
+
+def axes(robot: Robot) -> Iterator[Item]:
+    """The six axes of frame 0 that gravity does not point along."""
+    size = float(np.linalg.norm(robot.gravity))
+    for k, axis in enumerate("xyz"):
+        for sign in (1.0, -1.0):
+            g = np.where(np.arange(3) == k, sign * size, 0.0)
+            if size and not np.allclose(g, robot.gravity):
+                reversed_sense = np.allclose(g, -robot.gravity)
+                yield {
+                    "g": g,
+                    "points": "has the wrong sign: it points" if reversed_sense else "points",
+                    "axis": f"{'+' if sign > 0 else '-'}{axis}0",
+                    "entry": ", ".join(f"{x:.4g}" for x in g),
+                }
+
+
+def alphas(robot: Robot) -> Iterator[Item]:
+    """Turns of alpha of every frame."""
+    for frame in robot.frames:
+        for text, turn in TURNS.items():
+            before = robot.free[f"free_alpha{frame}"]
+            value = before + turn
+            sign = " (its sign)" if np.isclose(np.cos(value), np.cos(before)) else ""
+            item = {"frame": frame, "turn": text, "sign": sign, "value": value}
+            yield {**item, "fits": _angle(value)}
+
+
+def _angle(x: float) -> str:
+    """An angle in multiples of pi/2 where it is one."""
+    quarter = x / (np.pi / 2)
+    if not np.isclose(quarter, round(quarter)):
+        return f"{x:.4g} rad"
+    turn = (round(quarter) + 1) % 4 - 1
+    return {0: "0", 1: "pi/2", -1: "-pi/2", 2: "pi"}[turn]
+
+
+def lengths(robot: Robot) -> Iterator[Item]:
+    """Lengths of every frame that are not zero."""
+    for frame in robot.frames:
+        for name in ("d", "r", "b"):
+            length = robot.free.get(f"free_{name}{frame}", 0.0)
+            if length:
+                yield {"frame": frame, "entry": name, "length": length, "negative": f"{-length:g}"}
+
+
+def odd_lengths(robot: Robot) -> Iterator[Item]:
+    """Lengths that may be in mm, or in m where mm were meant."""
+    for item in lengths(robot):
+        if not LIMIT.MM_BELOW < abs(item["length"]) < LIMIT.MM_ABOVE:
+            for text, factor in LENGTHS.items():
+                yield {**item, "times": text, "factor": factor}
+
+
+def exchanged_lengths(robot: Robot) -> Iterator[Item]:
+    """Frames of other d than r."""
+    for frame in robot.frames:
+        d, r = robot.free[f"free_d{frame}"], robot.free[f"free_r{frame}"]
+        if d != r:
+            yield {"frame": frame, "d": d, "r": r}
+
+
+def odd_tables(robot: Robot) -> Iterator[Item]:
+    """All lengths of a table whose longest one is no length of an arm."""
+    given = {
+        key: x for key, x in robot.free.items() if key[:6] in ("free_d", "free_r", "free_b") and x
+    }
+    longest = max(map(abs, given.values()), default=1.0)
+    if robot.whole_table and not 10 * LIMIT.MM_BELOW < longest < LIMIT.MM_ABOVE:
+        for text, factor in LENGTHS.items():
+            yield {"times": text, "constants": {key: factor * x for key, x in given.items()}}
+
+
+def conventions(robot: Robot) -> Iterator[Item]:
+    """alpha and d of every frame taken from the frame before, or after it."""
+    for step, mistake, remedy in (
+        (
+            -1,
+            "of the classic (distal) convention and is read as Khalil's",
+            "set convention: distal",
+        ),
+        (
+            1,
+            "Khalil's and is read as of the classic (distal) convention",
+            "leave convention: distal out",
+        ),
+    ):
+        moved = {
+            f"free_{name}{frame}": robot.free.get(f"free_{name}{frame + step}", 0.0)
+            for frame in robot.frames
+            for name in ("alpha", "d")
+        }
+        if len(robot.frames) > 1 and robot.whole_table:
+            yield {"mistake": mistake, "set": remedy, "constants": moved}
+
+
+def entries(robot: Robot, names: str) -> Iterator[Item]:
+    """Entries of the table of these names, lengths where they are not zero."""
+    for key, value in robot.free.items():
+        entry = ENTRY.fullmatch(key)
+        if entry and entry[1] in names.split() and (value or entry[1] == "alpha"):
+            yield {"key": key, "entry": entry[1], "frame": entry[2], "value": value}
+
+
+def slow_joints(robot: Robot) -> Iterator[Item]:
+    """All joints with friction at low speed that the model lacks."""
+    if robot.friction is not None:
+        names = ", ".join(robot.labels[j] for j in np.flatnonzero(robot.friction))
+        yield {"joints": names, "friction": robot.friction}
+
+
+# Maps
+
+
+def in_positions(robot: Robot, item: Item) -> Maps:
+    """The map E of an item in the columns of positions."""
+    return robot.positions(item["E"])
+
+
+def in_torques(robot: Robot, item: Item) -> Maps:
+    """The map E of an item in the columns of torques."""
+    return robot.torques(item["E"])
+
+
+def in_both(robot: Robot, item: Item) -> Maps:
+    """The map E of an item in the columns of positions and torques."""
+    return robot.positions(item["E"]) | robot.torques(item["E"])
+
+
+def transmitted(robot: Robot, *, positions: bool, torques: bool, to_joints: bool) -> Maps:
+    """What was recorded at the motors taken to the joints, or the reverse."""
+    inverse = np.linalg.inv(robot.R)
+    P, p, T = (
+        (inverse, robot.offset, robot.R.T)
+        if to_joints
+        else (robot.R, -robot.R @ robot.offset, inverse.T)
+    )
+    return ({"P": P, "p": p} if positions else {}) | ({"T": T} if torques else {})
+
+
+def coupled(robot: Robot, item: Item, *, positions: bool, torques: bool) -> Maps:
+    """q_k' = q_k + share q_i and tau_i' = tau_i - share tau_k."""
+    P, T = np.eye(robot.n), np.eye(robot.n)
+    P[item["k"], item["i"]] = item["share"]
+    T[item["i"], item["k"]] = -item["share"]
+    return ({"P": P} if positions else {}) | ({"T": T} if torques else {})
+
+
+def constants_as_currents(robot: Robot) -> Array:
+    """Torques of the joints from what torque constants were applied to by mistake."""
+    return np.asarray(robot.R.T @ np.linalg.inv(robot.constant) @ np.linalg.inv(robot.R).T)
+
+
+def exchanged_ratios(robot: Robot, item: Item) -> Maps:
+    """Ratios of two joints exchanged, of what the files have on the side of the motors."""
+    factors = item["factors"]
+    maps = {"T": np.diag(factors)} if robot.sides[1] == "motor" else {}
+    return maps | ({"P": np.diag(1 / factors)} if robot.sides[0] == "motor" else {})
+
+
+def gravity(item: Item) -> Maps:
+    """Gravity along g."""
+    return {"constants": dict(zip(GRAVITY, map(float, item["g"]), strict=True))}
+
+
+def chosen(item: Item) -> Array:
+    """The factor of an item on the positions chosen."""
+    return np.diag(np.where(item["chosen"], item["factor"], 1.0))
+
+
+Q, TAU, Q_AND_TAU = (
+    f"name the columns in the order of the joints (record.columns.{name})"
+    for name in ("q", "tau", "q and tau")
+)
+COUPLING = (
+    "give the coupling of joints {one} and {other} as an off-diagonal element of drives.ratio"
+)
+MISSING = "the coupling of joints {one} and {other} is missing in the"
+
+CAUSES = (
+    Row(
+        "sign",
+        senses,
+        "the torque of joint {joint} has the wrong sign",
+        "turn the sign of the torque of joint {joint}: ratio, torque constant or column",
+        in_torques,
+    ),
+    Row(
+        "sign",
+        senses,
+        "the position of joint {joint} has the wrong sign",
+        "turn the sign of the position of joint {joint}, or its axis in the robot file",
+        in_positions,
+    ),
+    Row(
+        "sign",
+        senses,
+        "joint {joint} counts in the other sense, position and torque",
+        "turn the sign of the ratio of joint {joint}, or alpha and theta of its frame",
+        in_both,
+    ),
+    Row(
+        "sign",
+        several_joints,
+        "all torques have the wrong sign",
+        "turn the sign of the torques",
+        lambda robot, item: {"T": -np.eye(robot.n)},
+    ),
+    Row(
+        "sign",
+        several_joints,
+        "all positions have the wrong sign",
+        "turn the sign of the positions",
+        lambda robot, item: {"P": -np.eye(robot.n)},
+    ),
+    Row(
+        "exchange",
+        pairs,
+        "the position columns of joints {one} and {other} are exchanged",
+        Q,
+        in_positions,
+    ),
+    Row(
+        "exchange",
+        pairs,
+        "the torque columns of joints {one} and {other} are exchanged",
+        TAU,
+        in_torques,
+    ),
+    Row(
+        "exchange",
+        pairs,
+        "the columns of positions and torques of joints {one} and {other} are exchanged",
+        Q_AND_TAU,
+        in_both,
+    ),
+    Row("order", orders, "the position columns {moved}", Q, in_positions),
+    Row("order", orders, "the torque columns {moved}", TAU, in_torques),
+    Row("order", orders, "the columns of positions and torques {moved}", Q_AND_TAU, in_both),
+    Row(
+        "unit",
+        torque_units,
+        "torques: {unit} are read as N*m",
+        "set record.units.tau: {unit}",
+        lambda robot, item: {"T": item["factor"] * np.eye(robot.n)},
+        "a common factor of all torques",
+    ),
+    Row(
+        "unit",
+        position_units,
+        "positions: {mistake}",
+        "set record.units.q: {unit}",
+        lambda robot, item: {"P": chosen(item)},
+    ),
+    Row(
+        "unit",
+        position_unit_of_joints,
+        "position of joint {joint}: {mistake}",
+        "set the unit of joint {joint} in record.units.q: {unit}",
+        lambda robot, item: {"P": chosen(item)},
+    ),
+    Row(
+        "rate",
+        rates,
+        "the sampling rate is {times} the stated one",
+        "correct record.rate, or the unit of the time column (record.units.t)",
+        lambda robot, item: {"rate": item["factor"]},
+        "the sampling rate",
+    ),
+    Row(
+        "coupling",
+        neighbours,
+        f"{MISSING} positions and torques: position {{other}} is to be taken {{sense}} position {{one}}",
+        COUPLING,
+        lambda robot, item: coupled(robot, item, positions=True, torques=True),
+    ),
+    Row(
+        "coupling",
+        neighbours,
+        f"{MISSING} positions: position {{other}} is to be taken {{sense}} position {{one}}",
+        COUPLING,
+        lambda robot, item: coupled(robot, item, positions=True, torques=False),
+    ),
+    Row(
+        "coupling",
+        neighbours,
+        f"{MISSING} torques: torque {{one}} is to be taken {{back}} torque {{other}}",
+        COUPLING,
+        lambda robot, item: coupled(robot, item, positions=False, torques=True),
+    ),
+    Row(
+        "zero",
+        turns,
+        "theta of joint {joint} is wrong by {turn}",
+        "look at theta of the frame of joint {joint} and at its zero (drives.offset): {turn} are missing",
+        lambda robot, item: {"p": robot.one(item["j"], item["angle"], 0.0)},
+        "the zero of joint {joint}",
+    ),
+    Row(
+        "known",
+        known_torques,
+        "the known torque of joint {joint} has the wrong sign",
+        "turn the sign of the known torque of joint {joint} (record.columns.tau_known)",
+        lambda robot, item: {"known_factor": robot.one(item["j"], -1)},
+    ),
+    Row(
+        "known",
+        known_torques,
+        "the known torque of joint {joint} is not in the measured one",
+        "do not subtract the known torque of joint {joint} (record.columns.tau_known)",
+        lambda robot, item: {"known_factor": robot.one(item["j"], 0)},
+    ),
+    Row(
+        "side",
+        geared,
+        "torques of the motors are taken as torques of the joints: the gear ratio is missing",
+        "set record.torque_side: motor",
+        lambda robot, item: transmitted(robot, positions=False, torques=True, to_joints=True),
+    ),
+    Row(
+        "side",
+        geared,
+        "torques of the joints are taken as torques of the motors: the gear ratio is applied twice",
+        "set record.torque_side: joint",
+        lambda robot, item: transmitted(robot, positions=False, torques=True, to_joints=False),
+    ),
+    Row(
+        "side",
+        geared,
+        "positions of the motors are taken as positions of the joints",
+        "set record.side: motor",
+        lambda robot, item: transmitted(robot, positions=True, torques=False, to_joints=True),
+    ),
+    Row(
+        "side",
+        geared,
+        "positions of the joints are taken as positions of the motors",
+        "set record.side: joint, torque_side: motor",
+        lambda robot, item: transmitted(robot, positions=True, torques=False, to_joints=False),
+    ),
+    Row(
+        "side",
+        geared,
+        "positions and torques of the motors are taken as those of the joints",
+        "set record.side: motor",
+        lambda robot, item: transmitted(robot, positions=True, torques=True, to_joints=True),
+    ),
+    Row(
+        "side",
+        geared,
+        "positions and torques of the joints are taken as those of the motors",
+        "set record.side: joint",
+        lambda robot, item: transmitted(robot, positions=True, torques=True, to_joints=False),
+    ),
+    Row(
+        "unit",
+        with_constants,
+        "torques are taken as currents: torque constants are applied to them",
+        "look at record.units.tau: A of currents, N*m of torques",
+        lambda robot, item: {"T": constants_as_currents(robot)},
+    ),
+    Row(
+        "unit",
+        with_constants,
+        "currents are taken as torques: torque constants are missing",
+        "look at record.units.tau: A of currents, N*m of torques",
+        lambda robot, item: {"T": np.linalg.inv(constants_as_currents(robot))},
+    ),
+    Row(
+        "zero",
+        with_offsets,
+        "the offsets of the drives are used twice or with the wrong sign",
+        "look at the sign of drives.offset",
+        lambda robot, item: {"p": -2 * robot.offset},
+    ),
+    Row(
+        "zero",
+        with_offsets,
+        "the offsets of the drives are missing",
+        "set record.side: motor, or add drives.offset to the positions",
+        lambda robot, item: {"p": robot.offset},
+    ),
+    Row(
+        "zero",
+        with_offsets,
+        "the offsets of the drives are added to positions that have them",
+        "leave drives.offset out",
+        lambda robot, item: {"p": -robot.offset},
+    ),
+    Row(
+        "exchange",
+        other_ratios,
+        "the ratios of joints {one} and {other} are exchanged",
+        "exchange drives.ratio of joints {one} and {other}",
+        exchanged_ratios,
+    ),
+    Row(
+        "gravity",
+        other_gravity,
+        "gravity is {size} m/s^2 rather than 9.81",
+        "give gravity in m/s^2",
+        lambda robot, item: gravity(item),
+    ),
+    Row(
+        "gravity",
+        axes,
+        "gravity {points} along {axis}",
+        "set gravity: [{entry}], or turn frame 0",
+        lambda robot, item: gravity(item),
+    ),
+    Row(
+        "angle",
+        alphas,
+        "alpha of frame {frame} is wrong by {turn}{sign}",
+        "look at alpha of frame {frame}: {fits} fits",
+        lambda robot, item: {"constants": {f"free_alpha{item['frame']}": item["value"]}},
+        "alpha of frame {frame}",
+    ),
+    Row(
+        "length",
+        lengths,
+        "{entry} of frame {frame} has the wrong sign",
+        "look at {entry} of frame {frame}: {negative} fits",
+        lambda robot, item: {
+            "constants": {f"free_{item['entry']}{item['frame']}": -item["length"]}
+        },
+        "{entry} of frame {frame}",
+    ),
+    Row(
+        "length",
+        odd_lengths,
+        "{entry} of frame {frame} is to be taken {times} times: mm and m",
+        "give {entry} of frame {frame} in m",
+        lambda robot, item: {
+            "constants": {f"free_{item['entry']}{item['frame']}": item["factor"] * item["length"]}
+        },
+        "{entry} of frame {frame}",
+    ),
+    Row(
+        "length",
+        exchanged_lengths,
+        "d and r of frame {frame} are exchanged",
+        "exchange d and r of frame {frame}",
+        lambda robot, item: {
+            "constants": {f"free_d{item['frame']}": item["r"], f"free_r{item['frame']}": item["d"]}
+        },
+    ),
+    Row(
+        "length",
+        odd_tables,
+        "all lengths are to be taken {times} times: mm and m",
+        "give lengths in m",
+        lambda robot, item: {"constants": item["constants"]},
+    ),
+    Row(
+        "table",
+        conventions,
+        "the table is {mistake}",
+        "{set}",
+        lambda robot, item: {"constants": item["constants"]},
+    ),
+)
+
+
+def factor_words(robot: Robot, item: Item, xi: float) -> Item:
+    """A factor exp(xi), and what it may be."""
+    near = [text for value, text in GUESSES.items() if abs(abs(xi) - np.log(value)) < 0.05]
+    guess = near[0] if near else "they are right when this factor is 1"
+    return {"factor": f"{np.exp(xi):.3g}", "times": times(float(np.exp(xi))), "guess": guess}
+
+
+def size_of_torque(robot: Robot, j: int) -> float:
+    """Root mean square torque of a joint, N m or N."""
+    assert robot.samples is not None
+    return float(np.sqrt((robot.samples.tau[:, j] ** 2).mean()))
+
+
+def offset_words(robot: Robot, item: Item, xi: float) -> Item:
+    """A constant torque of xi times the size of that of the joint."""
+    j = item["j"]
+    return {"offset": f"{xi * size_of_torque(robot, j):.3g} {'N m' if robot.turning[j] else 'N'}"}
+
+
+def angle_words(robot: Robot, item: Item, xi: float) -> Item:
+    """An angle off by xi."""
+    return {"degrees": f"{np.degrees(xi):.3g}", "fits": f"{item.get('value', 0.0) + xi:.3f}"}
+
+
+def length_words(robot: Robot, item: Item, xi: float) -> Item:
+    """A length of exp(xi) times the given one."""
+    return {"fits": f"{item['value'] * np.exp(xi):.4g}", "given": f"{item['value']:.4g}"}
+
+
+NUMBERS = (
+    Row(
+        "rate",
+        study,
+        "the sampling rate is {times} the stated one",
+        "correct record.rate, or the unit of the time column (record.units.t)",
+        lambda robot, item, xi: {"rate": float(np.exp(xi))},
+        "the sampling rate",
+        1.0,
+        factor_words,
+    ),
+    Row(
+        "factor",
+        study,
+        "all torques are to be multiplied by {factor}",
+        "look at unit, torque constants and side of the torques ({guess})",
+        lambda robot, item, xi: {"T": np.exp(xi) * np.eye(robot.n)},
+        "a common factor of all torques",
+        2.6,
+        factor_words,
+    ),
+    Row(
+        "scale",
+        joints,
+        "the position of joint {joint} is to be multiplied by {factor}",
+        "look at the counts per turn of the encoder of joint {joint}, at its ratio (drives.ratio) and at its unit (record.units.q)",
+        lambda robot, item, xi: robot.positions(np.diag(robot.one(item["j"], np.exp(xi)))),
+        "the scale of the position of joint {joint}",
+        1.2,
+        factor_words,
+    ),
+    Row(
+        "offset",
+        joints,
+        "the torque of joint {joint} is off by {offset}",
+        "look at the zero of the torque of joint {joint}, or give it as a known torque (record.columns.tau_known)",
+        lambda robot, item, xi: {
+            "unmodelled": np.outer(
+                robot.one(item["j"], xi * size_of_torque(robot, item["j"]), 0.0), (1.0, 0.0)
+            )
+        },
+        "a constant torque of joint {joint}",
+        2.0,
+        offset_words,
+    ),
+    Row(
+        "factor",
+        joints_of_several,
+        "the torque of joint {joint} is to be multiplied by {factor}",
+        "look at ratio, torque constant and unit of joint {joint} ({guess})",
+        lambda robot, item, xi: robot.torques(np.diag(robot.one(item["j"], np.exp(xi)))),
+        "a factor of the torque of joint {joint}",
+        2.6,
+        factor_words,
+    ),
+    Row(
+        "zero",
+        turning_joints,
+        "the zero of joint {joint} is off by {degrees} degrees",
+        "look at theta of the frame of joint {joint}, at drives.offset and at the calibration of its encoder",
+        lambda robot, item, xi: {"p": robot.one(item["j"], xi, 0.0)},
+        "the zero of joint {joint}",
+        1.2,
+        angle_words,
+    ),
+    Row(
+        "friction",
+        slow_joints,
+        "the friction of joint {joints} at low speed is not that of the model; columns of kind stribeck have it",
+        "add such columns",
+        lambda robot, item, xi: {"unmodelled": xi * np.outer(item["friction"], (0.0, 1.0))},
+        "the friction of joint {joints} at low speed",
+        2.0,
+    ),
+    Row(
+        "angle",
+        lambda robot: entries(robot, "alpha"),
+        "alpha of frame {frame} is off by {degrees} degrees",
+        "look at alpha of frame {frame}: {fits} rad fits",
+        lambda robot, item, xi: {"constants": {item["key"]: item["value"] + xi}},
+        "alpha of frame {frame}",
+        1.2,
+        angle_words,
+    ),
+    Row(
+        "length",
+        lambda robot: entries(robot, "d r b"),
+        "{entry} of frame {frame} is {fits} m rather than {given} m",
+        "measure {entry} of frame {frame}: {fits} m fits",
+        lambda robot, item, xi: {"constants": {item["key"]: item["value"] * float(np.exp(xi))}},
+        "{entry} of frame {frame}",
+        1.0,
+        length_words,
+    ),
+)
+
+
+def causes(robot: Robot) -> list[Cause]:
+    """All that can be tried on a robot, of CAUSES."""
+    return [row.cause(robot, item) for row in CAUSES for item in row.of(robot)]
