@@ -6,8 +6,6 @@
             P >= t S of every condition, rows, chi in a Space
     Quadratic   min 1/2 chi'A chi - g'chi              subject to
             P >= 0 of every condition, rows chi >= 0, for many A and g
-    Quadratic   min 1/2 chi'A chi - g'chi              subject to
-            P >= 0 of every condition, rows chi >= 0, for many A and g
 
 S = diag(size) of the condition: the cones hold S^-1/2 P S^-1/2, whose entries are near one.
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of

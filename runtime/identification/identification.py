@@ -121,7 +121,6 @@ def identify(
     wide, records, study, further = with_wrench(model, records, study, further)
     asked = variants is not None if plausible is None else plausible
     plausible = asked and wide is model and study.signals.reader != "static"
-    plausible = plausible and not any(isinstance(record, Stream) for record in records)
     model = wide
     asked_study, statement = at_rest(model, records, of_links(model, study))
     study, lowpass = resolved(asked_study, records)

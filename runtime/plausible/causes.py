@@ -107,7 +107,7 @@ class Cause:
         known = np.asarray(self.known_factor * samples.tau_known)
         if np.ndim(self.unmodelled) == 0:
             return known
-        return known + (self.unmodelled * unmodelled_torques(samples)).sum(axis=2)
+        return np.asarray(known + (self.unmodelled * unmodelled_torques(samples)).sum(axis=2))
 
 
 def unmodelled_torques(samples: Samples) -> Array:
@@ -376,10 +376,8 @@ def other_ratios(robot: Robot) -> Iterator[Item]:
     for item in pairs(robot) if "motor" in robot.sides else ():
         i, k = item["i"], item["k"]
         if not np.isclose(abs(ratio[i]), abs(ratio[k])):
-            yield {
-                **item,
-                "factors": robot.one(i, ratio[k] / ratio[i]) * robot.one(k, ratio[i] / ratio[k]),
-            }
+            times_i, times_k = float(ratio[k] / ratio[i]), float(ratio[i] / ratio[k])
+            yield {**item, "factors": robot.one(i, times_i) * robot.one(k, times_k)}
 
 
 def other_gravity(robot: Robot) -> Iterator[Item]:

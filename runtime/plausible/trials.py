@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -275,7 +276,7 @@ class Baseline:
         chi = self.given.X if cause.constants else self.physical.K @ self.given.X
         moved = D @ chi + self.tau - Y
         plain = explained + self.tau - self.as_given[1]
-        return (moved - plain) / LIMIT.DIFFERENCE_STEP
+        return np.asarray((moved - plain) / LIMIT.DIFFERENCE_STEP)
 
     def first_step(self, J: Array) -> tuple[Array, Array] | None:
         """xi of numbers of effect J, shape (a, K, n), beside the model, and their covariance; None
@@ -327,9 +328,7 @@ def baseline_of(
     return replace(baseline, N=N, free=free, given=given)
 
 
-def regressor(
-    model: GeneratedModel, states: tuple[Array, Array, Array], **constants: float
-) -> Array:
+def regressor(model: GeneratedModel, states: tuple[Array, Array, Array], **constants: Any) -> Array:
     """D at states, shape (K, n, b), without columns that are rounding, such as cos(pi/2).
 
     Raises
@@ -441,7 +440,7 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
     steps: list[tuple[float, float, Row, Change]] = []
     for row in NUMBERS:
         for item in row.of(robot):
-            change = partial(row.cause, robot, item)
+            change: Change = partial(row.cause, robot, item)
             J = baseline.effect(change)
             flat = np.linalg.norm(J) < LIMIT.DIFFERENCE_STEP**2 * np.linalg.norm(baseline.tau)
             if flat or baseline.beyond(J[:, :, None]) < LIMIT.NEARLY_HIDDEN:
@@ -458,8 +457,8 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
             if gain >= LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE:
                 steps.append((gain, xi, row, change))
     steps.sort(key=lambda item: -item[0])
-    for _, xi, row, change in steps[: LIMIT.NUMBERS_SEARCHED]:
-        trial = _searched(baseline, row, change, xi)
+    for _, xi, row, number in steps[: LIMIT.NUMBERS_SEARCHED]:
+        trial = _searched(baseline, row, number, xi)
         if trial is not None:
             trials.append(trial)
     return trials
