@@ -74,7 +74,7 @@ ONLY_IN = {  # library: files and folders that may import it
     ),
     "pooch": ("runtime/records/datasets.py",),
     "pint": ("runtime/settings/units.py",),
-    "mujoco": ("symgen/description/mjcf.py",),
+    "mujoco": ("symgen/description/mjcf_model.py",),
     "polars": ("runtime/records/formats/parquet.py",),
     "h5py": ("runtime/records/formats/mat.py",),
     "rosbags": ("runtime/records/formats/bags.py",),

@@ -9,14 +9,12 @@ all but the last without mass,
 
 Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q -
 springref). Relations of joints and of fixed tendons
-that are linear are solved, exactly, for joints that no actuator drives. MuJoCo reads a text that
-names no file (`mjcf_text`).
+that are linear are solved, exactly, for joints that no actuator drives.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,7 +22,7 @@ import numpy as np
 
 from symgen.description.angles import SNAP, Angles, reaches
 from symgen.description.expression import ZERO, Expression, ratio, twelfths
-from symgen.description.mjcf_text import Mjcf, reduced
+from symgen.description.mjcf_model import Mjcf, compiled
 from symgen.description.tree import (
     FIXED_TYPE,
     FREE_TYPE,
@@ -47,10 +45,9 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     """Links and joints of an MJCF file; `exact` as of `read_tree`; `sites`: each is a link on a
     fixed joint.
     """
-    mjcf, angles = reduced(content), Angles(exact)
-    model = _compiled(mjcf)
-    tree = _tree(model, mjcf, angles, sites=sites)
-    text, changes = angles.report(file, reaches(_distances(model), "moved 0"))
+    mjcf, angles = compiled(content), Angles(exact)
+    tree = _tree(mjcf, angles, sites=sites)
+    text, changes = angles.report(file, reaches(_distances(mjcf.model), "moved 0"))
     return replace(
         tree, angles=text, notes=(*tree.notes, *(f"{SNAPPED} {change}" for change in changes))
     )
@@ -77,42 +74,14 @@ def _distances(model: Any) -> list[tuple[str, str, float]]:
     return [(ant, end, float(np.linalg.norm(way))) for ant, end, way in ways]
 
 
-def _compiled(mjcf: Mjcf) -> Any:
-    """The model; MuJoCo's remarks on its own simulation of it would go to the screen and to a file
-    of the working folder.
-    """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise DescriptionError("MJCF is read by MuJoCo: pip install symgen[mjcf]") from error
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        return mujoco.MjModel.from_xml_string(mjcf.text)
-    except ValueError as error:
-        message = " ".join(str(error).split())
-        number = re.search(r",? line (\d+)\Z", message)
-        line = mjcf.lines[int(number[1]) - 2] if number else None
-        message = message[: number.start()] if number else message
-        raise DescriptionError(
-            "MuJoCo refuses the file: "
-            f"{message.removeprefix('XML Error: ').removeprefix('Error: ')[:300]}",
-            line=line,
-        ) from error
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
 @dataclass
 class _Growing:
     """The tree as it grows.
 
     Attributes
     ----------
-    model : MjModel
-        What MuJoCo compiled.
     mjcf : Mjcf
-        The reduced text and its lines.
+        What MuJoCo compiled, and the lines of it.
     angles : Angles
         Of the rotations of bodies and sites.
     names : list of str
@@ -123,7 +92,6 @@ class _Growing:
         Link of each body, and pose (4, 4) of the body in the frame of that link.
     """
 
-    model: Any
     mjcf: Mjcf
     angles: Angles
     names: list[str]
@@ -133,7 +101,8 @@ class _Growing:
     place: dict[int, tuple[str, Array]] = field(default_factory=lambda: {0: ("world", np.eye(4))})
 
 
-def _tree(model: Any, mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
+def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
+    model = mjcf.model
     if model.njnt > MAX_JOINTS:
         raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
     for values in (
@@ -147,7 +116,7 @@ def _tree(model: Any, mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(f"a number is not finite or larger than {LARGEST:g}")
-    growing = _Growing(model, mjcf, angles, _joint_names(model))
+    growing = _Growing(mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
         _body(growing, b)
     places = dict(list(growing.place.values())[1:])
@@ -227,7 +196,7 @@ def _turned(position: Array, quaternion: Array, what: str, frame: str, angles: A
 
 def _body(growing: _Growing, b: int) -> None:
     """The links of body b: one for each of its joints, or one that is fixed."""
-    model = growing.model
+    model = growing.mjcf.model
     name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
     what = f"body {name!a:.60} (line {growing.mjcf.bodies[b - 1]})"
@@ -259,7 +228,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
     """Joint k on `parent`, where the body has `pose` at q = ref; the pose of the body in the frame
     of the joint.
     """
-    model, line = growing.model, growing.mjcf.joints[k]
+    model, line = growing.mjcf.model, growing.mjcf.joints[k]
     name, kind = growing.names[k], int(model.jnt_type[k])
     if kind == BALL:
         raise DescriptionError(
@@ -341,7 +310,7 @@ def _relations(growing: _Growing) -> dict[str, Expression]:
     """The joints that linear relations determine, by the others: exact elimination of joints that
     no actuator drives.
     """
-    model, names = growing.model, growing.names
+    model, names = growing.mjcf.model, growing.names
     relations: dict[str, Expression] = {}
     for e in range(model.neq):
         line = growing.mjcf.relations[e]

@@ -49,15 +49,15 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
     links: dict[str, Inertial | None] = {}
     joints: list[Joint] = []
     mimics: dict[str, Mimic] = {}
-    for e in root.children:
+    for e in root:
         if e.tag == "link":
-            if (name := e.text("name")) in links:
+            if (name := e.word("name")) in links:
                 raise DescriptionError(f"link {name!r} is given twice; keep one", line=e.line)
             links[name] = _inertial(e, angles)
         elif e.tag == "joint":
             joints.append(_joint(e, angles))
-            if joints[-1].kind != FIXED_TYPE and (mimic := e.first("mimic")) is not None:
-                leader = mimic.text("joint")
+            if joints[-1].kind != FIXED_TYPE and (mimic := e.find("mimic")) is not None:
+                leader = mimic.word("joint")
                 factor, offset = (
                     Expression.number(ratio(mimic.number(key, default)))
                     for key, default in (("multiplier", "1"), ("offset", "0"))
@@ -84,9 +84,11 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
     angles_text, changes = angles.report(file, reach)
     notes += tuple(f"{SNAPPED} {change}" for change in changes)
     points = [
-        e.text("name")
-        for e in root.children
-        if e.tag == "link" and (own := e.first("inertial")) and own.first("inertia") is None
+        e.word("name")
+        for e in root
+        if e.tag == "link"
+        and (own := e.find("inertial")) is not None
+        and own.find("inertia") is None
     ]
     notes += (
         (f"no <inertia>, taken as point masses: {', '.join(f'{name!a:.60}' for name in points)}",)
@@ -94,7 +96,7 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         else ()
     )
     return Tree(
-        root.attributes.get("name", ""),
+        root.attrib.get("name", ""),
         links,
         tuple(joints),
         base,
@@ -106,10 +108,8 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
 
 def _left_out(root: XmlElement) -> Iterator[str]:
     """Tags of the elements of a robot, its links and its joints that are not read."""
-    for e in (root, *root.children):
-        yield from (
-            child.tag for child in e.children if e.tag in READ and child.tag not in READ[e.tag]
-        )
+    for e in (root, *root):
+        yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
 
 
 def _length(joint: Joint) -> float:
@@ -146,7 +146,7 @@ def _pose(holder: XmlElement, what: str, frame: str, angles: Angles) -> Array:
     """(4, 4) of the <origin> of a link or joint: R = Rz(yaw) Ry(pitch) Rx(roll); `frame`: the link
     that it turns.
     """
-    T, e = np.eye(4), holder.first("origin")
+    T, e = np.eye(4), holder.find("origin")
     if e is None:
         return T
     rpy = e.numbers("rpy", 3, "0 0 0").tolist()
@@ -156,16 +156,16 @@ def _pose(holder: XmlElement, what: str, frame: str, angles: Angles) -> Array:
 
 
 def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
-    e = link.first("inertial")
+    e = link.find("inertial")
     if e is None:
         return None
-    mass, inertia = e.first("mass"), e.first("inertia")
+    mass, inertia = e.find("mass"), e.find("inertia")
     if mass is None:
         raise DescriptionError("<inertial> needs <mass>", line=e.line)
     M = mass.number("value")
     if M < 0:
         raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
-    pose = _pose(e, f"link {link.text('name')!a:.60}", "", angles)
+    pose = _pose(e, f"link {link.word('name')!a:.60}", "", angles)
     if inertia is None:  # a point mass: programs that read URDF say so and go on
         return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
@@ -173,34 +173,31 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
 
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:
-    kind, name = e.text("type"), e.text("name")
+    kind, name = e.word("type"), e.word("name")
     if kind not in (*MOVING, FIXED_TYPE):
         raise DescriptionError(
             f"joint {name!r} is {kind[:30]!r}; expected {', '.join(MOVING)} or {FIXED_TYPE}",
             line=e.line,
         )
-    ends = {tag: child for tag in ("parent", "child") if (child := e.first(tag)) is not None}
+    ends = {tag: child for tag in ("parent", "child") if (child := e.find(tag)) is not None}
     if len(ends) < 2:
         raise DescriptionError(
             f"joint {name!r} needs <parent link=...> and <child link=...>", line=e.line
         )
-    given = e.first("axis")
+    given = e.find("axis")
     axis = np.array([1.0, 0.0, 0.0]) if given is None else given.numbers("xyz", 3, "1 0 0")
     length = float(np.linalg.norm(axis))
     if kind == FIXED_TYPE:
         axis, length = np.array([0.0, 0.0, 1.0]), 1.0  # of no meaning; some files say 0 0 0
     if length < 1e-6:
         raise DescriptionError(
-            f"joint {name!r}: axis {axis.tolist()} has no direction", line=(given or e).line
+            f"joint {name!r}: axis {axis.tolist()} has no direction",
+            line=(e if given is None else given).line,
         )
-    limit, dynamics = e.first("limit"), e.first("dynamics")
+    limit, dynamics = e.find("limit"), e.find("dynamics")
     keys = ("lower", "upper", "velocity", "effort")
     bounds = (
-        {
-            key: limit.number(key, largest=sys.float_info.max)
-            for key in keys
-            if key in limit.attributes
-        }
+        {key: limit.number(key, largest=sys.float_info.max) for key in keys if key in limit.attrib}
         if limit is not None
         else {}
     )
@@ -211,7 +208,7 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
         0.0 if dynamics is None else dynamics.number(key, "0") for key in ("damping", "friction")
     )
     axis = axis if abs(length - 1) < 1e-15 else axis / length
-    links = (ends["parent"].text("link"), ends["child"].text("link"))
+    links = (ends["parent"].word("link"), ends["child"].word("link"))
     pose = _pose(e, f"joint {name!a:.60}", links[1], angles)
     return Joint(name, kind, *links, pose, axis, e.line, limits, damping, friction)
 

@@ -8,8 +8,9 @@ its line.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 import numpy as np
@@ -20,29 +21,30 @@ Array = np.ndarray
 MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, LARGEST = 5_000_000, 30, 50_000, 1e9
 
 
-@dataclass
-class XmlElement:
-    """An XML element, the line and the byte where it starts."""
+class XmlElement(ElementTree.Element):
+    """An element of ElementTree, with the line and the byte where it starts."""
 
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[XmlElement] = field(default_factory=list)
-    byte: int = 0
+    def __init__(self, tag: str, attributes: dict[str, str], line: int, byte: int) -> None:
+        super().__init__(tag, attributes)
+        self.line, self.byte = line, byte
+
+    if TYPE_CHECKING:  # an element holds elements of its class
+
+        def __iter__(self) -> Iterator[XmlElement]: ...
+        def iter(self, tag: str | None = None) -> Generator[XmlElement, None, None]: ...
+        def find(self, path: str, namespaces: Any = None) -> XmlElement | None: ...
 
     def own(self, *tags: str) -> Iterator[XmlElement]:
         """Children with these tags, those inside its frames (MJCF) too."""
-        for child in self.children:
+        for child in self:
             if child.tag in tags:
                 yield child
             elif child.tag == "frame":
                 yield from child.own(*tags)
 
-    def first(self, tag: str) -> XmlElement | None:
-        return next((child for child in self.children if child.tag == tag), None)
-
-    def text(self, name: str, default: str | None = None) -> str:
-        value = self.attributes.get(name, default)
+    def word(self, name: str, default: str | None = None) -> str:
+        """An attribute."""
+        value = self.attrib.get(name, default)
         if value is None:
             raise DescriptionError(f"<{self.tag}> has no {name}; add it", line=self.line)
         return value
@@ -51,7 +53,7 @@ class XmlElement:
         self, name: str, n: int, default: str | None = None, largest: float = LARGEST
     ) -> Array:
         """n finite numbers of an attribute."""
-        text = self.text(name, default)
+        text = self.word(name, default)
         words = text.split()
         try:
             values = [float(word) for word in words]
@@ -59,12 +61,7 @@ class XmlElement:
             values = []
         if len(words) != n or len(values) != n or not all(abs(x) <= largest for x in values):
             raise DescriptionError(
-                (
-                    f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of "
-                    "size "
-                    "at "
-                    f"most {largest:g}"
-                ),
+                f"<{self.tag} {name}={text[:60]!r}>: expected {n} number{'s' * (n > 1)} of size at most {largest:g}",
                 line=self.line,
             )
         return np.array(values)
@@ -81,7 +78,7 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
             f"more than {MAX_BYTES} bytes; meshes belong into files of their own", line=1
         )
     parser = expat.ParserCreate()
-    top = XmlElement("", {}, 0)
+    top = XmlElement("", {}, 0, 0)
     open_, count = [top], 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -98,8 +95,8 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
                 f"<{tag}>: this file is a xacro macro; expand it first (xacro FILE > robot.urdf)",
                 line=line,
             )
-        open_.append(XmlElement(tag, attributes, line, byte=parser.CurrentByteIndex))
-        open_[-2].children.append(open_[-1])
+        open_.append(XmlElement(tag, attributes, line, parser.CurrentByteIndex))
+        open_[-2].append(open_[-1])
 
     def refuse(*_: object) -> int:
         raise DescriptionError(
@@ -120,4 +117,4 @@ def read_elements(content: bytes, max_depth: int = MAX_DEPTH) -> XmlElement:
         ) from error
     except (LookupError, ValueError) as error:  # of an encoding that is not one
         raise DescriptionError(f"no XML: {error}; save the file as UTF-8", line=1) from error
-    return top.children[0]
+    return next(iter(top))

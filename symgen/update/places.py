@@ -24,7 +24,7 @@ import numpy as np
 
 from symgen.description.fields import located
 from symgen.description.files import TREES
-from symgen.description.mjcf_text import DEEPEST, ORIENTATION
+from symgen.description.mjcf_model import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
 from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree
 from symgen.description.tree_frames import Table, placed
@@ -132,7 +132,7 @@ class LinkPlace:
     @property
     def principal(self) -> bool:
         """Whether an MJCF states principal moments."""
-        full = self.inertial is None or "fullinertia" in self.inertial.attributes
+        full = self.inertial is None or "fullinertia" in self.inertial.attrib
         return self.attributes is MJCF and not full
 
     def numbers(self, ten: Array) -> Array:
@@ -164,7 +164,7 @@ class LinkPlace:
             return
         for tag, row in self.attributes.inertial.items():
             e, own = (
-                self.inertial.first(tag) if tag else self.inertial,
+                self.inertial.find(tag) if tag else self.inertial,
                 {key: x[[*places]] for key, places in row.items()},
             )
             default = (0.0, 0.0, 0.0) if tag == "origin" else None
@@ -185,7 +185,7 @@ class LinkPlace:
         quat = quaternion(self.axes @ V)
         if all(map(same, quat, quaternion(self.axes))):
             return
-        written = next((name for name in ORIENTATION if name in self.inertial.attributes), "quat")
+        written = next((name for name in ORIENTATION if name in self.inertial.attrib), "quat")
         if written == "quat":
             edits.set_numbers(self.inertial, "quat", quat.tolist(), (1.0, 0.0, 0.0, 0.0))
         else:
@@ -204,15 +204,14 @@ class Places:
             self._find_bodies(root)
         else:
             self.links, self.joints = (
-                {e.text("name"): e for e in root.children if e.tag == tag}
-                for tag in ("link", "joint")
+                {e.word("name"): e for e in root if e.tag == tag} for tag in ("link", "joint")
             )
 
     def _find_bodies(self, root: XmlElement) -> None:
-        compilers = [e for e in root.children if e.tag == "compiler"]
-        self.from_geoms = [e for e in compilers if e.attributes.get("inertiafromgeom") == "true"]
-        self.degrees = not any(e.attributes.get("angle") == "radian" for e in compilers)
-        bodies = [e for world in root.children if world.tag == "worldbody" for e in _bodies(world)]
+        compilers = [e for e in root if e.tag == "compiler"]
+        self.from_geoms = [e for e in compilers if e.attrib.get("inertiafromgeom") == "true"]
+        self.degrees = not any(e.attrib.get("angle") == "radian" for e in compilers)
+        bodies = [e for world in root if world.tag == "worldbody" for e in _bodies(world)]
         joints = [x for e in bodies for x in e.own("joint", "freejoint")]
         moving = [
             joint.name
@@ -222,7 +221,7 @@ class Places:
         self.links = dict(zip(self.tree.places, bodies, strict=True))
         self.joints = dict(zip(moving, joints, strict=True))
         for name, e in self.joints.items():
-            if e.attributes.get("name", name) != name:
+            if e.attrib.get("name", name) != name:
                 raise DescriptionError(
                     f"joint {name!a:.60} is not found where MuJoCo has it; sort joints before "
                     "bodies",
@@ -233,7 +232,7 @@ class Places:
         """Where the numbers of link `name` stand, which has pose X in frame j of `tree`."""
         link, inertial = self.links[name], tree.links[name]
         e = next(link.own("inertial"), None)
-        if e is not None and e not in link.children:
+        if e is not None and e not in link:
             raise DescriptionError(
                 "<inertial> inside a <frame>; write it into its body", line=e.line
             )
@@ -276,7 +275,7 @@ class Places:
         e, names = self.joints[joint.name], self.attributes.joint
         new = {family: x for family, x in values.items() if not same(x, before[family])}
         own = {names[family]: x for family, x in new.items() if family not in SPRING}
-        if new and "springdamper" in e.attributes:
+        if new and "springdamper" in e.attrib:
             raise DescriptionError(
                 f"joint {joint.name!a:.60}: springdamper sets its damping; write stiffness and "
                 "damping instead",
@@ -292,7 +291,7 @@ class Places:
                 )
             turns = self.degrees and joint.kind != "prismatic"
             own |= {"stiffness": K, "springref": np.degrees(-offset / K) if turns else -offset / K}
-        holder = e.first(self.attributes.dynamics) if self.attributes.dynamics else e
+        holder = e.find(self.attributes.dynamics) if self.attributes.dynamics else e
         if holder is not None:
             for key, x in own.items():
                 edits.set_numbers(holder, key, (x,))
@@ -338,7 +337,7 @@ def quaternion(R: Array) -> Array:
 
 def _bodies(e: XmlElement) -> Iterator[XmlElement]:
     """Bodies in the order of MuJoCo: a body before those inside it."""
-    for child in e.children:
+    for child in e:
         if child.tag == "body":
             yield child
         if child.tag in ("body", "frame"):

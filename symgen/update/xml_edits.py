@@ -72,9 +72,9 @@ class XmlEdits:
                 self._add(e, name, values)
             return
         words = list(FIGURES.finditer(self.content, *span))
-        if [word[0].decode("ascii", "replace") for word in words] != e.attributes[
-            name
-        ].split() or len(words) < len(values):
+        if [word[0].decode("ascii", "replace") for word in words] != e.attrib[name].split() or len(
+            words
+        ) < len(values):
             raise DescriptionError(
                 f"<{e.tag} {name}>: its numbers are written by character references; write digits",
                 line=e.line,

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from oracles.urdf_table import snapped_text
 from runtime.estimators.estimate import Estimate
-from symgen.description.mjcf_text import reduced
+from symgen.description.mjcf_model import compiled as compiled_mjcf
 from symgen.description.robot import INERTIAL
 from symgen.description.xml_text import read_elements
 
@@ -112,20 +112,18 @@ def _pinocchio(
 ) -> Array:
     robot = pin.buildModelFromXML(snapped_text(path.read_text("utf-8")))
     data = robot.createData()
-    elements = {
-        e.text("name"): e for e in read_elements(path.read_bytes()).children if e.tag == "joint"
-    }
+    elements = {e.word("name"): e for e in read_elements(path.read_bytes()) if e.tag == "joint"}
     joints = [
         (
             robot.joints[robot.getJointId(model.LABELS[j])],
-            elements[model.LABELS[j]].first("dynamics"),
+            elements[model.LABELS[j]].find("dynamics"),
         )
         for j in model.JOINTS
     ]
     leaders = {
-        name: mimic.text("joint")
+        name: mimic.word("joint")
         for name, e in elements.items()
-        if (mimic := e.first("mimic")) is not None
+        if (mimic := e.find("mimic")) is not None
     }
     rest = np.array(pin.neutral(robot))
     for name, place in ((name, lock.get(leaders.get(name, name))) for name in elements):
@@ -153,8 +151,10 @@ def _mujoco(path: Path, model: ModuleType, q: Array, qd: Array, qdd: Array) -> A
     compiled file.
     """
     content = path.read_bytes()
-    compiled = mujoco.MjModel.from_xml_string(
-        reduced(content).text if b"<mesh" in content else content.decode()
+    compiled = (
+        compiled_mjcf(content).model
+        if b"<mesh" in content
+        else mujoco.MjModel.from_xml_string(content.decode())
     )
     compiled.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     data = mujoco.MjData(compiled)
