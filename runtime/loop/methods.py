@@ -202,7 +202,6 @@ def observed(
             )
             raise InputError(message, file=record.file)
     own = [prepared(model, record, study) for record in several]
-    method = method_of(settings)
     if simulator is not None:
         asked = {
             key: settings.options[key] for key in ("reference", "around") if key in settings.options

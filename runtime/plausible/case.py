@@ -34,7 +34,7 @@ class Case:
     ----------
     model : GeneratedModel
     given : sequence of Prepared
-        Records, as they were read.
+        Records, or excerpts of long ones, as they were read.
     straight : sequence of Prepared
         The same, counts that start anew unwrapped.
     study : Study

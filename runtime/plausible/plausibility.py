@@ -35,7 +35,7 @@ from runtime.plausible.physics import (
     size,
     values,
 )
-from runtime.plausible.samples import samples_of
+from runtime.plausible.samples import excerpts, samples_of
 from runtime.plausible.sizes import (
     accelerations,
     inertias,
@@ -221,7 +221,8 @@ def _case(
     variants: GeneratedModel | None,
 ) -> Case | Check:
     """What the checks read; the finding where there is nothing to read."""
-    own = [prepared(model, record, study) for record in records]
+    parts = [part for record in records for part in excerpts(record, study)]
+    own = [prepared(model, part, study) for part in parts]
     try:
         require_no_channels(model, "a trial of another reading")
         whole = [unwrapped(one.record, study.signals, one.drives) for one in own]

@@ -15,7 +15,8 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.records.record import Record
-from runtime.rows.prepared import Prepared
+from runtime.rows.prepared import Prepared, Source, record_of
+from runtime.rows.selection import window_of
 from runtime.settings.study import Study
 from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_filtered
 
@@ -89,6 +90,30 @@ class Samples:
 def moving(qd: Array) -> Array:
     """Samples at which each joint moves, bool (K, n)."""
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
+
+
+def excerpts(source: Source, study: Study) -> list[Source]:
+    """EXCERPTS of a long record, evenly spread over the window; one that is not longer as it is."""
+    record = record_of(source)
+    start, stop = window_of(record.t, study.rows.window, record.name)
+    number, length = LIMIT.EXCERPTS
+    if stop - start <= number * length:
+        return [source]
+    parts: list[Source] = []
+    for begin in map(int, np.linspace(start, stop - length, number)):
+        samples = slice(begin, begin + length)
+        known, missing = record.tau_known, record.missing
+        part = replace(
+            record,
+            t=record.t[begin] + np.arange(length) / record.rate,
+            q=record.q[samples],
+            tau=record.tau[samples],
+            tau_known=None if known is None else known[samples],
+            missing=None if missing is None else replace(missing, samples=missing.samples[samples]),
+            channels={name: x[samples] for name, x in record.channels.items()},
+        )
+        parts.append(part)
+    return parts
 
 
 def samples_of(records: Sequence[Record | Prepared], study: Study) -> Samples:

@@ -21,7 +21,7 @@ from runtime.loop.methods import estimate_of
 from runtime.model.inertia import physical_model
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
-from runtime.plausible.samples import Samples, samples_of
+from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.records.reading import read_records
 from runtime.settings.study import Rows, Study, study_from_mapping
 from symgen.description.yaml import parse_robot
@@ -193,6 +193,22 @@ def test_changes_that_no_fit_can_tell_are_found_by_computing() -> None:
         "degrees" in text or "torque of joint 1" in text or "+z0" in text
         for text in found.equivalent
     )
+
+
+def test_excerpts_of_a_long_record_are_spread_over_its_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    t = np.arange(5000) / 500
+    study = study_from_mapping({"rows": {"window": [1.0, 9.0]}})
+    record = runtime.Record(t, t, t**2, tau_known=t)
+    assert excerpts(record, study) == [record]
+    monkeypatch.setattr(LIMIT, "EXCERPTS", (3, 400))
+    parts = excerpts(record, study)
+    assert [len(part) for part in parts] == [400] * 3
+    assert parts[0].t[0] == pytest.approx(1.0) and parts[2].t[-1] == pytest.approx(9.0)
+    for part in parts:
+        np.testing.assert_allclose(part.q[:, 0], part.t)
+        np.testing.assert_allclose(part.torque[:, 0], part.t**2 - part.t)
 
 
 def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
