@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from runtime.errors import SettingsError
-from runtime.estimators.estimate import Status
-from runtime.estimators.linear import LinearOptions, System, ordinary
+from runtime.estimators.estimate import Estimate, Status
+from runtime.estimators.linear import LinearOptions, System, assemble, ordinary
 from runtime.estimators.solution import Solution
 from runtime.estimators.wls import weighted
 from runtime.model.generated import GeneratedModel
@@ -158,3 +158,26 @@ def linear_companion(settings: EstimateSettings) -> EstimateSettings:
     return EstimateSettings(
         "ols" if settings.weights == "none" else "wls", settings.weights, settings.columns
     )
+
+
+def linear_estimate(
+    observation: Observation,
+    settings: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """Parameters of Y = W X + rho by one linear system; SettingsError for another method.
+
+    Parameters
+    ----------
+    observation : Observation
+    settings : EstimateSettings, optional
+        Method, weights, columns, options; default: ols.
+    model : GeneratedModel, optional
+        Gives units, joint numbers and the hash of the robot file.
+    provenance : mapping, optional
+        Further entries for Estimate.provenance.
+    """
+    system = linear_system(observation, settings or EstimateSettings())
+    return assemble(system, system.solve(), model=model, provenance=provenance)

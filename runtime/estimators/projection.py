@@ -18,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import least_squares
 
+from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, channels_of
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared
@@ -59,8 +60,9 @@ class LawProblem:
         """a of the coordinates u."""
         return np.where(self.log, np.exp(np.where(self.log, u, 0.0)), u)
 
-    def constants(self, u: Array) -> dict[str, float]:
-        return dict(zip(self.scalars, map(float, self.values(u)), strict=True))
+    def bound(self, u: Array) -> Any:
+        """The model with the scalars at u."""
+        return BoundModel(self.model, dict(zip(self.scalars, self.values(u).tolist(), strict=True)))
 
     def _varying(self) -> list[list[int]]:
         """Columns that each scalar enters."""
@@ -72,7 +74,7 @@ class LawProblem:
         middle = (self.lower + self.upper) / 2
 
         def columns(u: Array) -> Array:
-            D = model.regressor(q, qd, qdd, **self.constants(u), **timed)[..., place]
+            D = self.bound(u).regressor(q, qd, qdd, **timed)[..., place]
             return np.array(D)
 
         here, result = columns(middle), []
@@ -84,8 +86,8 @@ class LawProblem:
         return result
 
     def _observations(self, columns: Sequence[str] | None, u: Array) -> list[Observation]:
-        constants = self.constants(u)
-        return [r.observation(self.model, columns or self.names, constants) for r in self.records]
+        model = self.bound(u)
+        return [record.observation(model, columns or self.names) for record in self.records]
 
     def column(self, c: int, u: Array) -> Array:
         """Column c of W at all rows."""

@@ -1,5 +1,4 @@
-"""Torque constants of the drives from a weighed load: what the drives call a torque, in units
-of what the load weighs.
+"""Torque constants of the drives from a weighed load.
 
 The torque of a record is v, computed with the torque constants of the robot file; the true one is g
 v, a factor per motor. V holds the share of
@@ -9,18 +8,16 @@ with it:
     [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
 
     together   W and the load's columns are exact, V is noisy: total least squares with exact
-               columns. With Q a basis of the exact columns and D the
-               deviations of the columns of V, g ~ D^-1 times the smallest right singular vector of
-               (V - Q Q'V) D^-1; the last entry gives the size.
+               columns. With Q a basis of the exact columns and D the deviations of the columns of
+               V, g ~ D^-1 times the smallest right singular vector of (V - Q Q'V) D^-1; the last
+               entry gives the size.
     per joint  v_j = W_j (X/g_j) + W_Lu (chi_Lu/g_j) + W_Lk chi_Lk (1/g_j): one least squares per
-    motor, noise on the left side alone;
-               drives without coupling only.
+               motor, noise on the left side alone; drives without coupling only.
 
 The load is that of the torques times g; its deviations hold those of g.
 
 A motor whose torque does not change with the load says nothing: its gain is refused by its own
-deviation. Without a weighed load no record can tell
-g from X.
+deviation. Without a weighed load no record can tell g from X.
 
 Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
 identification.md 5.8.
@@ -161,10 +158,10 @@ def drive_gains(
             "(payload.known: {M: ...})"
         )
     drives = _drives(model)
-    own = [prepared(model, record, study).record.origin for record in (*without, *loaded)]
-    constants = [
-        drives.torque_constant if o.torque_constant is None else o.torque_constant for o in own
-    ]
+    constants = []
+    for record in (*without, *loaded):
+        constant = prepared(model, record, study).record.origin.torque_constant
+        constants.append(drives.torque_constant if constant is None else constant)
     if any(not np.array_equal(constant, constants[0]) for constant in constants):
         raise InputError(
             "the records were read with different torque constants; give them the same "
@@ -183,7 +180,9 @@ def drive_gains(
         ]
     )
     n = drives.n
-    exact, load, V = observation.W[:, : -n - 1], observation.W[:, -n - 1], observation.W[:, -n:]
+    exact = observation.W[:, : -n - 1]
+    load = observation.W[:, -n - 1]
+    V = observation.W[:, -n:]
     deviations, alone, sigma_alone = _alone(observation, exact, load, drives)
     together, sigma = _together(observation, exact, load, V, deviations, drives, seed)
     return DriveGains(
@@ -201,12 +200,13 @@ def _drives(model: GeneratedModel) -> Drives:
     return Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
 
 
-def _with_motors(model: GeneratedModel, own: Prepared, drives: Drives) -> Observation:
+def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Observation:
     """W and Y of a record, and behind W one column per motor: its share in the torque of the joint
     of the row.
     """
-    selection, observation = own.certain(model), own.observation(model)
-    motor = drives.motor_command(own.record.torque) * drives.torque_constant
+    selection = record.certain(model)
+    observation = record.observation(model)
+    motor = drives.motor_command(record.record.torque) * drives.torque_constant
     mask = selection.mask.ravel()
     shares = [
         decimated_torque(motor[:, [m]] * drives.ratio[m], selection).ravel()[mask]
@@ -226,7 +226,8 @@ def _with_load(
     """
     load = load_columns(model, physical_model(model), settings)
     b = len(model.BASE_PARAMETERS)
-    W, V = observation.W[:, :b], observation.W[:, b:]
+    W = observation.W[:, :b]
+    V = observation.W[:, b:]
     columns = [W, mounted * (W @ load.columns), mounted * (W @ load.torque), V]
     names = (
         *observation.names[:b],
@@ -244,14 +245,16 @@ def _alone(
     motor moves one joint.
     """
     n = observation.n
-    deviation, gain, sigma = np.ones(n), np.full(n, np.nan), np.full(n, np.nan)
+    deviation = np.ones(n)
+    gain = np.full(n, np.nan)
+    sigma = np.full(n, np.nan)
     coupled = drives.ratio != np.diag(np.diag(drives.ratio))
     for j in range(n):
         rows = observation.joint(j)
         A = np.column_stack([exact[rows], load[rows]])
         used = [k for k in range(A.shape[1]) if A[:, k].any()]
         names = tuple(observation.names[k] for k in used)
-        own = Observation(
+        of_joint = Observation(
             np.asfortranarray(A[:, used]),
             observation.Y[rows],
             observation.rows[j : j + 1],
@@ -260,7 +263,7 @@ def _alone(
             observation.record[rows],
             observation.rate,
         )
-        factored = ordinary(own, EstimateSettings(), LinearOptions())
+        factored = ordinary(of_joint, EstimateSettings(), LinearOptions())
         fit = assemble(factored, factored.solve())
         deviation[j] = fit.sigma_rho
         if "known load" in names and not coupled[j].any() and not coupled[:, j].any():
@@ -285,13 +288,14 @@ def _together(
     weight = np.repeat(
         1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
     )
-    n, own = len(deviation), _independent(exact)
-    E = exact[:, own]
+    n = len(deviation)
+    independent = _independent(exact)
+    E = exact[:, independent]
     A = np.column_stack([E, load, V]) * weight[:, None]
     D = _column_deviations(observation.rows, deviation, drives)
     blocks = split_rows(A, observation.blocks())
     found, scattered = np.full((2, n + exact.shape[1]), np.nan)
-    places = [*range(n), *(n + own)]
+    places = [*range(n), *(n + independent)]
     found[places] = _gains(triangularise(A), D)
     scattered[places] = scatter(
         blocks, lambda gram: _gains(gram_root(gram), D), LIMIT.GAIN_RUNS, seed
@@ -303,7 +307,8 @@ def _gains(R: Array, D: Array) -> Array:
     """g, and the parameters of the exact columns, from the triangular factor of [exact, known load,
     V].
     """
-    n, e = len(D), len(R) - len(D) - 1
+    n = len(D)
+    e = len(R) - n - 1
     g = np.linalg.svd(R[-n:, -n:] / D)[2][-1] / D
     along = R[-n - 1, -n:] @ g / R[-n - 1, -n - 1] if R[-n - 1, -n - 1] else 0.0
     g = g / along if along else np.full(n, np.nan)
@@ -331,8 +336,9 @@ def _independent(A: Array) -> Array:
     return np.asarray(np.sort(used[order[size > LIMIT.INDEPENDENT_COLUMN * size[0]]]))
 
 
-def scaled(model: GeneratedModel, own: Prepared, gains: DriveGains) -> Observation:
+def scaled(model: GeneratedModel, record: Prepared, gains: DriveGains) -> Observation:
     """Rows of a record with the torques of every motor times its factor."""
-    motors, n = _with_motors(model, own, _drives(model)), len(model.JOINTS)
-    W, names = motors.W[:, :-n], motors.names[:-n]
-    return replace(motors, W=W, Y=motors.W[:, -n:] @ gains.factors, names=names)
+    n = len(model.JOINTS)
+    motors = _with_motors(model, record, _drives(model))
+    Y = motors.W[:, -n:] @ gains.factors
+    return replace(motors, W=motors.W[:, :-n], Y=Y, names=motors.names[:-n])

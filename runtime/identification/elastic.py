@@ -91,53 +91,62 @@ def elasticity(
 
     names, X : parameters of the rigid fit, for the inertia about each joint.
     """
-    own = [one for one in records if "q_link" in one.record.channels]
-    if not own:
+    both = [record for record in records if "q_link" in record.record.channels]
+    if not both:
         return None
-    joints = np.flatnonzero(np.ptp(own[0].record.channels["q_link"], axis=0) > 0)  # nan, 0: none
-    values, labels = dict(getattr(model, "VALUES", {})), joint_labels(model)
-    found = [_gear(own, int(j), values.get(f"Ia{model.JOINTS[j]}")) for j in joints]
-    K, sigma_K, D, sigma_D, lag = np.array(found).T
-    A = _inertia(model, np.median(own[0].states.q, axis=0), names, X)[joints]
+    first = both[0]
+    joints = np.flatnonzero(np.ptp(first.record.channels["q_link"], axis=0) > 0)  # nan, 0: none
+    values = dict(getattr(model, "VALUES", {}))
+    labels = joint_labels(model)
+    gears = [_gear(both, int(j), values.get(f"Ia{model.JOINTS[j]}")) for j in joints]
+    K, sigma_K, D, sigma_D, lag = np.array(gears).T
+    A = _inertia(model, np.median(first.states.q, axis=0), names, X)[joints]
     with np.errstate(invalid="ignore"):
         resonance = np.sqrt(K / A) / (2 * np.pi)
-    low = own[0].study.signals.lowpass
-    cutoff = own[0].record.rate / 2 if low is None else low.hertz
+    low = first.study.signals.lowpass
+    cutoff = first.record.rate / 2 if low is None else low.hertz
     shown = tuple(labels[j] for j in joints)
     return Elasticity(shown, K, sigma_K, D, sigma_D, lag, resonance, cutoff)
 
 
-def _gear(own: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
+def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
     """K, sigma, D, sigma, lag of one joint."""
     rows, blocks = [], []
-    for one in own:
-        record, signals, low = one.record, one.study.signals, one.study.signals.lowpass
+    for prepared in records:
+        record = prepared.record
+        signals = prepared.study.signals
+        low = signals.lowpass
         link = filtered_states(record.channels["q_link"][:, [j]], record.rate, signals)
         motor = filtered_states(record.q[:, [j]], record.rate, signals)
         tau = median_filtered(record.torque[:, [j]], signals.window_of_torques)
         for _ in () if low is None else {*low.on}:
             tau = lowpass_filtered(tau, record.rate, low)  # type: ignore[arg-type]
-        gap, sign = motor.q - link.q, np.sign(motor.qd)
+        gap = motor.q - link.q
+        sign = np.sign(motor.qd)
         tau = tau - (Ia or 0.0) * motor.qdd
         columns = [tau, link.qd - motor.qd, motor.qd, sign, np.ones_like(sign), gap]
         A = np.hstack([*columns[:-1], *([] if Ia else [motor.qdd]), gap])
-        kept = one.selection.samples
+        kept = prepared.selection.samples
         moving = np.abs(motor.qd[kept, 0]) > LIMIT.STANDING * np.abs(motor.qd).max()
         rows.append(A[kept][moving])
         blocks += np.array_split(np.arange(len(rows[-1])), LIMIT.GEAR_BLOCKS)
     A = np.vstack(rows)
-    Z, y = A[:, :-1], A[:, -1]
+    Z = A[:, :-1]
+    y = A[:, -1]
     scale = np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
     Z = Z / scale
     x, *_ = np.linalg.lstsq(Z, y, rcond=None)
-    inverse, e = np.linalg.pinv(Z.T @ Z, hermitian=True), y - Z @ x
+    inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
+    e = y - Z @ x
     first = np.repeat(np.cumsum([0, *map(len, rows[:-1])]), LIMIT.GEAR_BLOCKS)
     g = np.array([Z[k + a].T @ e[k + a] for a, k in zip(first, blocks, strict=True)])
     C = inverse @ (g.T @ g) @ inverse * len(g) / (len(g) - 1)
-    x, s = x / scale, np.sqrt(np.diag(C)) / scale
+    x = x / scale
+    s = np.sqrt(np.diag(C)) / scale
     if x[0] < LIMIT.GEAR_CERTAIN * s[0]:
         return (np.nan, np.nan, np.nan, np.nan, float(x[2]))
-    K, damping = 1 / x[0], x[1] / x[0]
+    K = 1 / x[0]
+    damping = x[1] / x[0]
     mixed = C[0, 1] / (scale[0] * scale[1])
     spread = np.sqrt(s[1] ** 2 + (damping * s[0]) ** 2 - 2 * damping * mixed) * K
     return float(K), float(s[0] * K**2), float(damping), float(spread), float(x[2])
@@ -146,7 +155,8 @@ def _gear(own: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...
 def _inertia(model: GeneratedModel, q: Array, names: Sequence[str], X: Array) -> Array:
     """A_jj at q of the parameters, shape (n,)."""
     n = len(q)
-    at_rest, kept = np.zeros((n + 1, n)), [list(model.BASE_PARAMETERS).index(k) for k in names]
+    at_rest = np.zeros((n + 1, n))
+    kept = [list(model.BASE_PARAMETERS).index(k) for k in names]
     D = model.regressor(np.tile(q, (n + 1, 1)), at_rest, np.vstack([np.zeros(n), np.eye(n)]))
     torques = np.asarray(D)[:, :, kept] @ X
     A = np.diag(torques[1:] - torques[0])

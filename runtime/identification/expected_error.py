@@ -1,5 +1,7 @@
-"""How far off are predictions of other motions likely to be? Deviations of the parameters, and what
-encoders do to them, carried over to motions of the robot's own range.
+"""How far off are predictions of other motions likely to be?
+
+Deviations of the parameters, and what encoders do to them, carried over to motions of the robot's
+own range.
 
     D       regressor in states of a reference motion: sines of every joint over a part of the range
             and at a part of the speed of the robot file, or of the record where it has none
@@ -42,7 +44,6 @@ from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
 from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared
 from runtime.settings.study import EstimateSettings
-from runtime.signals.encoder_advice import acceleration_error
 
 Array = np.ndarray
 
@@ -61,6 +62,7 @@ def expected_error(
     settings: EstimateSettings,
     fit: Estimate,
     records: Sequence[Prepared],
+    steps: float = 0.0,
 ) -> Expected:
     """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
     file nor records tell a range, or a loop does not close in it.
@@ -76,6 +78,8 @@ def expected_error(
     fit : Estimate
         The parameters that stand for the robot.
     records : sequence of Prepared
+    steps : float
+        Share of the accelerations that is an error of the encoder's steps.
     """
     states = reference_states(model, records)
     if states is None or channels_of(model):
@@ -88,28 +92,25 @@ def expected_error(
     if linear.weights == "none":
         linear = EstimateSettings("wls", "joint", linear.columns)
     system = linear_system(observation, linear)
-    every = assemble(system, system.solve())
-    D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in every.names]]
-    X = np.array([dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in every.names])
-    wider = max(1.0, float(np.median(every.sigma_corrected / every.sigma))) ** 2
-    V, near = wider * every.covariance, every.X
+    least_squares = assemble(system, system.solve())
+    D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in least_squares.names]]
+    X = np.array(
+        [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
+    )
+    wider = max(1.0, float(np.median(least_squares.sigma_corrected / least_squares.sigma))) ** 2
+    V = wider * least_squares.covariance
+    near = least_squares.X
     if dict(fit.details.get("options", {})).get("prior", "none") != "none":
         physical = physical_model(model)
-        K, rows = physical.rows(every.names), system.weighted
-        variance = wider * (1.0 if system.known_variance else every.sigma_rho**2)
+        K, rows = physical.rows(least_squares.names), system.weighted
+        variance = wider * (1.0 if system.known_variance else least_squares.sigma_rho**2)
         near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
         D, X = D @ K, np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))
-    size, M = np.linalg.norm(A @ X), A.T @ A @ V
-    spread, nu = max(np.trace(M), 0.0), max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
-    steps = max(
-        (
-            acceleration_error(own.record, own.states, own.study.signals, own.drives)
-            for own in records
-            if own.study.signals.reader == "lowpass"
-        ),
-        default=0.0,
-    )
+    size = np.linalg.norm(A @ X)
+    M = A.T @ A @ V
+    spread = max(np.trace(M), 0.0)
+    nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
     errors = 100 * np.sqrt(open_part * times + (steps / (1 + steps)) ** 2)
@@ -150,10 +151,12 @@ def reference_states(
     if span.shape != (n, 2) or speed.shape != (n,) or not np.isfinite([*span.T, speed]).all():
         if not records:
             return None
-        q = np.concatenate([own.states.q for own in records])
-        qd = np.concatenate([own.states.qd for own in records])
-        half, speed = np.ptp(q, axis=0) / 2, np.abs(qd).max(axis=0)
-        alike = np.array(joint_units(model))[:, None] == np.array(joint_units(model))
+        q = np.concatenate([record.states.q for record in records])
+        qd = np.concatenate([record.states.qd for record in records])
+        half = np.ptp(q, axis=0) / 2
+        speed = np.abs(qd).max(axis=0)
+        units = np.array(joint_units(model))
+        alike = units[:, None] == units
         half, speed = (
             np.array([max(x[j], np.median(x[alike[j]])) for j in range(n)]) for x in (half, speed)
         )  # a joint that hardly moves: as its neighbours

@@ -1,5 +1,4 @@
-"""The friction of every joint as a curve: what the rest of the model leaves of the torque, against
-velocity, and which law it follows.
+"""The friction of every joint as a curve against velocity, and which law it follows.
 
     f_j = Y_j - W_j X without the friction and offset of joint j
             (Y, W decimated, X of a fit of all parameters)
@@ -13,17 +12,15 @@ velocity, and which law it follows.
     stribeck+load     both
 
 Every term is built at the rate of the record and decimated like Y, so that the filter rounds
-sign(v) on both sides alike. Every law contains the
-first and is linear but for VS, which is searched (its F-test is approximate: VS means nothing where
-FST = 0). Residuals are correlated: deviations take blocks of time as independent, and the F-test
-and Akaike's
-criterion count N/T samples, T the correlation time of the residual in rows. The law is chosen on
-blocks of time that did not fit it.
-X is held: this says what form friction has, not what the other parameters would be with it.
+sign(v) on both sides alike. Every law contains the first and is linear but for VS, which is
+searched (its F-test is approximate: VS means nothing where FST = 0). Residuals are correlated:
+deviations take blocks of time as independent, and the F-test and Akaike's criterion count N/T
+samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that
+did not fit it. X is held: this says what form friction has, not what the other parameters would be
+with it.
 
 References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon,
-Gautier and Garrec (2010) for friction that
-grows with the load.
+Gautier and Garrec (2010) for friction that grows with the load.
 """
 
 from __future__ import annotations
@@ -45,9 +42,8 @@ from runtime.identification.friction_laws import (
     held_out_error,
     joined,
     law_torque,
-    p_value,
 )
-from runtime.identification.residuals import correlation_time, residual_correlation
+from runtime.identification.residuals import correlation_time, p_value, residual_correlation
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels, require
@@ -158,11 +154,7 @@ class FrictionCurve:
             return ""
         if excess > 0:
             return "friction is larger at standstill than in slow motion: the Stribeck effect"
-        return (
-            "FST is negative: friction falls towards standstill, there is no Stribeck peak; "
-            "the "
-            "term bends the curve of viscous friction"
-        )
+        return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
 
     def summary(self) -> dict[str, Any]:
         """For JSON."""
@@ -233,16 +225,18 @@ def own_friction(model: GeneratedModel, j: int) -> list[int]:
     """
     physical = physical_model(model)
     elements = elements_of(model)
-    own = [name in elements and elements[name][0] in OWN for name in physical.standard]
+    of_curve = [name in elements and elements[name][0] in OWN for name in physical.standard]
+    others = ~np.array(of_curve)
     structure = np.asarray(model.STRUCTURE)
     alone = structure[:, j] & (structure.sum(axis=1) == 1)
-    return [int(k) for k in np.flatnonzero(alone) if not physical.K[k][~np.array(own)].any()]
+    return [int(k) for k in np.flatnonzero(alone) if not physical.K[k][others].any()]
 
 
-def _terms(model: GeneratedModel, own: Prepared, fit: Estimate, number: int) -> list[Terms]:
+def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) -> list[Terms]:
     """Terms of every joint of one record."""
-    selection, observation = own.certain(model), own.observation(model)
-    window = own.states[selection.samples]
+    selection = record.certain(model)
+    observation = record.observation(model)
+    window = record.states[selection.samples]
     X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
     block = observation.blocks()
     alone = [own_friction(model, j) for j in range(observation.n)]
@@ -265,7 +259,8 @@ def _terms(model: GeneratedModel, own: Prepared, fit: Estimate, number: int) -> 
     for j in range(observation.n):
         rest = X.copy()
         rest[alone[j]] = 0.0
-        rows, v = observation.joint(j), window.qd[:, j]
+        rows = observation.joint(j)
+        v = window.qd[:, j]
         s = np.sign(v)
         signals = {
             "FS": s,
@@ -282,12 +277,12 @@ def _terms(model: GeneratedModel, own: Prepared, fit: Estimate, number: int) -> 
             return at_rows(np.sign(v) * np.exp(-((v / np.asarray(VS)[..., None]) ** 2)), j)
 
         linear = {name: at_rows(signal, j) for name, signal in signals.items()}
-        own_block = block[rows] + (number << 32)
+        of_record = block[rows] + (number << 32)
         terms.append(
             Terms(
                 observation.Y[rows] - observation.W[rows] @ rest,
                 linear["FV"],
-                own_block,
+                of_record,
                 linear,
                 excess,
             )

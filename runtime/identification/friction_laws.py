@@ -1,5 +1,6 @@
-"""Laws of friction as terms of a least-squares fit, and how well each predicts rows that did not
-fit it.
+"""Laws of friction as terms of a least-squares fit.
+
+How well each predicts is asked of rows that did not fit it.
 
 Laws, signs and references: `runtime.identification.friction`.
 """
@@ -13,7 +14,6 @@ from typing import cast
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import f as fisher
 
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.linear import percent
@@ -93,7 +93,8 @@ def _columns(terms: Terms, names: Sequence[str], VS: float | None) -> Array:
 
 def fitted(terms: Terms, names: Sequence[str], rows: Array) -> dict[str, float]:
     """Least squares of a law on some rows; VS by a search on a logarithmic axis."""
-    f, VS = terms.f[rows], _excess_velocity(terms, names, rows) if "VS" in names else None
+    f = terms.f[rows]
+    VS = _excess_velocity(terms, names, rows) if "VS" in names else None
     x = np.linalg.lstsq(_columns(terms, names, VS)[rows], f, rcond=None)[0]
     law = dict(zip((name for name in names if name != "VS"), map(float, x), strict=True))
     return law if VS is None else {**law, "VS": VS}
@@ -161,15 +162,3 @@ def deviations(terms: Terms, law: Mapping[str, float], residual: Array) -> dict[
             strict=True,
         )
     )
-
-
-def p_value(
-    squares_first: float, squares: float, terms_first: int, terms: int, count: float
-) -> float:
-    """Of the F-test of a law against the first one, from their squared residuals, numbers of terms,
-    and independent samples.
-    """
-    if terms == terms_first or squares <= 0 or count <= terms:
-        return 1.0
-    F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
-    return float(fisher.sf(F, terms - terms_first, count - terms))

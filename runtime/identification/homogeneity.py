@@ -22,9 +22,10 @@ The second, the statistic of analysis of variance, takes from the blocks the siz
 alone and their shape from the rows. Hotelling's d' S^-1 d inverts S, which some 100 unequal blocks
 tell too badly: it rejects 9 % of right pairs at AR(0.99) for 2.5 %, this one 1 %. That is why the
 test of single parameters has half of the level, and the one in all the whole.
+
 Records that differ say that the robot changed (load, temperature, wear), that something in one
-record is wrong, or that the model leaves out what their motions do
-not share: the stated deviations know nothing of model error.
+record is wrong, or that the model leaves out what their motions do not share: the stated deviations
+know nothing of model error.
 
 References: Box (1954) and Brunner, Dette and Munk (1997) for the test in all; Cochrane and Orcutt
 (1949) for whitened rows; Holm (1979).
@@ -42,10 +43,9 @@ from scipy.stats import t as student
 from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.estimate import Estimate
-from runtime.estimators.method import linear_companion
+from runtime.estimators.method import linear_companion, linear_estimate
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import SHORTEST, Observation, split_rows
 from runtime.settings.study import EstimateSettings
@@ -131,19 +131,16 @@ class Homogeneity(Result, keys="records parameters p agree disagreements unteste
                 f"The records {names} agree within their stated deviations (p {self.p:.2g} for "
                 f"{len(self.parameters)} parameters).{left_out}"
             )
-        told: dict[str, list[str]] = {}
-        for one in self.disagreements:
-            told.setdefault(one.record, []).append(
-                f"{one.parameter} ({one.value:.3g}, elsewhere {one.others:.3g}, {abs(one.z):.1f} "
-                "deviations)"
-            )
+        differences: dict[str, list[str]] = {}
+        for d in self.disagreements:
+            text = f"{d.parameter} ({d.value:.3g}, elsewhere {d.others:.3g}, {abs(d.z):.1f} deviations)"
+            differences.setdefault(d.record, []).append(text)
         where = "; ".join(
-            f"{record}: {', '.join(own[:4])}{' ...' if len(own) > 4 else ''}"
-            for record, own in told.items()
+            f"{record}: {', '.join(texts[:4])}{' ...' if len(texts) > 4 else ''}"
+            for record, texts in differences.items()
         )
         return (
-            f"The records {names} do NOT agree within their stated deviations (p "
-            f"{self.p:.1g}). "
+            f"The records {names} do NOT agree within their stated deviations (p {self.p:.1g}). "
             f"{where or 'No single parameter stands out'}.{left_out}"
         )
 
@@ -192,9 +189,9 @@ def homogeneity(
     fits: dict[str, list[Array]] = {}
     untested = []
     for record, part in parts.items():
-        own = EstimateSettings(linear.method, linear.weights, tuple(names), linear.options)
+        alike = EstimateSettings(linear.method, linear.weights, tuple(names), linear.options)
         try:
-            fit = estimate_of(part, own, model=model)
+            fit = linear_estimate(part, alike, model=model)
         except InputError as e:
             untested.append(f"{record}, {e}")
             continue

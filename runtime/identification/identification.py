@@ -22,7 +22,7 @@ from runtime.identification.elastic import elasticity
 from runtime.identification.fits import agreement, fitted, validated
 from runtime.identification.friction import friction_curves
 from runtime.identification.laws import FittedLaws, fit_laws
-from runtime.identification.payload_study import payload_study
+from runtime.identification.payload_study import PayloadStudy, payload_study
 from runtime.identification.result import Identification
 from runtime.identification.torque_law import completed, gain_doubt
 from runtime.identification.transmitted import transmitted
@@ -173,9 +173,7 @@ def identify(
     result = result if statement else _with_elasticity(result)
     return replace(
         result,
-        payload=None
-        if study.payload is None
-        else payload_study(model, measured, study, provenance=origin(records)),
+        payload=_payload(model, measured, study, records),
         feasibility=feasibility_of(result) if physical else None,
         friction=friction_curves(model, measured, study, result.estimate) if friction else (),
         plausibility=plausibility(model, measured, asked_study, variants=variants)
@@ -204,6 +202,17 @@ def _with_laws(
     laws = fit_laws(model, loaded, columns, weights=weighted)
     model = cast(GeneratedModel, BoundModel(model, laws.constants))
     return model, laws, *transmitted(model, loaded, others, weighted)
+
+
+def _payload(
+    model: GeneratedModel, measured: Measured, study: Study, records: Sequence[Record]
+) -> PayloadStudy | None:
+    """The load of study.payload; None where it names none."""
+    if study.payload is None:
+        return None
+    missing_too = study.signals.admits_missing
+    loaded = read_records(study.payload.record, model, missing=missing_too)
+    return payload_study(model, measured, loaded, study, provenance=origin(records))
 
 
 def _with_findings(observation: Observation, *sentences: str) -> Observation:

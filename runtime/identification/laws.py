@@ -16,8 +16,7 @@ import numpy as np
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.linear import percent
 from runtime.estimators.projection import LawProblem, Projection, basis
-from runtime.identification.friction_laws import p_value
-from runtime.identification.residuals import correlation_time, residual_correlation
+from runtime.identification.residuals import correlation_time, p_value, residual_correlation
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import split_rows

@@ -3,12 +3,11 @@ known or unknown.
 
     [Y_a; Y_b - W_Lk chi_Lk] = [[W_a, 0], [W_b, W_Lu]] [X; chi_Lu]        W_L = W K_L
 
-a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L
-are XX ... M of the load alone at the frame of
-that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it. Known ones (a weighed M)
-move to the left. A parameter of the load is reported
-only if it has an effect; its deviation says whether the motion excites it. Where friction changes
-with the load, rows b have friction columns of their own.
+a without, b with the load; K_L the ten columns of K = dX/dchi of the link that carries it, so chi_L are XX ... M of the load
+alone at the frame of that link, or with K_L A (`runtime.model.mount`) at a frame fixed to it.
+Known ones (a weighed M) move to the left. A parameter of the load is reported only if it has an
+effect; its deviation says whether the motion excites it. Where friction changes with the load, rows
+b have friction columns of their own.
 
 Reference: Khalil, Gautier and Lemoine (2007), identification of the payload inertial parameters of
 industrial manipulators.
@@ -24,8 +23,8 @@ import numpy as np
 
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.method import linear_estimate
 from runtime.json_documents import Result
-from runtime.loop.methods import estimate_of
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
@@ -160,7 +159,7 @@ def payload(
         return replace(rows, W=np.asfortranarray(np.hstack([rows.W, of_load])), Y=Y, names=names)
 
     both = stack([extended(stack(without), 0.0), extended(stack(loaded), 1.0)])
-    fit = estimate_of(both, method, model=model, provenance=provenance)
+    fit = linear_estimate(both, method, model=model, provenance=provenance)
     units = {**fit.units, **{f"{family}{LOAD}": _unit(family) for family in load.unknown}}
     units |= {
         model.BASE_PARAMETERS[k] + LOAD: fit.units.get(model.BASE_PARAMETERS[k], "")

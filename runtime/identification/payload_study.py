@@ -1,5 +1,6 @@
-"""The load of a study: its parameters, and the torque constants of the drives that carry it
-(`runtime.identification.payload`, `runtime.identification.drive_gains`).
+"""The load of a study: its parameters, and the torque constants of the drives that carry it.
+
+`runtime.identification.payload`, `runtime.identification.drive_gains`.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from runtime.identification.drive_gains import DriveGains, drive_gains, scaled
 from runtime.identification.payload import Payload, payload
 from runtime.json_documents import Result
 from runtime.model.generated import GeneratedModel, require_no_channels
-from runtime.records.reading import read_records
 from runtime.records.record import Record
-from runtime.rows.prepared import Prepared, prepared, resolved
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import Prepared, prepared
 from runtime.settings.study import Study
 from runtime.table import in_lines, with_intervals
 
@@ -62,19 +63,21 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
 def payload_study(
     model: GeneratedModel,
     without: Sequence[Record | Prepared],
+    loaded: Sequence[Record | Prepared],
     study: Study,
     *,
-    loaded: Sequence[Record | Prepared] | None = None,
     provenance: Mapping[str, Any] | None = None,
 ) -> PayloadStudy:
     """The load of study.payload, by ols, or by wls where the study has weights.
 
     Parameters
     ----------
-    without : sequence of Record or Prepared
-        Joint side, without the load.
-    loaded : sequence of Record or Prepared, optional
-        Joint side, with the load; default: those of study.payload.record, read from their files.
+    without, loaded : sequence of Record or Prepared
+        Joint side, without and with the load.
+    study : Study
+        Signals, rows, and the load in study.payload.
+    provenance : mapping, optional
+        Further entries of the provenance of the estimate.
 
     Raises
     ------
@@ -82,8 +85,6 @@ def payload_study(
         No record with the load, or columns left out.
     """
     settings = study.payload
-    if settings is not None and loaded is None:
-        loaded = read_records(settings.record, model, missing=study.signals.admits_missing)
     if settings is None or not loaded:
         raise SettingsError(
             "no record with the load; name it in payload.record", path=("payload", "record")
@@ -95,16 +96,19 @@ def payload_study(
             path=("estimate", "columns"),
         )
     require_no_channels(model, "the study of a load")
-    study, _ = resolved(study, [*without, *loaded])
-    without, loaded = (
-        [prepared(model, record, study) for record in records] for records in (without, loaded)
-    )
-    gains = drive_gains(model, without, loaded, study, settings) if settings.gains else None
-    empty, full = (
-        [own.observation(model) if gains is None else scaled(model, own, gains) for own in records]
-        for records in (without, loaded)
-    )
-    joint = payload(model, empty, full, settings, method, provenance=provenance)
+    empty = [prepared(model, record, study) for record in without]
+    full = [prepared(model, record, study) for record in loaded]
+    gains = None
+    if settings.gains:
+        gains = drive_gains(model, empty, full, study, settings)
+    rows = [_rows(model, record, gains) for record in empty]
+    loaded_rows = [_rows(model, record, gains) for record in full]
+    load = payload(model, rows, loaded_rows, settings, method, provenance=provenance)
     if gains is not None:
-        joint = replace(joint, sigma=np.fmax(joint.sigma, gains.sigma_load))
-    return PayloadStudy(joint, gains)
+        load = replace(load, sigma=np.fmax(load.sigma, gains.sigma_load))
+    return PayloadStudy(load, gains)
+
+
+def _rows(model: GeneratedModel, record: Prepared, gains: DriveGains | None) -> Observation:
+    """Rows of a record, with the torques of every motor times its factor where it is sought."""
+    return record.observation(model) if gains is None else scaled(model, record, gains)

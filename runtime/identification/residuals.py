@@ -22,6 +22,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import welch
 from scipy.special import chdtrc
+from scipy.stats import f as fisher
 
 from runtime.identification.validation import JointComparison
 from runtime.limits import LIMIT
@@ -158,3 +159,13 @@ def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
         spectrum = np.abs(rfft(grid, length := next_fast_len(2 * grid.shape[1], real=True))) ** 2
         sums[:, : grid.shape[1]] += irfft(spectrum, length)[:, : grid.shape[1]]
     return sums[0], np.rint(sums[1])
+
+
+def p_value(
+    squares_first: float, squares: float, terms_first: int, terms: int, count: float
+) -> float:
+    """Of the F-test of a model of more terms against the first one, from their squared residuals, numbers of terms, and independent samples."""
+    if terms == terms_first or squares <= 0 or count <= terms:
+        return 1.0
+    F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
+    return float(fisher.sf(F, terms - terms_first, count - terms))

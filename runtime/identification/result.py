@@ -54,7 +54,7 @@ from runtime.rows.observation import Observation
 from runtime.rows.prepared import Prepared, record_of
 from runtime.rows.selection import unused_joints
 from runtime.settings.study import Study
-from runtime.signals.encoder_advice import encoder_sentences
+from runtime.signals.encoder_advice import acceleration_error, encoder_sentences
 from runtime.table import IN_LINE, Table, in_lines, notebook, with_intervals
 
 if TYPE_CHECKING:
@@ -299,8 +299,17 @@ class Identification:
         """`expected_error`, and the interval in which it is likely, %."""
         if not (self.determined and self.usable):
             return Expected(*3 * (float("nan") if self.determined else LIMIT.LARGEST_EXPECTED,))
+        by_lowpass = [r for r in self.prepared if r.study.signals.reader == "lowpass"]
+        steps = [
+            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
+        ]
         return expected_error(
-            self.model, self.observation, self.study.estimate, self.model_estimate, self.prepared
+            self.model,
+            self.observation,
+            self.study.estimate,
+            self.model_estimate,
+            self.prepared,
+            max(steps, default=0.0),
         )
 
     @cached_property

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime.estimators.estimate import Estimate
+from runtime.estimators.method import linear_estimate
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.records.law import late, torque_law
 from runtime.records.record import Record
@@ -66,79 +66,79 @@ def completed(
     fitted: Sequence[Prepared],
     further: Sequence[Record],
 ) -> tuple[tuple[Prepared, ...], list[Record], LawEstimate | None]:
-    """The records with the torque of the completed law, and what was found; as they are where
-    nothing is to be.
-    """
+    """The records with the torque of the completed law, and its estimate; as they are where nothing is to be found."""
     laws = [r.controller.law for r in study.record if r.by_law and r.controller is not None]
     asked = [law for law in laws if "fit" in (law.kd, law.delay)]
     if not asked:
         return tuple(fitted), list(further), None
     settings = next(r.controller for r in study.record if r.by_law and r.controller is not None)
     saturation = torque_law(settings, fitted[0].record.n, model.LIMITS).saturation
-    found = law_estimate(model, fitted, study, asked[0], saturation)
-    bound = np.where(np.isfinite(found.kd) | (asked[0].kd != "fit"), saturation, np.inf)
+    estimate = law_estimate(model, fitted, study, asked[0], saturation)
+    bound = np.where(np.isfinite(estimate.kd) | (asked[0].kd != "fit"), saturation, np.inf)
 
-    def whole(record: Record) -> Record:
-        others = {key: x for key, x in record.channels.items() if key != "law_v"}
-        tau = torque_of(record, np.nan_to_num(found.kd), found.delay, bound)
-        return replace(record, tau=tau, channels=others)
+    def with_torque(record: Record) -> Record:
+        channels = {key: x for key, x in record.channels.items() if key != "law_v"}
+        tau = torque_of(record, np.nan_to_num(estimate.kd), estimate.delay, bound)
+        return replace(record, tau=tau, channels=channels)
 
-    changed = tuple(replace(one, record=whole(one.record)) for one in fitted)
-    return changed, [whole(one) for one in further], found
+    changed = tuple(replace(prepared, record=with_torque(prepared.record)) for prepared in fitted)
+    return changed, [with_torque(record) for record in further], estimate
 
 
 def gain_doubt(
     model: GeneratedModel, study: Study, records: Sequence[Prepared], error: float
 ) -> str:
-    """Whether another kd than the stated one explains the records, a sentence; "" where it does
-    not, or they hold none. error : of the stated one, %.
+    """Whether another kd than the stated one explains the records, a sentence; "" where it does not.
+
+    error : float, %
+        Of the stated kd.
     """
-    own = [one for one in records if "law_v" in one.record.channels]
+    by_law = [prepared for prepared in records if "law_v" in prepared.record.channels]
     laws = [r.controller.law for r in study.record if r.controller is not None]
-    if error < LIMIT.LAW_DOUBT or len(own) < len(records) or not laws or laws[0].kd == "fit":
+    if error < LIMIT.LAW_DOUBT or len(by_law) < len(records) or not laws or laws[0].kd == "fit":
         return ""
-    uncut = np.full(own[0].record.n, np.inf)
-    found = law_estimate(model, own, study, Law(kp=laws[0].kp, kd="fit"), uncut)
-    if not found.error < error / 2:
+    n = by_law[0].record.n
+    uncut = np.full(n, np.inf)
+    estimate = law_estimate(model, by_law, study, Law(kp=laws[0].kp, kd="fit"), uncut)
+    if not estimate.error < error / 2:
         return ""
-    stated = laws[0].gains(own[0].record.n)["Vm"]
+    stated = laws[0].gains(n)["Vm"]
     each = ", ".join(
         f"{x + dx:.4g} in place of {x:g} of joint {j}"
-        for j, x, dx in zip(found.joints, stated, found.kd, strict=True)
+        for j, x, dx in zip(estimate.joints, stated, estimate.kd, strict=True)
         if np.isfinite(dx)
     )
     return (
-        f"With kd {each} the law leaves {found.error:.1f} % unexplained in place of {error:.1f} %: "
+        f"With kd {each} the law leaves {estimate.error:.1f} % unexplained in place of {error:.1f} %: "
         "are the gains in other units, or of the motor side?"
     )
 
 
 def law_estimate(
-    model: GeneratedModel, own: Sequence[Prepared], study: Study, law: Law, saturation: Array
+    model: GeneratedModel, records: Sequence[Prepared], study: Study, law: Law, saturation: Array
 ) -> LawEstimate:
     """kd of every joint and the delay, as far as `law` asks for them.
 
     saturation : ndarray, shape (n,), N m or N
         Largest torque of the drives; inf where they do not cut.
     """
-    n = own[0].record.n
+    n = records[0].record.n
     labels = joint_labels(model)
-    rows = observe(model, own, study)
-    records = TorquesOfLaw(model, own, rows, saturation)
+    torques = TorquesOfLaw(model, records, observe(model, records, study), saturation)
     asked = [f"KD{j}" for j in labels] if law.kd == "fit" else []
     cuts = bool(asked) and bool(np.isfinite(saturation).any())
     starts = LIMIT.LAW_STARTS if cuts else (0.0,)
     stiffness = law.gains(n)["P"]
-    found = [_searched(records, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
-    kd, delay, _ = min(found, key=lambda each: each[2])
-    fit = records.fit(asked, law.delay == "fit", kd, delay)
+    ends = [_searched(torques, asked, law.delay == "fit", s * stiffness, cuts) for s in starts]
+    kd, delay, _ = min(ends, key=lambda end: end[2])
+    fit = torques.fit(asked, law.delay == "fit", kd, delay)
     gains = [name for name in asked if name in fit.names and _apart(fit, name)]
     if len(gains) < len(asked):  # FV is the sum of both: without a cut the share of kd is zero
         lost = np.array([f"KD{j}" not in gains for j in labels])
-        records = replace(records, saturation=np.where(lost, np.inf, saturation))
+        torques = replace(torques, saturation=np.where(lost, np.inf, saturation))
         start = np.where(lost, 0.0, kd)
-        kd, delay, _ = _searched(records, gains, law.delay == "fit", start, cuts)
-        fit = records.fit(gains, law.delay == "fit", kd, delay)
+        kd, delay, _ = _searched(torques, gains, law.delay == "fit", start, cuts)
+        fit = torques.fit(gains, law.delay == "fit", kd, delay)
     sigma = dict(zip(fit.names, np.fmax(fit.sigma, fit.sigma_corrected), strict=True))
     sigmas = np.array([sigma.get(f"KD{j}", np.nan) for j in labels])
     kd = np.where(np.isfinite(sigmas), kd, np.nan)
@@ -148,14 +148,14 @@ def law_estimate(
 
 
 def _searched(
-    records: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
+    torques: TorquesOfLaw, gains: Sequence[str], late_too: bool, kd: Array, cuts: bool
 ) -> tuple[Array, float, float]:
     """kd, the delay and the misfit where passes from `kd` end. cuts : the law is not linear in kd."""
-    labels = [f"KD{j}" for j in joint_labels(records.model)]
+    labels = [f"KD{j}" for j in joint_labels(torques.model)]
     delay = 0.0
-    misfit = records.misfit(kd, delay) if cuts else np.nan
+    misfit = torques.misfit(kd, delay) if cuts else np.nan
     for _ in range(LIMIT.LAW_CUT_PASSES if cuts else LIMIT.LAW_PASSES):
-        fit = records.fit(gains, late_too, kd, delay)
+        fit = torques.fit(gains, late_too, kd, delay)
         step = {name: x for name, x in zip(fit.names, fit.X, strict=True) if np.isfinite(x)}
         by_kd = np.array([step.get(name, 0.0) for name in labels])
         by_delay = step.get("delay", 0.0)
@@ -164,10 +164,10 @@ def _searched(
             delay = delay + by_delay
             continue
         share = 1.0
-        after = records.misfit(kd + by_kd, delay + by_delay)
+        after = torques.misfit(kd + by_kd, delay + by_delay)
         while after > misfit and share > LIMIT.LAW_LEAST_STEP:
             share /= 2
-            after = records.misfit(kd + share * by_kd, delay + share * by_delay)
+            after = torques.misfit(kd + share * by_kd, delay + share * by_delay)
         if not after < misfit:
             break
         kd = kd + share * by_kd
@@ -183,7 +183,7 @@ class TorquesOfLaw:
     Attributes
     ----------
     model : GeneratedModel
-    own : sequence of Prepared
+    records : sequence of Prepared
         With the torque of the law without kd, and the channel law_v.
     rows : Observation
         W of these records.
@@ -192,46 +192,50 @@ class TorquesOfLaw:
     """
 
     model: GeneratedModel
-    own: Sequence[Prepared]
+    records: Sequence[Prepared]
     rows: Observation
     saturation: Array
 
     def torques(self, kd: Array, delay: float) -> list[Array]:
         """Torques of the records with these gains, shape (N, n) each."""
-        return [torque_of(one.record, kd, delay, self.saturation) for one in self.own]
+        records = [prepared.record for prepared in self.records]
+        return [torque_of(record, kd, delay, self.saturation) for record in records]
 
     def slopes(self, kd: Array, delay: float) -> list[Array]:
         """Derivatives of the torques by kd: v where the drives do not cut."""
-        found = []
-        for one in self.own:
-            v = one.record.channels["law_v"]
-            cut = np.abs(one.record.tau + kd * v) > self.saturation
-            found.append(late(one.record.t, np.where(cut, 0.0, v), delay))
-        return found
+        slopes = []
+        for prepared in self.records:
+            record = prepared.record
+            v = record.channels["law_v"]
+            cut = np.abs(record.tau + kd * v) > self.saturation
+            slopes.append(late(record.t, np.where(cut, 0.0, v), delay))
+        return slopes
 
     def fit(self, gains: Sequence[str], late_too: bool, kd: Array, delay: float) -> Estimate:
         """X beside the steps of kd and of the delay."""
         torques = self.torques(kd, delay)
-        Y = with_torques(self.rows, self.own, torques)
+        Y = with_torques(self.rows, self.records, torques)
         columns: dict[str, Array] = {}
         if gains:
-            V = with_torques(self.rows, self.own, self.slopes(kd, delay)).Y
+            V = with_torques(self.rows, self.records, self.slopes(kd, delay)).Y
             labels = [f"KD{j}" for j in joint_labels(self.model)]
             columns = {k: -V * (self.rows.joints == labels.index(k)) for k in gains}
         if late_too:
-            records = [one.record for one in self.own]
+            records = [prepared.record for prepared in self.records]
             rates = [
                 np.gradient(x, 1 / r.rate, axis=0) for x, r in zip(torques, records, strict=True)
             ]
-            columns["delay"] = with_torques(self.rows, self.own, rates).Y
+            columns["delay"] = with_torques(self.rows, self.records, rates).Y
         W = np.column_stack([self.rows.W, *columns.values()])
         wide = replace(Y, W=W, names=(*self.rows.names, *columns))
-        return estimate_of(wide, EstimateSettings("wls", "joint"), model=self.model)
+        return linear_estimate(wide, EstimateSettings("wls", "joint"), model=self.model)
 
     def misfit(self, kd: Array, delay: float) -> float:
         """sum_j N_j log ||Y_j - W_j X||, X by least squares weighted by joint."""
         fit = self.fit((), False, kd, delay)
-        return float(sum(one.rows * np.log(one.residual_norm) for one in fit.per_joint if one.rows))
+        return float(
+            sum(joint.rows * np.log(joint.residual_norm) for joint in fit.per_joint if joint.rows)
+        )
 
 
 def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Array:

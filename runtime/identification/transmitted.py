@@ -43,12 +43,14 @@ def transmitted(
     InputError
         A torque that does not settle.
     """
-    read = {c: own for c, own in channels_of(model).items() if c.startswith(TRANSMITTED)}
+    channels = channels_of(model)
+    read = {c: names for c, names in channels.items() if c.startswith(TRANSMITTED)}
     if not read:
         return tuple(fitted), list(further), ""
-    names = ", ".join(sorted({name for own in read.values() for name in own}))
+    names = ", ".join(sorted({name for laws in read.values() for name in laws}))
     torque = _Torque(model, read)
-    X, records = np.zeros(len(model.BASE_PARAMETERS)), [torque.given(r, None) for r in fitted]
+    X = np.zeros(len(model.BASE_PARAMETERS))
+    records = [torque.given(r, None) for r in fitted]
     before = np.zeros(0)
     for k in range(PASSES):
         X = _solved([r.observation(model) for r in records], weights)
@@ -62,13 +64,17 @@ def transmitted(
             f"{names}: the torque of the model does not settle in {PASSES} passes; is the friction "
             "larger than the torque that causes it?"
         )
-    told = (
+    text = (
         f"{names}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, "
         f"not the measured one; it settled in {k + 1} passes."
     )
-    study, drives = records[0].study, records[0].drives
-    seen = [torque.given(replace(prepared(model, r, study), drives=drives), X) for r in further]
-    return tuple(records), [one.record for one in seen], told
+    study = records[0].study
+    drives = records[0].drives
+    unseen = []
+    for record in further:
+        others = replace(prepared(model, record, study), drives=drives)
+        unseen.append(torque.given(others, X).record)
+    return tuple(records), unseen, text
 
 
 def _solved(observations: Sequence[Observation], weights: bool) -> Array:
@@ -91,21 +97,23 @@ class _Torque:
     """The torque of the columns that do not read it; `read` : {channel: parameters that do}."""
 
     def __init__(self, model: GeneratedModel, read: dict[str, tuple[str, ...]]) -> None:
-        self.model, self.read = model, read
-        own = {name for names in read.values() for name in names}
-        self.rest = [k for k, name in enumerate(model.BASE_PARAMETERS) if name not in own]
+        self.model = model
+        self.read = read
+        laws = {name for names in read.values() for name in names}
+        self.rest = [k for k, name in enumerate(model.BASE_PARAMETERS) if name not in laws]
         self.place = {c: model.JOINTS.index(int(c.removeprefix(TRANSMITTED))) for c in read}
 
-    def given(self, one: Prepared, X: Array | None) -> Prepared:
+    def given(self, record: Prepared, X: Array | None) -> Prepared:
         """The record with tau_m of X; 0 for None."""
-        tau = np.zeros((len(one.record), len(self.model.JOINTS)))
+        tau = np.zeros((len(record.record), len(self.model.JOINTS)))
         if X is not None:
-            s = one.states
+            s = record.states
             timed = {c: s.channels[c] for c in channels_of(self.model) if c not in self.read}
             D = cast(Any, self.model).regressor(s.q, s.qd, s.qdd, **timed)
             tau = D[..., self.rest] @ X[self.rest]
-        channels = {**one.record.channels, **{c: tau[:, [k]] for c, k in self.place.items()}}
-        other = replace(one, record=replace(one.record, channels=channels))
-        states = replace(one.states, channels=other.channels)
-        vars(other).update(states=states, selection=one.selection, torque=one.torque)
-        return other
+        transmitted = {c: tau[:, [k]] for c, k in self.place.items()}
+        channels = {**record.record.channels, **transmitted}
+        changed = replace(record, record=replace(record.record, channels=channels))
+        states = replace(record.states, channels=changed.channels)
+        vars(changed).update(states=states, selection=record.selection, torque=record.torque)
+        return changed
