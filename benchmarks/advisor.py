@@ -34,8 +34,8 @@ from scipy.special import stdtrit  # noqa: E402
 import symgen  # noqa: E402
 from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.model.generated import drives_of  # noqa: E402
-from runtime.records.datasets import dataset_study  # noqa: E402
-from runtime.records.reading import read_records  # noqa: E402
+from runtime.reading.datasets import dataset_study  # noqa: E402
+from runtime.reading.records import read_records  # noqa: E402
 from runtime.resolution.advice import LIMITS, crossing  # noqa: E402
 from runtime.resolution.advisor import advise  # noqa: E402
 from runtime.resolution.cestac import cestac  # noqa: E402

@@ -46,8 +46,8 @@ from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.resolution.cestac import cestac, levels_of
 from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
 from runtime.resolution.run import one_run

@@ -40,8 +40,8 @@ from runtime import Record, Study, load_model, observe
 from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
 from runtime.model.generated import GeneratedModel
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.resolution.cestac import Cestac, cestac
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot

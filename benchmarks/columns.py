@@ -31,8 +31,8 @@ from runtime.estimators.projection import LawProblem
 from runtime.identification.laws import fit_laws, fitted_laws
 from runtime.identification.transmitted import transmitted
 from runtime.loop.methods import estimate_of
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from symgen.description.element import LawScalar

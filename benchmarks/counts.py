@@ -38,8 +38,8 @@ import symgen
 from runtime import InputError, load_model
 from runtime.estimators.essential import essential_of
 from runtime.loop.methods import estimate_of
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.resolution.coarse_encoders import READERS

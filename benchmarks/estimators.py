@@ -45,8 +45,8 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import results
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned

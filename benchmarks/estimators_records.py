@@ -32,8 +32,8 @@ from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
-from runtime.records.datasets import dataset_study, fetch
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.records import read_records
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned

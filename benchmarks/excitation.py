@@ -32,8 +32,8 @@ from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
-from runtime.records.named import study_of
-from runtime.records.reading import read_records
+from runtime.reading.names import study_of
+from runtime.reading.records import read_records
 from runtime.rows.observe import observe
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings

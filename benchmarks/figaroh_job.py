@@ -49,8 +49,8 @@ from runtime.estimators.estimate import Estimate
 from runtime.files import read_bytes
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, load_model
-from runtime.records.datasets import dataset_study, fetch
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.records import read_records
 from runtime.rows.observation import Observation
 from runtime.rows.observe import observe
 from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping

@@ -43,8 +43,8 @@ from runtime.compiled.model import compiled_model, target_of
 from runtime.estimators.essential import essential_of
 from runtime.files import read_bytes
 from runtime.model.generated import GeneratedModel
-from runtime.records.datasets import dataset_study, fetch
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.records import read_records
 from runtime.resolution.run import one_run
 from runtime.rows.observe import observe
 from runtime.settings.study import Study, study_from_mapping

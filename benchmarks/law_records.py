@@ -23,7 +23,7 @@ import symgen
 from runtime.identification.elastic import elasticity
 from runtime.identification.torque_law import law_estimate
 from runtime.loop.methods import estimate_of
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.rows.observation import Observation, stack
 from runtime.rows.prepared import prepared, resolved

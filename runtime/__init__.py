@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from runtime.model.generated import load_model
     from runtime.plausible.delay import delay
     from runtime.plausible.plausibility import plausibility
-    from runtime.records.reading import read_record
+    from runtime.reading.records import read_record
+    from runtime.reading.resampling import resample
     from runtime.records.record import Record
-    from runtime.records.resampling import resample
     from runtime.reporting.files import report
     from runtime.resolution.advice import Advice
     from runtime.resolution.advisor import advise
@@ -84,9 +84,9 @@ _MODULES = {
     "runtime.loop.simulation": ("simulate",),
     "runtime.rows.observation": ("Observation",),
     "runtime.rows.observe": ("observe",),
-    "runtime.records.reading": ("read_record",),
+    "runtime.reading.records": ("read_record",),
     "runtime.records.record": ("Record",),
-    "runtime.records.resampling": ("resample",),
+    "runtime.reading.resampling": ("resample",),
     "runtime.reporting.files": ("report",),
     "runtime.resolution.advice": ("Advice",),
     "runtime.resolution.advisor": ("advise",),

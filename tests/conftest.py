@@ -22,7 +22,7 @@ from hypothesis import settings
 
 from runtime.errors import DataUnavailableError
 from runtime.model.loading import KEY, cache_folder
-from runtime.records.datasets import DATASETS, fetch, locate
+from runtime.reading.datasets import DATASETS, fetch, locate
 
 # Expressions and syntax trees stay alive by the hundred thousand: looking at them again and again
 # costs a tenth of the time.

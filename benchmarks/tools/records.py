@@ -30,7 +30,7 @@ from scipy.signal import butter, sosfiltfilt
 import symgen
 from runtime.files import read_bytes
 from runtime.model.drives import Drives
-from runtime.records.datasets import fetch
+from runtime.reading.datasets import fetch
 from symgen.description import Robot, load_robot
 from symgen.description.files import write_robot
 

@@ -37,8 +37,8 @@ from runtime.plausible.motion import low_speed_of_rest
 from runtime.plausible.plausibility import plausibility
 from runtime.plausible.samples import samples_of
 from runtime.progress import at
+from runtime.reading.records import read_records
 from runtime.records.law import require_found
-from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.rows.observe import observe
 from runtime.settings.study import Study

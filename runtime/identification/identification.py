@@ -35,8 +35,8 @@ from runtime.model.generated import GeneratedModel, elements_of
 from runtime.model.inertia import physical_model
 from runtime.plausible.plausibility import plausibility
 from runtime.progress import at
+from runtime.reading.records import read_records
 from runtime.records.provenance import origin, record_names
-from runtime.records.reading import read_records
 from runtime.records.record import Record
 from runtime.resolution.advisor import advise
 from runtime.resolution.cestac import cestac

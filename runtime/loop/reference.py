@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.records.formats.table import open_table
+from runtime.reading.formats import read_table
 from runtime.records.record import Record
 from runtime.settings.controller import Controller, Points
 from runtime.settings.trajectories import motion_from_mapping
@@ -151,7 +151,7 @@ def _check_length(duration: float, rate: float, key: str) -> None:
 
 def read_reference(path: Path, rate: float, n: int) -> Reference:
     """Columns q1 ... qn and, where the file has them, qd1 ..., qdd1 ... of a file at `rate`, Hz."""
-    table = open_table(path)
+    table = read_table(path)
     names = {x: [f"{x}{j}" for j in range(1, n + 1)] for x in UNITS}
     if missing := [name for name in names["q"] if name not in table.names]:
         raise InputError(
@@ -159,7 +159,7 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
             file=path.name,
         )
     if "t" in table.names:
-        t = table.read([["t"]])[0][:, 0]
+        t = table.read(["t"])[:, 0]
         own = (len(t) - 1) / (t[-1] - t[0])
         if abs(own / rate - 1) > LIMIT.RATE_TOLERANCE:
             raise InputError(
@@ -169,10 +169,10 @@ def read_reference(path: Path, rate: float, n: int) -> Reference:
                 ),
                 file=path.name,
             )
-    plain = Reference.sampled(table.read([names["q"]])[0], rate)
+    plain = Reference.sampled(table.read(names["q"]), rate)
     if not all(name in table.names for name in (*names["qd"], *names["qdd"])):
         return plain
-    return Reference(rate, plain.q, *table.read([names["qd"], names["qdd"]]))
+    return Reference(rate, plain.q, table.read(names["qd"]), table.read(names["qdd"]))
 
 
 def of_record(record: Record, controller: Controller) -> Reference:

@@ -38,7 +38,7 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
 from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
 from runtime.model.generated import GeneratedModel, constants_of, require_no_channels
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study
 

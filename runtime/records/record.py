@@ -1,6 +1,6 @@
 """A measured record: time, joint positions and joint torques, joint side, SI, uniformly sampled.
 
-`runtime.records.reading` makes records of files; a record made of arrays is checked alike.
+`runtime.reading.records` makes records of files; a record made of arrays is checked alike.
 """
 
 from __future__ import annotations

@@ -25,9 +25,8 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.files import read_bytes
 from runtime.limits import LIMIT
-from runtime.records.formats.npz import archive_of
+from runtime.reading.numpy_files import archive_of
 from runtime.resolution.runs import Runs
 
 FOLDER = "runs"
@@ -184,7 +183,7 @@ def _json(path: Path) -> Mapping[str, Any]:
 def _read(path: Path, b: int) -> Runs:
     """The runs of one archive; pickled objects are refused."""
     try:
-        archive = archive_of(read_bytes(path), path.name)
+        archive = archive_of(path)
         runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
     except (InputError, KeyError) as e:
         reason = e.message if isinstance(e, InputError) else f"no array {e}"

@@ -54,7 +54,7 @@ def cestac(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.records.reading import read_records
+        from runtime.reading.records import read_records
         from runtime.resolution.checkpoint import Checkpoint
         from runtime.resolution.coarse_encoders import READERS
 

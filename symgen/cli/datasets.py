@@ -12,7 +12,7 @@ def datasets(json: options.Json = False) -> None:
     with session.reported_errors():
         from json import dumps
 
-        from runtime.records.datasets import listing
+        from runtime.reading.datasets import listing
 
         rows, lines = listing(), []
         for row in rows:

@@ -40,7 +40,7 @@ def report(
         import runtime
         from runtime.identification.identification import assess
         from runtime.json_documents import json_text
-        from runtime.records.reading import read_records
+        from runtime.reading.records import read_records
 
         model = session.model_of(robot, trust=trust, exact=exact, records=record)
         study = session.changed(session.study_of_arguments(record), cestac={"side": side})

@@ -138,7 +138,7 @@ def model_of(
     """
     import symgen
     from runtime.model.generated import load_model
-    from runtime.records.formats.table import is_measured
+    from runtime.reading.formats import is_measured
 
     if target not in ("numpy", "c"):
         fail(f"--target {target}; expected numpy or c")
@@ -237,8 +237,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     recorded : whether the study has to name a record.
     """
     from runtime.errors import InputError
-    from runtime.records.formats.table import is_measured
-    from runtime.records.named import study_of
+    from runtime.reading.formats import is_measured
+    from runtime.reading.names import study_of
     from runtime.settings.location import located
 
     study = located(*study_of(records[0]))
@@ -266,7 +266,7 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
 def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     """The study with what is likely to cure each refusal of its records, written to `path`."""
     from runtime.errors import InputError
-    from runtime.records.suggested import suggested
+    from runtime.reading.suggested import suggested
     from runtime.result_files import write_all
     from runtime.settings.location import study_text
 

@@ -23,7 +23,7 @@ import symgen
 from runtime import Cestac, Record, Study
 from runtime.errors import DataUnavailableError
 from runtime.loop.reference import point_to_point
-from runtime.records.datasets import dataset_study
+from runtime.reading.datasets import dataset_study
 from runtime.settings.controller import Points
 from runtime.settings.study import CestacSettings, study_from_mapping
 from symgen.demo import tx40_tables as chapter

@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from runtime.errors import InputError
-from runtime.records.datasets import DATASETS
-from runtime.records.formats.bags import stored_files
-from runtime.records.formats.table import BAG, KINDS, is_measured
-from runtime.records.named import study_of
+from runtime.reading.bags import stored_files
+from runtime.reading.datasets import DATASETS
+from runtime.reading.formats import BAG, endings, is_measured
+from runtime.reading.names import study_of
 from runtime.result_files import write_all
 from runtime.settings.files import study_from_text
 from runtime.settings.location import located, study_text
@@ -112,9 +112,11 @@ class WorkFolder:
         """A file that has arrived, called `name` by its owner, becomes the record or the
         validation; a record has a new study.
         """
-        ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*KINDS, ".gz"))
-        if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in KINDS:
-            raise InputError(f"{name[:80]}: expected a measured file: {', '.join(KINDS)}, or .gz")
+        ending = "".join(s for s in map(str.lower, Path(name).suffixes) if s in (*endings(), ".gz"))
+        if not name.lower().endswith(ending) or ending.removesuffix(".gz") not in endings():
+            raise InputError(
+                f"{name[:80]}: expected a measured file: {', '.join(endings())}, or .gz"
+            )
         if (old := self.measured(kind)) is not None:
             remove(old)
         part.replace(self.path / f"{kind}{ending}")

@@ -135,14 +135,14 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Names of the columns of a measured file, and of those asked for (`columns`, by commas) first
     rows and thinned lines; rate and gaps by the column `t`.
     """
-    from runtime.records.formats.table import open_table
-    from runtime.records.time_stamps import time_stamps
+    from runtime.reading.formats import read_table
+    from runtime.records.clock import time_stamps
 
-    opened = open_table(Path(path))
+    opened = read_table(Path(path))
     names = list(opened.names)[:NAMES_LISTED]
     asked = [n for n in request.get("columns", "").split(",") if n in names]
-    parts = list(opened.blocks([[name] for name in asked])) if asked else []
-    values = [np.concatenate([part[k] for part in parts])[:, 0] for k in range(len(asked))]
+    chosen = opened.chosen(asked)
+    values = [chosen.read([name])[:, 0] for name in asked]
     columns = dict(zip(asked, values, strict=True))
     N, t = len(values[0]) if values else 0, columns.get(request.get("t", ""))
     kept = np.unique(np.linspace(0, max(N - 1, 0), min(N, INSTANTS_DRAWN)).astype(int))
@@ -190,7 +190,7 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
     relative to its study.
     """
-    from runtime.records.reading import read_records
+    from runtime.reading.records import read_records
     from runtime.settings.location import located
 
     model = runtime.load_model(symgen.model(path))

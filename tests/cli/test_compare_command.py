@@ -11,7 +11,7 @@ from campaign import campaign
 from typer.testing import CliRunner
 
 import symgen
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 

@@ -4,7 +4,7 @@ import json
 
 from typer.testing import CliRunner
 
-from runtime.records.datasets import DATASETS
+from runtime.reading.datasets import DATASETS
 from symgen.cli.main import app
 
 

@@ -17,7 +17,7 @@ import symgen
 from runtime.errors import InputError
 from runtime.identification.payload_study import payload_study
 from runtime.model.generated import load_model
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from symgen.cli.main import app
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module

@@ -13,7 +13,7 @@ from runtime import load_model
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.identification.validation import record_errors
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app

@@ -16,6 +16,7 @@ class Format:
     """ending : of the file.   make : a case of a random generator.   read : the bytes, as the file called `case.ENDING` in an empty folder.
 
     share : of the cases of all formats.   named : texts of which an error holds one: the file, as the user knows it.
+    foreign : whether a compiled library reads it: that it hangs or dies on damage is nothing that Python could turn into a message (docs/reliability.md).
     """
 
     ending: str
@@ -23,6 +24,7 @@ class Format:
     read: Callable[[Path], object]
     share: int
     named: tuple[str, ...] = ("case",)
+    foreign: bool = False
 
 
 FAULTY = Format("txt", lambda rng: b"ok", reading.read_faulty, 0)
@@ -40,13 +42,15 @@ FORMATS: dict[str, Format] = {
     "csv.gz": Format("csv.gz", making.make_csv_gz, reading.read_record, 20),
     "npz": Format("npz", making.make_npz, reading.read_record, 60),
     "npy": Format("npy", archives.npy, reading.read_record, 30),
-    "mat": Format("mat", making.make_mat, reading.read_record, 50),
-    "mat73": Format("mat", making.make_mat73, reading.read_record, 30),
-    "parquet": Format("parquet", making.make_parquet, reading.read_record, 8),
-    "bag": Format("bag", partial(making.make_bag, "bag"), reading.read_record, 20),
-    "mcap": Format("mcap", partial(making.make_bag, "mcap"), reading.read_record, 20),
-    "db3": Format("db3", partial(making.make_bag, "db3"), reading.read_record, 15),
-    "ros2": Format("zip", making.make_ros2, reading.read_folder, 20, ("case", "run.")),
+    "mat": Format("mat", making.make_mat, reading.read_record, 50, foreign=True),
+    "mat73": Format("mat", making.make_mat73, reading.read_record, 30, foreign=True),
+    "parquet": Format("parquet", making.make_parquet, reading.read_record, 8, foreign=True),
+    "bag": Format("bag", partial(making.make_bag, "bag"), reading.read_record, 20, foreign=True),
+    "mcap": Format("mcap", partial(making.make_bag, "mcap"), reading.read_record, 20, foreign=True),
+    "db3": Format("db3", partial(making.make_bag, "db3"), reading.read_record, 15, foreign=True),
+    "ros2": Format(
+        "zip", making.make_ros2, reading.read_folder, 20, ("case", "run."), foreign=True
+    ),
     "model": Format("py", making.make_model, reading.read_model, 20),
     "checkpoint": Format(
         "npz", making.make_checkpoint, reading.read_checkpoint, 10, ("000000.npz",)

@@ -113,7 +113,7 @@ def serve(pipe, folder: Path) -> None:
         "h5py",
         "mujoco",
         "symgen.emit",
-        "runtime.records.reading",
+        "runtime.reading.records",
         "runtime.estimators.estimate",
         "runtime.model.generated",
     ):

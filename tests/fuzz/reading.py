@@ -72,7 +72,7 @@ def two_joints() -> object:
 
 
 def read_record(path: Path) -> object:
-    from runtime.records.reading import read_record as read
+    from runtime.reading.records import read_record as read
     from runtime.settings.study import RecordSettings
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))

@@ -211,7 +211,7 @@ def bag_tables() -> tuple[dict, ...]:
 
 @cache
 def study_tables() -> tuple[dict, ...]:
-    from runtime.records.datasets import dataset_study
+    from runtime.reading.datasets import dataset_study
     from runtime.settings.study import Study, study_from_mapping, to_mapping
 
     small = {

@@ -18,7 +18,7 @@ from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_file
 from runtime.errors import InputError
 from runtime.files import read_bytes
 from runtime.model.generated import load_model
-from runtime.records.reading import read_record
+from runtime.reading.records import read_record
 from runtime.settings.files import load_study
 from runtime.settings.study import RecordSettings
 from symgen.description import load_robot
@@ -327,13 +327,13 @@ def test_large_files(tmp_path):
         load_study(tmp_path / "large.yaml")
     with (tmp_path / "large.csv").open("wb") as file:
         file.truncate(10_000_000_000)
-    with pytest.raises(InputError, match="by blocks"):
+    with pytest.raises(InputError, match="cut it into shorter records"):
         read_bytes(tmp_path / "large.csv")
 
 
 @pytest.mark.parametrize("data", ["/dev/null", "/nonexistent", "/proc/self/mem", "\n", "a" * 5000])
 def test_symgen_data(monkeypatch, tmp_path, data):
-    from runtime.records.datasets import locate
+    from runtime.reading.datasets import locate
 
     monkeypatch.setenv("SYMGEN_DATA", data)
     assert locate("emps", "DATA_EMPS.mat", cache=tmp_path) is None

@@ -12,7 +12,7 @@ from campaign import campaign, some
 
 from runtime import read_record
 from runtime.errors import InputError
-from runtime.records.formats.table import open_table
+from runtime.reading.formats import read_table
 from runtime.settings.study import study_from_mapping
 
 N, RATE = 40, 200
@@ -203,7 +203,7 @@ def test_without_its_library(tmp_path, monkeypatch):
     path = bag(tmp_path)
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(InputError, match=r"pip install symgen\[bags\]"):
-        open_table(path)
+        read_table(path)
 
 
 def test_paths(tmp_path):

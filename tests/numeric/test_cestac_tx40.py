@@ -15,8 +15,8 @@ from runtime.estimators.essential import essential_of
 from runtime.identification.validation import split_validation
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.resolution.cestac import cestac
 from runtime.rows.observe import observe
 from runtime.settings.study import EstimateSettings, study_from_mapping

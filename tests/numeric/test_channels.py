@@ -17,7 +17,7 @@ import symgen
 from runtime.errors import InputError, ModelError
 from runtime.identification.transmitted import transmitted
 from runtime.model.generated import require
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from symgen.certify.modules import certified_files

@@ -21,8 +21,8 @@ from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulated_motion import judged, simulated_motion
 from runtime.loop.simulation import Simulator
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.rows.observe import observe
 from runtime.settings.controller import ReferenceSettings
 from runtime.settings.study import EstimateSettings, study_from_mapping

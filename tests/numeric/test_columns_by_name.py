@@ -9,7 +9,7 @@ import pytest
 from numeric.bag_files import joint_states, write_bag
 
 from runtime.errors import InputError
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.record import Columns, RecordSettings
 
 NAMES = ("elbow", "shoulder", "wrist")

@@ -22,8 +22,8 @@ from runtime.compiled.model import CompiledModel, compiled_model
 from runtime.errors import InputError
 from runtime.estimators.method import linear_system
 from runtime.model.drives import Drives
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.records.record import Origin, Record
 from runtime.resolution.cestac import cestac
 from runtime.resolution.coarse_encoders import CoarseEncoders

@@ -17,8 +17,8 @@ import symgen
 from runtime import load_model
 from runtime.errors import InputError, SettingsError
 from runtime.model.generated import drives_of
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.rows.observe import observe
 from runtime.rows.prepared import decimated_torque, observation_from_states, prepared

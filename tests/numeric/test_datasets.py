@@ -7,8 +7,8 @@ import pooch
 import pytest
 
 from runtime.errors import DataUnavailableError, InputError
-from runtime.records import datasets
-from runtime.records.datasets import DATASETS, Dataset, dataset_study, fetch, locate
+from runtime.reading import datasets
+from runtime.reading.datasets import DATASETS, Dataset, dataset_study, fetch, locate
 from runtime.settings.study import study_from_mapping
 
 CONTENT = b"q1,tau1\n1,2\n"

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from runtime import identify
 from runtime.identification.elastic import elasticity
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.rows.prepared import Prepared
 from runtime.settings.study import Lowpass, Signals, Study, study_from_mapping

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from runtime import load_model, observe
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.settings.study import study_from_mapping
 
 EMITTED = Path(__file__).parents[2] / "generated"

@@ -40,8 +40,8 @@ from runtime.identification.validation import split_validation
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot

@@ -20,8 +20,8 @@ from campaign import sampled
 
 from runtime import load_model, observe
 from runtime.estimators.essential import essential_of
-from runtime.records.datasets import dataset_study, fetch
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.records import read_records
 from runtime.settings.study import study_from_mapping
 
 FORMATS = (

@@ -15,8 +15,8 @@ from runtime.identification.friction import friction_curves, own_friction
 from runtime.identification.residuals import correlation_time, residual_correlation
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Page, render
 from runtime.reporting.sections import friction_section

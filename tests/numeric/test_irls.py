@@ -16,8 +16,8 @@ from runtime.estimators.estimate import Estimate
 from runtime.estimators.irls import slope, weight
 from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.rows.observe import observe
 from runtime.settings.study import EstimateSettings, study_from_mapping
 

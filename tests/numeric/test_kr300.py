@@ -14,7 +14,7 @@ import symgen
 from runtime.errors import InputError
 from runtime.identification.validation import prediction_errors
 from runtime.loop.methods import estimate_of
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 pytestmark = pytest.mark.skipif(

@@ -19,8 +19,8 @@ from runtime import load_model
 from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.model.generated import drives_of
+from runtime.reading.records import read_record
 from runtime.records.missing import Missing, bridged
-from runtime.records.reading import read_record
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.rows.observe import observe

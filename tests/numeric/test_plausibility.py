@@ -22,7 +22,7 @@ from runtime.model.inertia import physical_model
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
 from runtime.plausible.samples import Samples, excerpts, samples_of
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.study import Rows, Study, study_from_mapping
 from symgen.description.yaml import parse_robot
 

@@ -6,8 +6,8 @@ import pytest
 import runtime
 import symgen
 from runtime.estimators.semidefinite import Program
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.settings.study import EssentialSettings, study_from_mapping
 
 

@@ -16,7 +16,7 @@ import scipy.io
 from runtime import Record, read_record
 from runtime.errors import InputError, SettingsError
 from runtime.model.drives import Drives
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.records.record import Origin
 from runtime.settings.study import RecordSettings, study_from_mapping
 
@@ -123,7 +123,7 @@ def late(t):
             T + 0.5 * (np.arange(N) >= 30),
             None,
             (
-                "59 samples in 0.29 s, 1 pause aside, are 200 Hz, 1/median step is 200 Hz. Remedy: "
+                "59 samples in 0.29 s, pauses aside, are 200 Hz, 1/median step is 200 Hz. Remedy: "
                 "one "
                 "Record for each piece"
             ),
@@ -660,7 +660,7 @@ def test_no_time_and_no_rate(tmp_path):
 
 def test_wrong_number_of_joints(tmp_path):
     write_csv(tmp_path / "a.csv")
-    with pytest.raises(InputError, match="the robot has 3 joints"):
+    with pytest.raises(InputError, match="2 joints; arm has 3"):
         read_record(settings(files="a.csv"), robot(Drives(np.eye(3), 0.0, 1.0)), folder=tmp_path)
 
 

@@ -13,8 +13,8 @@ import pytest
 from runtime.errors import InputError, ModelError, SettingsError
 from runtime.limits import LIMIT
 from runtime.model.generated import load_model
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing, sampled

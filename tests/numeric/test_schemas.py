@@ -11,7 +11,7 @@ import pytest
 import runtime
 from runtime.estimators.estimate import Status
 from runtime.identification.schemas import json_schema
-from runtime.records.datasets import DATASETS, dataset_study
+from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.settings.study import Study, study_from_mapping, to_mapping
 
 ROOM = Path(runtime.__file__).parent

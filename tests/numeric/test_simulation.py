@@ -23,8 +23,8 @@ from runtime.loop.simulation import Simulator
 from runtime.loop.simulation import simulate as simulate_study
 from runtime.loop.stick_slip import friction_function
 from runtime.model.casadi import load_symbolic
-from runtime.records.datasets import dataset_study
-from runtime.records.reading import read_records
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.schema import structure
 from runtime.settings.study import study_from_mapping
@@ -327,7 +327,7 @@ def test_motor_encoder_saturation_and_seeds(tx40, truth):
 
 
 def test_record_and_csv_carry_the_reference(tx40, truth, tmp_path):
-    from runtime.records.reading import read_record
+    from runtime.reading.records import read_record
     from runtime.settings.study import RecordSettings
 
     settings = controller(record_every=5, reference={"points": {"duration": 0.4}})

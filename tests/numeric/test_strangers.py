@@ -15,7 +15,7 @@ import symgen
 from runtime.checks.check import Check
 from runtime.model.drives import Drives
 from runtime.plausible.causes import Robot, causes
-from runtime.records.likely_columns import likely_columns
+from runtime.reading.likely_columns import likely_columns
 from runtime.settings.units import torque_unit
 from symgen.cli.main import app
 from symgen.description.yaml import parse_robot
@@ -392,7 +392,7 @@ def test_names_that_tell_nothing_are_refused_as_before(tmp_path) -> None:
 
 def test_columns_that_carry_the_names_of_joints_are_suggested() -> None:
     """As ROS logs have them; in the order of the robot, whatever that of the file."""
-    from runtime.records.likely_columns import likely_columns
+    from runtime.reading.likely_columns import likely_columns
 
     joints = ("joint_1", "elbow", "joint_10")
     names = [f"{j}{end}" for end in ("_pos", "_effort") for j in ("elbow", "joint_10", "joint_1")]

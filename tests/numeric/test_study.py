@@ -10,8 +10,8 @@ import pytest
 
 from runtime.errors import InputError, SettingsError
 from runtime.loop.methods import METHODS
-from runtime.records.datasets import DATASETS, dataset_study
-from runtime.records.named import study_of
+from runtime.reading.datasets import DATASETS, dataset_study
+from runtime.reading.names import study_of
 from runtime.settings import gone
 from runtime.settings.arithmetic import number
 from runtime.settings.files import load_study, study_from_text

@@ -1,6 +1,4 @@
-"""Text files: numbers are parsed once, pieces of any size give the same bits, and errors name the
-line.
-"""
+"""Text files: numbers are parsed once, comments and ends of lines change no bit, and errors name the line."""
 
 from pathlib import Path
 
@@ -8,8 +6,7 @@ import numpy as np
 import pytest
 
 from runtime import InputError, read_record
-from runtime.records.formats import text
-from runtime.records.formats.columns import Source
+from runtime.reading.formats import read_table
 
 rng = np.random.default_rng(3)
 
@@ -35,50 +32,36 @@ def test_numbers_of_a_file_are_parsed_once(tmp_path, monkeypatch):
     assert len(calls) == 1
 
 
-def test_comments_and_pieces_give_the_same_bits(tmp_path, monkeypatch):
+def test_comments_give_the_same_bits(tmp_path):
     lines = sampled_lines()
     plain = read_record(written(tmp_path / "plain.csv", lines))
     by_lines = read_record(
         written(tmp_path / "commented.csv", [*lines[:7], "# a comment", "", *lines[7:]])
     )
-    monkeypatch.setattr(text, "PIECE", 1000)
-    long = read_record(tmp_path / "plain.csv")
-    for other in (by_lines, long):
-        assert other.q.tobytes() == plain.q.tobytes() and other.tau.tobytes() == plain.tau.tobytes()
+    assert by_lines.q.tobytes() == plain.q.tobytes()
+    assert by_lines.tau.tobytes() == plain.tau.tobytes()
 
 
 @pytest.mark.parametrize("end", ["\r\n", "\r"])
-def test_ends_of_lines(tmp_path, monkeypatch, end):
+def test_ends_of_lines(tmp_path, end):
     lines = sampled_lines()
     plain, other = read_record(written(tmp_path / "plain.csv", lines)), tmp_path / "other.csv"
     other.write_bytes(b"\xef\xbb\xbf" + (end.join(lines) + end).encode())
-    for piece in (text.PIECE, 1000, 7):
-        monkeypatch.setattr(text, "PIECE", piece)
-        record = read_record(other)
-        assert (
-            record.q.tobytes() == plain.q.tobytes() and record.tau.tobytes() == plain.tau.tobytes()
-        )
+    record = read_record(other)
+    assert record.q.tobytes() == plain.q.tobytes() and record.tau.tobytes() == plain.tau.tobytes()
 
 
-@pytest.mark.parametrize("comment", [None, 3, 300, 401])
-def test_files_are_read_in_pieces(tmp_path, monkeypatch, comment):
-    """No sample is lost or read twice, wherever reading begins."""
-    lines = sampled_lines()
-    expected = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
-    if comment:
-        lines.insert(comment, "# a comment")
-    monkeypatch.setattr(text, "PIECE", 500)
-    table = text.open_text(Source(written(tmp_path / "run.csv", lines)))
-    assert table.samples([["t"]]) == len(expected)
-    blocks = [np.stack(block) for block in table.parts(["tau1", "t"], 64)]
-    assert [block.shape[1] for block in blocks] == [64] * 6 + [16]
-    assert np.array_equal(np.concatenate(blocks, axis=1).T, expected[:, [2, 0]])
-    assert table.in_any_order()
-    for start, stop in ((0, 1), (63, 64), (1, 400), (250, 350), (399, 400)):
-        part = np.concatenate(
-            [np.stack(block) for block in table.parts(["tau1", "t"], 64, start, stop)], axis=1
-        )
-        assert np.array_equal(part.T, expected[start:stop, [2, 0]])
+def test_columns_that_nobody_asks_for_may_hold_anything(tmp_path):
+    """A mode, a remark, fields that are empty: refused where they are asked for, with their first line."""
+    lines = sampled_lines(40)
+    plain = read_record(written(tmp_path / "plain.csv", lines))
+    modes = ["mode", *(("", "auto", "7")[k % 3] for k in range(40))]
+    mixed = [f"{line},{mode}" for line, mode in zip(lines, modes, strict=True)]
+    record = read_record(written(tmp_path / "mixed.csv", mixed))
+    assert record.q.tobytes() == plain.q.tobytes() and record.tau.tobytes() == plain.tau.tobytes()
+    table = read_table(tmp_path / "mixed.csv")
+    with pytest.raises(InputError, match=r"mixed\.csv, column 'mode', line 3: 'auto'; expected"):
+        table.read(["t", "mode"])
 
 
 @pytest.mark.parametrize(

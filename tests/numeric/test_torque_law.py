@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from runtime import InputError, identify
 from runtime.errors import SettingsError
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.study import study_from_mapping, to_mapping
 
 RATE, N = 200.0, 3000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from runtime import read_record
-from runtime.records.datasets import dataset_study
+from runtime.reading.datasets import dataset_study
 from runtime.settings.study import study_from_mapping
 from runtime.signals.filters import filtered_states
 

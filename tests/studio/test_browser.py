@@ -434,7 +434,7 @@ def wait_for(holds: Callable[[], bool], seconds: float = 120.0) -> None:
 
 
 def tx40_study() -> dict[str, Any]:
-    from runtime.records.datasets import dataset_study
+    from runtime.reading.datasets import dataset_study
 
     return dict(dataset_study("tx40"))
 

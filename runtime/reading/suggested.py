@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from runtime.errors import InputError
 from runtime.model.generated import GeneratedModel
-from runtime.records.reading import read_records
+from runtime.reading.records import read_records
 from runtime.settings.study import Study, study_from_mapping, to_mapping
 from runtime.settings.yaml import yaml_text
 

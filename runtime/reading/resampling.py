@@ -29,8 +29,7 @@ from scipy.interpolate import CubicSpline
 
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.records.remedies import remedies
-from runtime.records.time_stamps import GAP, TimeStamps, time_stamps
+from runtime.records.clock import GAP, TimeStamps, remedy_text, time_stamps
 from runtime.settings.record import Resample
 from runtime.settings.schema import structure
 
@@ -105,7 +104,7 @@ def resample(
     if stamps.gaps or stamps.resets:
         raise InputError(
             f"time has gaps of more than {longest:g} periods, or goes back. "
-            f"{remedies(t, time_stamps(t), arrays=True)}"
+            f"{remedy_text(t, time_stamps(t), arrays=True)}"
         )
     ((stretch,), _, _) = resampled(
         t, [x[:, None] if x.ndim == 1 else x], stamps, settings, None, file="t"

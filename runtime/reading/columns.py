@@ -1,8 +1,6 @@
-"""From the columns of a file to positions and torques of the joint side, SI: names, finite numbers,
-scale, units, then the drives.
+"""From the columns of a file to positions and torques of the joint side, SI: names, then scale, units and drives.
 
-Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1
-... qn, tau1 ... taun needs no column names.
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names.
 """
 
 from __future__ import annotations
@@ -15,13 +13,133 @@ import numpy as np
 
 from runtime.errors import InputError
 from runtime.model.drives import Drives
-from runtime.records.formats.columns import Array, Table
-from runtime.records.formats.joint_states import joint_columns, named_columns
-from runtime.records.likely_columns import likely_columns
-from runtime.settings.record import BY_NAME, NONE, Columns, RecordSettings
+from runtime.reading.likely_columns import likely_columns
+from runtime.reading.table import Array, Table
+from runtime.settings.record import BY_NAME, Columns, RecordSettings
 from runtime.settings.units import COMMANDS, position_unit, torque_unit
 
-IN_FIRST = ("t", "q", "q_r", "qd", "qd_ref", "q_link")  # in the file of the positions
+WORDS = {
+    "q": ("q", "pos", "position"),
+    "tau": ("tau", "torque", "effort"),
+    "qr": ("qr", "reference"),
+}  # beside the name of a joint
+
+
+def column_names(
+    settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()
+) -> Columns:
+    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag: the joints of its messages.
+
+    Parameters
+    ----------
+    first, last : Table
+        Files of the positions and of the torques.
+    joints : sequence of str
+        Names of the joints of the robot, in its order: what `names` means in the settings, and what of a bag is read where they are left out.
+    """
+    given = settings.columns
+    t = given.t
+    if t is None and settings.rate is None and "t" in first.names:
+        t = "t"
+    q_ref: tuple[str, ...] = ()
+    if given.q_ref:
+        q_ref = _meant(first, "qr", "", given.q_ref, joints)
+    elif "qr1" in first.names:
+        q_ref = _numbered("qr", first, joints)
+    if first.joints is not None and settings.units.t != "s":
+        raise InputError(
+            f"record.units.t is {settings.units.t}; time stamps of bags are read in s",
+            file=first.file,
+        )
+    q = _meant(first, "q", "position", given.q, joints)
+    tau: tuple[str, ...] = ()
+    by_wrench = given.wrench and not given.tau and "tau1" not in last.names
+    if settings.by_law and settings.controller is None:
+        raise InputError(
+            "record.columns name q_ref and no tau: set controller: {kp: ..., kd: ...}, whose law then is the torque, or record.columns.tau",
+            file=last.file,
+        )
+    if not by_wrench and not settings.by_law:
+        as_q = last.joints is not None or given.q == BY_NAME
+        tau = _meant(last, "tau", "effort", given.tau or (given.q if as_q else ()), joints)
+    if given.q == BY_NAME and first is last and set(q) & set(tau):
+        raise InputError(
+            f"columns {', '.join(q)} would be positions and torques; name those of the torques, record.columns.tau",
+            file=first.file,
+        )
+    if not {*q} <= {*first.names} and {*q} <= {*last.names} and {*tau} <= {*first.names}:
+        raise InputError(
+            f"{first.file} holds the torques and {last.file} the positions; `files` are the positions, then the torques"
+        )
+    return replace(given, t=t, q=q, tau=tau, q_ref=q_ref)
+
+
+def _meant(
+    table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
+) -> tuple[str, ...]:
+    """Columns that `names` mean, of q, tau or qr (`key`), which bags call `quantity`."""
+    if names == BY_NAME and not joints:
+        raise InputError(
+            f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; add labels to the robot file",
+            file=table.file,
+        )
+    if table.joints is not None and quantity:
+        ours = names == BY_NAME or (not names and joints and {*joints} <= {*table.joints})
+        chosen = joints if ours else names or _numbered_joints(table)
+        return tuple(f"{name}.{quantity}" if name in table.joints else name for name in chosen)
+    if names == BY_NAME:
+        return tuple(_of_joint(table, key, joint) for joint in joints)
+    return tuple(names) or _numbered(key, table, joints)
+
+
+def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, ...]:
+    """The columns q1, q2 ... in the order of their numbers."""
+    matches = [re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name) for name in table.names]
+    numbered = sorted((int(match[1]), match[0]) for match in matches if match)
+    if not numbered:
+        raise InputError(
+            f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name them in a study file, record.columns.{quantity}",
+            file=table.file,
+            remedy=likely_columns(table.names, joints),
+        )
+    return tuple(name for _, name in numbered)
+
+
+def _numbered_joints(table: Table) -> tuple[str, ...]:
+    """Joints of a bag that are called alike but for a number, 1, 2 ... or 0, 1 ..., in this order."""
+    joints = table.joints or ()
+    matches = [re.fullmatch(r"(.*?)(\d{1,3})", joint) for joint in joints]
+    numbers = sorted((match[1], int(match[2]), match[0]) for match in matches if match)
+    stem, start, _ = min(numbers, default=("", 2, ""))
+    expected = [(stem, start + k) for k in range(len(joints))]
+    if start > 1 or [(other, k) for other, k, _ in numbers] != expected:
+        raise InputError(
+            f"{table.topic} has the joints {', '.join(joints) or '(none)'}; name those of the robot, in its order, in record.columns: {{q: [...], tau: [...]}}",
+            file=table.file,
+        )
+    return tuple(joint for *_, joint in numbers)
+
+
+def _of_joint(table: Table, key: str, joint: str) -> str:
+    """The column of a joint by its name, alone or beside a word for the quantity: q_elbow, elbow.pos, effort/elbow."""
+    forms = {
+        form
+        for word in WORDS[key]
+        for mark in "_./"
+        for form in (f"{joint}{mark}{word}", f"{word}{mark}{joint}")
+    }
+    hits = [name for name in table.names if name in forms]
+    if not hits:
+        hits = [name for name in table.names if name == joint]
+    if len(hits) == 1:
+        return hits[0]
+    what = f"no column {joint}, {key}_{joint} or the like among {', '.join(table.names)}"
+    if hits:
+        what = f"columns {', '.join(hits)}"
+    raise InputError(
+        f"{what}; expected one for {joint}, name the columns in record.columns.{key}",
+        file=table.file,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,83 +218,6 @@ def conversion(
     return Conversion(positions, commands, of_positions, of_torques, coupled, own)
 
 
-def column_names(
-    settings: RecordSettings, first: Table, last: Table, joints: Sequence[str] = ()
-) -> Columns:
-    """The names in the settings, or t, q1 ... qn, tau1 ... taun where they are left out; of a bag:
-    the joints of its messages.
-
-    joints : names of the joints of the robot, in its order: what `names` means in the settings, and
-    what of a bag is read where they are left out.
-    """
-    given = settings.columns
-    t = (
-        given.t
-        if given.t is not None or settings.rate is not None or "t" not in first.names
-        else "t"
-    )
-    q_ref = (
-        _meant(first, "qr", "", given.q_ref, joints)
-        if given.q_ref
-        else _numbered("qr", first, joints)
-        if "qr1" in first.names
-        else ()
-    )
-    if first.joints is not None and settings.units.t != "s":
-        raise InputError(
-            f"record.units.t is {settings.units.t}; time stamps of bags are read in s",
-            file=first.file,
-        )
-    of_q = _meant(first, "q", "position", given.q, joints)
-    of_tau: tuple[str, ...] = ()
-    if given.wrench and not given.tau and "tau1" not in last.names:
-        of_tau = ()
-    elif not settings.by_law:
-        named = last.joints is not None or given.q == BY_NAME
-        of_tau = _meant(last, "tau", "effort", given.tau or (given.q if named else ()), joints)
-    elif settings.controller is None:
-        raise InputError(
-            "record.columns name q_ref and no tau: set controller: {kp: ..., kd: ...}, whose law "
-            "then is the torque, or record.columns.tau",
-            file=last.file,
-        )
-    if given.q == BY_NAME and first is last and set(of_q) & set(of_tau):
-        raise InputError(
-            (
-                f"columns {', '.join(of_q)} would be positions and torques; name those of the "
-                "torques, "
-                "record.columns.tau"
-            ),
-            file=first.file,
-        )
-    if not {*of_q} <= {*first.names} and {*of_q} <= {*last.names} and {*of_tau} <= {*first.names}:
-        raise InputError(
-            f"{first.file} holds the torques and {last.file} the positions; `files` are the "
-            "positions, then the torques"
-        )
-    return replace(given, t=t, q=of_q, tau=of_tau, q_ref=q_ref)
-
-
-def _meant(
-    table: Table, key: str, quantity: str, names: Sequence[str], joints: Sequence[str]
-) -> tuple[str, ...]:
-    if names == BY_NAME and not joints:
-        raise InputError(
-            (
-                f"record.columns.{key} is {BY_NAME[0]}, but the robot has no name for every joint; "
-                "add "
-                "labels to the robot file"
-            ),
-            file=table.file,
-        )
-    if table.joints is not None and quantity:
-        ours = names == BY_NAME or (not names and joints and {*joints} <= {*table.joints})
-        return joint_columns(table, quantity, joints if ours else names)
-    if names == BY_NAME:
-        return named_columns(table, key, joints)
-    return tuple(names) or _numbered(key, table, joints)
-
-
 def require_alike(
     names: Columns, first: Table, last: Table, q: tuple[int, ...], tau: tuple[int, ...]
 ) -> None:
@@ -188,43 +229,17 @@ def require_alike(
         and {*names.q} <= {*last.names}
     ):
         raise InputError(
-            f"{first.file} and {last.file} hold positions and torques each; two `files` are the "
-            "positions and the torques of one record, "
-            f"further records are named by `also: [{last.file}]`"
+            f"{first.file} and {last.file} hold positions and torques each; two `files` are the positions and the torques of one record, further records are named by `also: [{last.file}]`"
         )
     if q[1:] != tau[1:]:
         raise InputError(
-            (
-                f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques "
-                f"({', '.join(names.tau)}); expected one of each per joint"
-            ),
+            f"{q[1]} columns of positions ({', '.join(names.q)}), {tau[1]} of torques ({', '.join(names.tau)}); expected one of each per joint",
             file=first.file,
         )
     if q != tau:
         raise InputError(
-            f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut "
-            "them to the same instants"
+            f"{q[0]} samples of positions in {first.file}, {tau[0]} of torques in {last.file}; cut them to the same instants"
         )
-
-
-def _numbered(quantity: str, table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    found = sorted(
-        (int(m[1]), name)
-        for name in table.names
-        if (m := re.fullmatch(rf"{quantity}([0-9]{{1,4}})", name))
-    )
-    if not found:
-        raise InputError(
-            (
-                f"no columns {quantity}1, {quantity}2 ... among {', '.join(table.names)}; name "
-                "them "
-                "in "
-                f"a study file, record.columns.{quantity}"
-            ),
-            file=table.file,
-            remedy=likely_columns(table.names, joints),
-        )
-    return tuple(name for _, name in found)
 
 
 def _per_joint(
@@ -291,34 +306,3 @@ def _torque_constant(
             remedy={"torque_constant": 1.0} if drives is None else {"torque_side": "motor"},
         )
     return factors, np.where([kind in COMMANDS for kind, _ in units], constant, 1.0)
-
-
-def asked_columns(names: Columns) -> dict[str, tuple[str, ...]]:
-    """Columns by quantity; none of a quantity that is not asked for."""
-    return {
-        "t": () if names.t is None else (names.t,),
-        "q": names.q,
-        "q_r": names.q_ref,
-        "qd": names.qd,
-        "qd_ref": names.qd_ref,
-        "q_link": tuple(name for name in names.q_link if name != NONE),
-        "tau": names.tau,
-        "tau_ff": names.tau_ff,
-        "tau_known": tuple(name for name in names.tau_known if name != NONE),
-        **names.further,
-    }
-
-
-def groups_of(
-    names: Columns, tables: tuple[Table, Table, Table]
-) -> list[tuple[Table, dict[str, tuple[str, ...]]]]:
-    """Each file once, with the columns that it is asked for, by quantity."""
-    first, last, other = tables
-    place = {**dict.fromkeys(IN_FIRST, first), "tau": last, "tau_ff": last, "tau_known": other}
-    place |= dict.fromkeys(names.further, first)
-    asked = {key: columns for key, columns in asked_columns(names).items() if columns}
-    groups = {
-        table: {key: columns for key, columns in asked.items() if place[key] is table}
-        for table in dict.fromkeys(tables)
-    }
-    return [(table, own) for table, own in groups.items() if own]

@@ -1,0 +1,252 @@
+"""ROS 1 bags (.bag), ROS 2 bags (a folder with metadata.yaml, or its .db3), and MCAP files, by rosbags (pip install symgen[bags]): the messages sensor_msgs/JointState of one topic as columns.
+
+    t                        s from the first message that is read
+    shoulder.position        of the joint `shoulder`; so velocity and effort
+
+In `record.columns` the name of the joint is enough: q means position, tau effort. A message names its joints itself, so that their order may change from message to message. Where several nodes publish on a topic, such as those of an arm and of its gripper, messages that hold none of the joints that are asked for are skipped and counted; one that holds some of them is an error.
+
+Messages are read by the definition of JointState that ROS has, never by one that a bag brings along: rosbags would turn that into code and run it. A bag whose JointState is another one is refused. Time is the stamp of the header, or the time of the log where every stamp is zero.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.files import require_file, sha256, sha256_of
+from runtime.limits import LIMIT
+from runtime.reading.table import Array, Options, Table, damage_named
+
+MESSAGE = "sensor_msgs/msg/JointState"
+HASHES = (  # of this message: MD5 in ROS 1, RIHS01 in ROS 2 (nothing before Iron)
+    *("", "3066dcd76a6cfaef579bd0f34173e9fd"),
+    "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e",
+)
+FIELDS = [
+    *("header", "string[]", "name"),
+    *(word for x in ("position", "velocity", "effort") for word in ("float64[]", x)),
+]
+STORED_NAME = re.compile(r"[\w.+ -]{1,255}")
+QUANTITIES = ("position", "velocity", "effort")
+NANOSECONDS = 1_000_000_000  # per second
+
+
+@dataclass(frozen=True)
+class JointState:
+    """One message.
+
+    Attributes
+    ----------
+    number : int
+        Of the message on its topic, from 1.
+    stamp : int, ns
+        Time.
+    joints : tuple of str
+        Names of the joints.
+    position, velocity, effort : ndarray
+        One value by joint (rad or m, rad/s or m/s, N m or N), or none.
+    """
+
+    number: int
+    stamp: int
+    joints: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointTable(Table):
+    """The messages of a topic; `columns` has no numbers until the joints are chosen."""
+
+    messages: tuple[JointState, ...]
+
+    def chosen(self, names: Sequence[str]) -> Table:
+        """The table of the messages that hold a joint of these columns; of all messages where none does, so that the first one tells what is missing."""
+        joints = {name.rpartition(".")[0] for name in names} - {""}
+        some = [message for message in self.messages if joints.intersection(message.joints)]
+        messages = some or list(self.messages)
+        columns: dict[str, Array] = {}
+        for name in names:
+            joint, _, quantity = name.rpartition(".")
+            if name == "t":
+                first = messages[0].stamp
+                stamps = np.array([message.stamp - first for message in messages], dtype=np.int64)
+                columns[name] = stamps / NANOSECONDS
+            elif joint and quantity in QUANTITIES:
+                values = [self._value(message, joint, quantity) for message in messages]
+                columns[name] = np.array(values)
+        skipped = len(self.messages) - len(messages)
+        note = f"{skipped} of {len(self.messages)} messages on {self.topic} have none of these joints and are skipped"
+        return Table(
+            file=self.file,
+            columns={**dict.fromkeys(self.columns, np.empty(0)), **columns},
+            row=lambda i: self._row(messages[i]),
+            joints=self.joints,
+            topic=self.topic,
+            note=note if skipped else "",
+            what=self.what,
+            digest=self.digest,
+        )
+
+    def _row(self, message: JointState) -> str:
+        return f"message {message.number} of {self.topic}"
+
+    def _value(self, message: JointState, joint: str, quantity: str) -> float:
+        values = getattr(message, quantity)
+        if joint not in message.joints:
+            reason = f"no joint {joint}; it has {', '.join(message.joints) or 'none'}"
+        elif len(values) != len(message.joints):
+            reason = f"{len(values)} values of {quantity} for {len(message.joints)} joints"
+        elif message.joints.count(joint) > 1:
+            reason = f"joint {joint} more than once"
+        else:
+            return float(values[message.joints.index(joint)])
+        raise InputError(
+            f"{reason}; expected every message to hold what the record names",
+            file=self.file,
+            row=self._row(message),
+        )
+
+
+def read_bag(path: Path, options: Options) -> JointTable:
+    """Table of the messages of a topic."""
+    from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_typestore
+
+    with damage_named("a whole bag", path.name):
+        if path.suffix == ".bag":
+            reader: Any = rosbag1.Reader(path)
+            decode: Any = get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
+        else:
+            reader = rosbag2.Reader(path)
+            decode = get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
+        with reader:
+            topic = _topic(reader.connections, options.topic, path.name)
+            messages = tuple(_messages(reader, topic, decode))
+    if not messages:
+        raise InputError(f"no message on {topic}", file=path.name)
+    names = {"t": None}
+    joints: dict[str, None] = {}
+    for message in messages:
+        for joint in message.joints:
+            if joint not in joints:
+                joints[joint] = None
+                held = [x for x in QUANTITIES if len(getattr(message, x))]
+                names |= dict.fromkeys(f"{joint}.{x}" for x in held)
+    return JointTable(
+        file=path.name,
+        columns=dict.fromkeys(names, np.empty(0)),
+        joints=tuple(joints),
+        topic=topic,
+        what="a bag",
+        messages=messages,
+    )
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of a bag: of its file, or of the list of those of a folder, each of which has to lie
+    in it.
+    """
+    if not path.is_dir():
+        return sha256_of(path)
+    return sha256(
+        "".join(f"{sha256_of(file)}  {file.name}\n" for file in stored_files(path)).encode()
+    )
+
+
+def stored_files(folder: Path) -> list[Path]:
+    """Files of a ROS 2 bag, a folder with metadata.yaml."""
+    from runtime.settings.yaml import yaml_values
+
+    where = f"{folder.name}/metadata.yaml"
+    require_file(folder / "metadata.yaml")
+    try:
+        text = (folder / "metadata.yaml").open("rb").read(4 * LIMIT.YAML_CHARACTERS + 1).decode()
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"cannot be read: {e}", file=where) from e
+    values, _ = yaml_values(text, file=where)
+    bag = values.get("rosbag2_bagfile_information") if isinstance(values, Mapping) else None
+    if not isinstance(bag, Mapping):
+        raise InputError(
+            "no mapping rosbag2_bagfile_information; expected the description of a ROS 2 bag",
+            file=where,
+        )
+    names = bag.get("relative_file_paths")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError("relative_file_paths names no file; expected those of the bag", file=where)
+    return [_inside(folder, name, where) for name in names]
+
+
+def _inside(folder: Path, name: str, where: str) -> Path:
+    """The file `name` of the folder; bags of the first ROS 2 versions write it behind the name of
+    the folder.
+    """
+    stored = name.removeprefix(f"{folder.name}/")
+    path = folder / stored
+    if (
+        not STORED_NAME.fullmatch(stored)
+        or stored.startswith(".")
+        or not path.resolve().is_relative_to(folder.resolve())
+    ):
+        raise InputError(
+            f"relative_file_paths names {name[:80]!r}; expected a file of this folder", file=where
+        )
+    if not path.is_file():
+        raise InputError(
+            f"relative_file_paths names {name!r}; there is no such file in the folder", file=where
+        )
+    return path
+
+
+def _topic(connections: list[Any], wanted: str | None, file: str) -> str:
+    """The topic that is read; it is one of JointState, as ROS defines it."""
+    topics = sorted({c.topic for c in connections if c.msgtype == MESSAGE})
+    others = sorted({f"{c.topic} ({c.msgtype})" for c in connections if c.msgtype != MESSAGE})
+    if wanted is None and len(topics) > 1:
+        raise InputError(
+            f"several topics of {MESSAGE}: {', '.join(topics)}; choose one by record.topic",
+            file=file,
+        )
+    if not topics or (wanted is not None and wanted not in topics):
+        what = f"no topic {wanted} of {MESSAGE}" if wanted else f"no topic of {MESSAGE}"
+        raise InputError(
+            f"{what}; the bag has {', '.join([*topics, *others][:20]) or 'none'}", file=file
+        )
+    name = wanted or topics[0]
+    for c in connections:
+        if c.topic == name and (c.digest not in HASHES or not _as_defined(c.msgdef)):
+            raise InputError(
+                f"{name} holds messages that are called {MESSAGE} and defined otherwise", file=file
+            )
+    return name
+
+
+def _as_defined(definition: Any) -> bool:
+    """Whether a definition that a bag brings along, where it is in .msg text, has the fields of
+    JointState; other languages go by their hash.
+    """
+    if definition.format.name != "MSG":
+        return True
+    return re.sub(r"#[^\n]*", " ", definition.data.split("=" * 80)[0]).split()[1:] == FIELDS
+
+
+def _messages(reader: Any, topic: str, decode: Any) -> list[JointState]:
+    """Messages of the topic in the order of the log, with the stamp of the header, or the time of the log where every stamp is zero."""
+    connections = [c for c in reader.connections if c.topic == topic]
+    states = []
+    logs = []
+    for number, (_, logged, raw) in enumerate(reader.messages(connections=connections), start=1):
+        m = decode(raw, MESSAGE)
+        stamp = int(m.header.stamp.sec) * NANOSECONDS + int(m.header.stamp.nanosec)
+        states.append(JointState(number, stamp, tuple(m.name), m.position, m.velocity, m.effort))
+        logs.append(int(logged))
+    if any(state.stamp for state in states):
+        return states
+    return [replace(state, stamp=log) for state, log in zip(states, logs, strict=True)]

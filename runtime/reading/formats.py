@@ -1,0 +1,116 @@
+"""The formats of measured files, one line each, and how a file is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from runtime.errors import InputError
+from runtime.files import sha256_of
+from runtime.reading.bags import digest_of, read_bag
+from runtime.reading.mat import read_mat
+from runtime.reading.numpy_files import read_npy, read_npz
+from runtime.reading.parquet import read_parquet
+from runtime.reading.table import Options, Table
+from runtime.reading.text import read_text
+
+
+@dataclass(frozen=True)
+class Format:
+    """How one format is read.
+
+    Attributes
+    ----------
+    title : str
+        What a file of it is, in messages.
+    endings : tuple of str
+        Of file names, in lower case.
+    read : callable
+        The table of a file.
+    install : str
+        Command that brings what reads it beyond NumPy and SciPy, if anything.
+    packed : bool
+        Whether it may be compressed by gzip.
+    digest : callable
+        SHA-256 of a file.
+    """
+
+    title: str
+    endings: tuple[str, ...]
+    read: Callable[[Path, Options], Table]
+    install: str = ""
+    packed: bool = True
+    digest: Callable[[Path], str] = sha256_of
+
+
+TABLES = "pip install symgen[tables]"
+BAGS = "pip install symgen[bags]"
+FORMATS = [
+    Format("a text file", (".csv", ".txt", ".dat", ".tsv"), read_text),
+    Format("a file of one plain array", (".npy",), read_npy),
+    Format("an archive of plain arrays", (".npz",), read_npz),
+    Format("a Parquet file", (".parquet",), read_parquet, TABLES),
+    Format("a MATLAB file", (".mat",), read_mat, TABLES),
+    Format("a whole bag", (".bag", ".mcap", ".db3"), read_bag, BAGS, False, digest_of),
+]
+BAG = ".db3"  # a folder is read as one
+
+
+def read_table(path: Path, topic: str | None = None, decimal: str = ".") -> Table:
+    """Table of a measured file; its hash is computed first, so that nothing that unpacks to more than a record holds is read.
+
+    Parameters
+    ----------
+    path : Path
+        A file whose name ends as one of `endings`, perhaps followed by .gz, or the folder of a ROS 2 bag.
+    topic : str, optional
+        Of a bag; default: the only one that holds sensor_msgs/JointState.
+    decimal : str
+        "." or ",", of the numbers of a text file.
+    """
+    format_ = format_of(path)
+    if path.suffix.lower() == ".gz" and not format_.packed:
+        raise InputError("a bag within .gz; uncompress it", file=str(path))
+    if not path.exists():
+        raise InputError("cannot be read: no such file", file=str(path))
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        raise InputError(
+            "a folder without metadata.yaml, hence no ROS 2 bag; name the measured or study file in it",
+            file=str(path),
+        )
+    digest = format_.digest(path)
+    try:
+        return replace(format_.read(path, Options(topic, decimal)), digest=digest)
+    except ImportError as e:
+        raise InputError(
+            f"{format_.title} needs an optional library: {format_.install}", file=path.name
+        ) from e
+
+
+def endings(*, packed: bool | None = None) -> tuple[str, ...]:
+    """Endings of all formats, or of those that may be compressed by gzip, or may not."""
+    return tuple(
+        ending
+        for format_ in FORMATS
+        for ending in format_.endings
+        if packed in (None, format_.packed)
+    )
+
+
+def is_measured(path: Path) -> bool:
+    """Whether the name is that of a measured file, or of a folder, which may be a ROS 2 bag."""
+    return path.is_dir() or any(suffix.lower() in endings() for suffix in path.suffixes)
+
+
+def format_of(path: Path) -> Format:
+    """The format that the ending of a file tells; a folder is a bag."""
+    suffixes = [BAG] if path.is_dir() else [s.lower() for s in path.suffixes if s.lower() != ".gz"]
+    kind = suffixes[-1] if suffixes else ""
+    for format_ in FORMATS:
+        if kind in format_.endings:
+            return format_
+    raise InputError(
+        f"unknown kind of file {kind!r}; expected {', '.join(endings(packed=True))}, plain or with .gz, {', '.join(endings(packed=False))} or the folder of a ROS 2 bag",
+        file=str(path),
+    )

@@ -1,0 +1,76 @@
+"""What a name on a command line means: a dataset, a study file, or a measured file; and what records and their files are called."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from runtime.errors import InputError
+from runtime.reading.datasets import DATASETS, dataset_study
+from runtime.reading.formats import endings, is_measured
+from runtime.settings.files import load_study
+from runtime.settings.record import RecordSettings
+from runtime.settings.study import Study, study_from_mapping
+
+
+@dataclass(frozen=True)
+class Label:
+    """Name of a record, and of each of its files in the provenance of results."""
+
+    name: str
+    files: tuple[str, ...]
+
+
+def study_of(record: str | Path) -> tuple[Study, Path]:
+    """The Study that a name means, and the folder its files are relative to.
+
+    Parameters
+    ----------
+    record : str or Path
+        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
+    """
+    path = Path(record)
+    if str(record) in DATASETS:
+        return study_from_mapping(dataset_study(str(record))), Path()
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return load_study(path), path.parent
+    if is_measured(path):
+        return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
+    raise InputError(
+        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
+    )
+
+
+def labels(settings: Sequence[RecordSettings]) -> list[Label]:
+    """One label by record, no name twice.
+
+    A record is called as its settings say, else as its dataset or its first file without ending; of equal ones each is called by the folder too (day1/run, day2/run), by more folders where need be, and in the end by its number. A file is called by its name, by its path where another has the same.
+    """
+    paths = [Path(s.dataset or "") / (s.files[0] if s.files else "") for s in settings]
+    parts = [[*path.parts[:-1], stem(path.name)] for path in paths]
+    names = [s.name or s.dataset or part[-1] for s, part in zip(settings, parts, strict=True)]
+    for depth in range(2, max(map(len, parts), default=0) + 1):
+        count = Counter(names)
+        names = [
+            "/".join(part[-depth:]) if count[name] > 1 and s.name is None else name
+            for s, part, name in zip(settings, parts, names, strict=True)
+        ]
+    names = [
+        f"{name} ({names[:k].count(name) + 1})" if name in names[:k] else name
+        for k, name in enumerate(names)
+    ]
+    same = Counter(Path(file).name for file in {file for s in settings for file in s.files})
+    files = [
+        tuple(Path(file).name if same[Path(file).name] == 1 else file for file in s.files)
+        for s in settings
+    ]
+    return [Label(name, of) for name, of in zip(names, files, strict=True)]
+
+
+def stem(file: str) -> str:
+    """The name of a measured file without its ending: log.1 of log.1.csv.gz."""
+    name = file[:-3] if file.lower().endswith(".gz") else file
+    ending = next((ending for ending in endings() if name.lower().endswith(ending)), "")
+    return name[: len(name) - len(ending)] or file

@@ -1,0 +1,57 @@
+"""NumPy files: archives of arrays (.npz) and single arrays (.npy); pickled objects are refused."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.files import require_size, unpacked
+from runtime.reading.table import WIDEST, Array, Options, Table, damage_named, is_numeric
+
+ARCHIVE = "an archive of plain arrays"
+SINGLE = "a file of one plain array"
+
+
+def read_npz(path: Path, options: Options) -> Table:
+    """Table of a .npz file."""
+    arrays = archive_of(path)
+    return Table(file=path.name, columns={key: x for key, x in arrays.items() if is_numeric(x)})
+
+
+def read_npy(path: Path, options: Options) -> Table:
+    """Table of a .npy file: its columns are called 1, 2 ..."""
+    with damage_named(SINGLE, path.name):
+        x = np.load(unpacked(path), allow_pickle=False)
+        if not isinstance(x, np.ndarray):
+            raise ValueError("an archive")
+    if not is_numeric(x) or x.ndim not in (1, 2) or not x.size or min(x.shape) > WIDEST:
+        raise InputError(
+            f"{x.dtype} of shape {x.shape}; expected numbers of shape (N,), (N, k) or (k, N), at most {WIDEST} columns",
+            file=path.name,
+        )
+    columns = np.atleast_2d(x) if x.ndim == 1 or x.shape[0] < x.shape[1] else x.T
+    return Table(
+        file=path.name, columns={str(k): column for k, column in enumerate(columns, start=1)}
+    )
+
+
+def archive_of(path: Path) -> dict[str, Array]:
+    """Arrays by name of a .npz file; InputError for pickled objects, damage, and more than such a file holds."""
+    file = path.name
+    stream = unpacked(path)
+    with damage_named(ARCHIVE, file):
+        with zipfile.ZipFile(stream) as archive:
+            members = archive.namelist()
+            held = sum(member.file_size for member in archive.infolist())
+        require_size(held, path.stat().st_size, file)
+        if len(members) > WIDEST:
+            raise InputError(f"{len(members)} arrays; at most {WIDEST} are read", file=file)
+        if len({name.removesuffix(".npy") for name in members}) < len(members):
+            raise InputError("holds an array of one name twice; store it once", file=file)
+        with np.load(stream, allow_pickle=False) as arrays:
+            return {
+                name.removesuffix(".npy"): arrays[name] for name in members if name.endswith(".npy")
+            }

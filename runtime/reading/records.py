@@ -1,0 +1,374 @@
+"""From the files of a measurement to a Record: columns, scale, units, then the drives, then the clock.
+
+    record = read_record("run.csv")
+    records = read_records(study.record, model, folder="measurements")
+
+Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names. Bad input raises InputError, which names file, column and line or sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from runtime.errors import InputError, ModelError
+from runtime.limits import LIMIT
+from runtime.model.generated import GeneratedModel, drives_of, joint_labels
+from runtime.reading.columns import Conversion, column_names, conversion, require_alike
+from runtime.reading.datasets import fetch
+from runtime.reading.formats import read_table
+from runtime.reading.names import Label, labels, study_of
+from runtime.reading.resampling import Stretch, resampled
+from runtime.reading.table import Array, Table
+from runtime.records.clock import Stamps, rate_of, time_stamps
+from runtime.records.law import torque_law
+from runtime.records.missing import COUNTS, Missing, bridged
+from runtime.records.record import JOINT_CHANNELS, Origin, Record, require_finite
+from runtime.settings.record import NONE, Columns, RecordSettings, each_record
+from runtime.settings.units import time_unit
+
+IRREGULAR = 0.05
+"""Between the rate of the settings and the median step of stamps that are resampled."""
+
+
+def read_record(
+    path: str | Path | RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path = ".",
+    missing: bool = False,
+) -> Record:
+    """One measured record, joint side, SI.
+
+    Parameters
+    ----------
+    path : str, Path or RecordSettings
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
+    model : module, optional
+        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
+    folder : str or Path
+        Where relative file names start; of a study file, those in it start where it is.
+    missing : bool
+        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or hold something else, and several records, or one that `resample` splits.
+    """
+    if isinstance(path, RecordSettings):
+        settings: tuple[RecordSettings, ...] = (path,)
+    else:
+        named = Path(folder) / path
+        study, folder = study_of(named if named.exists() else path)
+        settings = study.record
+        missing = missing or study.signals.admits_missing
+    records = read_records(settings, model, folder=folder, missing=missing)
+    if len(records) != 1:
+        names = ", ".join(record.name for record in records)
+        raise InputError(
+            f"{len(records)} records or pieces between gaps; read_records gives them all: {names}"
+        )
+    return records[0]
+
+
+def read_records(
+    settings: Sequence[RecordSettings],
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path | None = None,
+    missing: bool = False,
+) -> list[Record]:
+    """Several records of one robot, no name twice; a record that `resample` splits at gaps is one record by piece.
+
+    Parameters
+    ----------
+    model : module, optional
+        Emitted model of the robot, for its drives and its number of joints.
+    folder : str or Path, optional
+        Where relative file names start; default: the current folder.
+    missing : bool
+        Whether positions may be missing, as `signals.reader: counts` admits.
+    """
+    settings = each_record(tuple(settings))
+    return [
+        piece
+        for record, label in zip(settings, labels(settings), strict=True)
+        for piece in _pieces(record, label, model, Path(folder or ""), missing)
+    ]
+
+
+def _pieces(
+    settings: RecordSettings,
+    label: Label,
+    model: GeneratedModel | None,
+    folder: Path,
+    missing: bool,
+) -> list[Record]:
+    """The record of these settings, or those into which `resample` splits it at gaps and where time goes back."""
+    tables = [
+        read_table(path, settings.topic, settings.decimal)
+        for path in record_files(settings, folder)
+    ]
+    hashes = {name: table.digest for name, table in zip(label.files, tables, strict=True)}
+    first, last, other = _places(settings, tables)
+    columns = column_names(settings, first, last, _names_of(model))
+    signals = _signals(columns, first, last, other, missing)
+    n = signals["q"].values.shape[1]
+    _require_shapes(columns, signals, first, last)
+    if model is not None and n != len(model.JOINTS):
+        raise InputError(
+            f"{n} joints; {model.NAME} has {len(model.JOINTS)}, {model.JOINTS}",
+            file=", ".join(hashes),
+        )
+    drives = None if model is None else drives_of(model)
+    side = conversion(settings, drives, first, last, n)
+    samples = _joint_side(settings, columns, signals, side, missing)
+    table = signals["q"].table
+    notes = [signal.table.note for signal in signals.values() if signal.table.note]
+    del signals, tables, first, last, other
+    law = None
+    if settings.by_law:
+        limits = dict(getattr(model, "LIMITS", {}))
+        law = torque_law(settings.controller, n, limits)
+    stretches, rate, time = _uniform(settings, columns, table, samples)
+    origin = Origin(
+        files=hashes,
+        time="; ".join(text for text in (time, *dict.fromkeys(notes)) if text),
+        jitter=settings.jitter,
+        drives=side.drives,
+        torque_constant=side.constant,
+        joints=() if model is None else joint_labels(model),
+        whole="" if len(stretches) == 1 else label.name,
+        simulated=settings.simulated,
+    )
+    keys = [key for key in samples if key != "t"]
+    records = []
+    for k, stretch in enumerate(stretches, start=1):
+        own = dict(zip(keys, stretch.signals, strict=True))
+        if law is not None:
+            own = law.signals(stretch.t, own, rate)
+        channels = (*JOINT_CHANNELS, *columns.further, "law_v")
+        records.append(
+            Record(
+                stretch.t,
+                own["q"],
+                own.get("tau", np.zeros_like(own["q"])),
+                tau_known=own.get("tau_known"),
+                channels={key: own[key] for key in channels if key in own},
+                rate=rate,
+                name=label.name
+                if len(stretches) == 1
+                else f"{label.name} ({k} of {len(stretches)})",
+                missing=Missing(own["missing"], side.follows) if "missing" in own else None,
+                origin=origin,
+            )
+        )
+    return records
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """Columns of one quantity, shape (N, k), as the file holds them."""
+
+    table: Table
+    names: tuple[str, ...]
+    values: Array
+
+    def finite(self, values: Array, hint: str = "", largest: float | None = None) -> Array:
+        """The values, of these columns, if they are finite and, in SI, of a size that exists."""
+        limits = {} if largest is None else {"largest": largest}
+        return require_finite(
+            values, self.names, self.table.file, self.table.row, hint=hint, **limits
+        )
+
+
+def _signals(
+    columns: Columns, first: Table, last: Table, other: Table, missing: bool
+) -> dict[str, Signal]:
+    """The columns that are asked for, by quantity."""
+    places = {
+        "t": (first, () if columns.t is None else (columns.t,)),
+        "q": (first, columns.q),
+        "q_r": (first, columns.q_ref),
+        "qd": (first, columns.qd),
+        "qd_ref": (first, columns.qd_ref),
+        "q_link": (first, tuple(name for name in columns.q_link if name != NONE)),
+        "tau": (last, columns.tau),
+        "tau_ff": (last, columns.tau_ff),
+        "tau_known": (other, tuple(name for name in columns.tau_known if name != NONE)),
+        **{key: (first, names) for key, names in columns.further.items()},
+    }
+    asked = {key: place for key, place in places.items() if place[1]}
+    chosen = {
+        table: table.chosen([x for place, names in asked.values() if place is table for x in names])
+        for table in dict.fromkeys((first, last, other))
+    }
+    signals = {}
+    for key, (place, names) in asked.items():
+        positions = key == "q"
+        hint = f", or repair or cut the record; {COUNTS}" if positions else ""
+        values = chosen[place].read(names, empty=missing and positions, hint=hint)
+        signals[key] = Signal(chosen[place], names, values)
+    return signals
+
+
+def _require_shapes(
+    columns: Columns, signals: Mapping[str, Signal], first: Table, last: Table
+) -> None:
+    """Raise InputError where the columns are not of one record of n joints."""
+    N, n = signals["q"].values.shape
+    require_alike(columns, first, last, (N, n), signals.get("tau", signals["q"]).values.shape)
+    absent = {
+        "q_link": columns.q_link.count(NONE),
+        "tau_known": columns.tau_known.count(NONE),
+    }
+    for key, title in (
+        ("q_r", "reference positions"),
+        ("qd", "velocities"),
+        ("qd_ref", "reference velocities"),
+        ("q_link", "positions behind the gears"),
+        ("tau_ff", "feed-forward torques"),
+        ("tau_known", "known torques"),
+    ):
+        if key not in signals:
+            continue
+        signal = signals[key]
+        width = signal.values.shape[1] + absent.get(key, 0)
+        if width != n:
+            raise InputError(
+                f"{width} {title} {', '.join(signal.names)}; expected {n}", file=first.file
+            )
+    for signal in signals.values():
+        if len(signal.values) != N:
+            raise InputError(
+                f"{N} samples in {first.file}, {len(signal.values)} of {', '.join(signal.names)}; expected the same instants",
+                file=signal.table.file,
+            )
+
+
+def _joint_side(
+    settings: RecordSettings,
+    columns: Columns,
+    signals: Mapping[str, Signal],
+    side: Conversion,
+    missing: bool,
+) -> dict[str, Array]:
+    """The signals, joint side, SI, and `missing`, True for each position that is missing, where any is."""
+    samples: dict[str, Array] = {}
+    for key, signal in signals.items():
+        values = signal.values
+        if key == "q" and missing and np.isnan(values).any():
+            samples["missing"] = np.isnan(values)
+            values = bridged(values, samples["missing"])
+        values = signal.finite(values, COUNTS if key == "q" else "")
+        if key == "t":
+            samples[key] = values[:, 0] * time_unit(settings.units.t)
+            continue
+        if key in ("q", "q_r"):
+            values = side.position(values)
+        elif key in ("qd", "qd_ref"):
+            values = side.velocity(values)
+        elif key in ("tau", "tau_ff"):
+            values = side.torque(values)
+        elif key == "tau_known":
+            values = _spread(values, columns.tau_known, 0.0)
+        elif key == "q_link":
+            values = _spread(values, columns.q_link, np.nan) * side.positions
+        elif key not in columns.channels:
+            values = values * settings.scale.wrench
+        held = values[:, ~np.isnan(values[0])] if key == "q_link" else values
+        signal.finite(held, largest=LIMIT.LARGEST_NUMBER)
+        samples[key] = values
+    return samples
+
+
+def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
+    """Columns of the joints that have one, `absent` for the others, shape (N, n)."""
+    own = [name != NONE for name in names]
+    if all(own):
+        return values
+    spread = np.full((len(values), len(own)), absent)
+    spread[:, own] = values
+    return spread
+
+
+def _uniform(
+    settings: RecordSettings, columns: Columns, table: Table, samples: Mapping[str, Array]
+) -> tuple[list[Stretch], float, str]:
+    """The samples at a uniform rate, Hz, and what their time stamps are like: as they are, or resampled where the settings ask for it.
+
+    table : of the positions and of the time.
+    """
+    t = samples.get("t")
+    signals = tuple(values for key, values in samples.items() if key != "t")
+    if t is None:
+        if settings.rate is None:
+            raise InputError(
+                "no time column and no rate; set record.rate (Hz) or record.columns.t",
+                file=table.file,
+            )
+        return [Stretch(np.arange(len(signals[0])) / settings.rate, signals)], settings.rate, ""
+    if settings.resample is None:
+        stamps = Stamps(table.file, columns.t, table.row, settings.rate, settings.jitter)
+        rate = rate_of(stamps, t)
+        return [Stretch(t, signals)], rate, time_stamps(t, file=table.file).to_text(table.row)
+    regularity = time_stamps(t, gap=settings.resample.longest, file=table.file)
+    if settings.rate is not None and abs(1 / regularity.period / settings.rate - 1) > IRREGULAR:
+        raise InputError(
+            f"time runs at {1 / regularity.period:g} Hz, record.rate is {settings.rate:g} Hz; correct one, or the unit of time",
+            file=table.file,
+        )
+    try:
+        stretches, rate, done = resampled(
+            t, signals, regularity, settings.resample, settings.rate, file=table.file
+        )
+    except InputError as e:
+        raise InputError(
+            f"{e.message}. The stamps: {regularity.to_text(table.row)}",
+            file=table.file,
+            column=columns.t,
+        ) from None
+    return stretches, rate, f"{regularity.to_text(table.row)}; {done}"
+
+
+def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, Table, Table]:
+    """The files of the positions, of the torques and of the known torques.
+
+    Of two files the second holds the torques, but for known torques that it has and the first has not, beside torques of the first.
+    """
+    first = tables[0]
+    last = tables[-1]
+    columns = settings.columns
+    if len(tables) == 3 or not columns.tau_known:
+        return first, tables[min(1, len(tables) - 1)], last
+    known = {name for name in columns.tau_known if name != NONE}
+    torques = {*columns.tau} or {"tau1"}
+    in_first = known <= {*first.names}
+    apart = not in_first and torques <= {*first.names}
+    return first, first if apart else last, first if in_first else last
+
+
+def record_files(settings: RecordSettings, folder: Path) -> list[Path]:
+    """Paths of the files of a record; those of a dataset are looked up, and downloaded where need be."""
+    if not settings.files:
+        raise InputError("the record names no file; set record.files")
+    if settings.dataset is None:
+        return [folder / file for file in settings.files]
+    return [fetch(settings.dataset, file) for file in settings.files]
+
+
+def _names_of(model: Any) -> tuple[str, ...]:
+    """Names of the joints of an emitted model, in the order of JOINTS; none where the robot file does not name every joint."""
+    names = getattr(model, "LABELS", {})
+    if not isinstance(names, Mapping) or not all(
+        isinstance(name, str) and name.isprintable() for name in names.values()
+    ):
+        raise ModelError("LABELS are no table of names; emit the model again", file=model.NAME)
+    if model is None or not names.keys() >= {*model.JOINTS}:
+        return ()
+    return tuple(names[j] for j in model.JOINTS)

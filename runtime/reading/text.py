@@ -1,0 +1,190 @@
+"""Text files: comma, semicolon, tab or blanks between numbers, one header line or none, `#` before comments; decimals with a point, or with a comma where that is said.
+
+NumPy parses a file whose fields are all numbers. Where it cannot, the lines are read field by field: a column of other things is refused by name when it is asked for, with the first line where that is so.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections import Counter
+from collections.abc import Iterator
+from functools import partial
+from io import TextIOWrapper
+from itertools import chain, islice
+from pathlib import Path
+
+import numpy as np
+
+from runtime.errors import InputError
+from runtime.files import opened
+from runtime.reading.table import WIDEST, Array, Options, Table
+
+CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
+UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
+Lines = Iterator[tuple[int, str]]  # number of a line, from 1, and what stands there
+
+
+def read_text(path: Path, options: Options) -> Table:
+    """Table of a text file; without a header line the columns are called 1, 2, 3 ..."""
+    file = path.name
+    decimal = options.decimal
+    _, first = next(_lines(path), (0, ""))
+    if not first:
+        raise InputError("no line of numbers", file=file)
+    delimiter = next((mark for mark in ";\t," if mark in first and mark != decimal), None)
+    if _width(first, delimiter) > WIDEST:
+        raise InputError(
+            f"{_width(first, delimiter)} columns; at most {WIDEST} are read, write those you need into a file of their own",
+            file=file,
+        )
+    header = _fields(first, delimiter)
+    has_header = any(_number(field, decimal) is None for field in header)
+    names = tuple(header) if has_header else tuple(str(k + 1) for k in range(len(header)))
+    double = sorted(name for name, count in Counter(names).items() if count > 1)
+    if double:
+        raise InputError(f"header names {', '.join(double)} more than once", file=file)
+    refused: dict[str, InputError] = {}
+    empty: dict[str, str] = {}
+    values = _parsed(path, has_header, delimiter, decimal)
+    if values is None or values.shape[1] != len(names):
+        lines = islice(_lines(path), has_header, None)
+        values = _by_fields(file, lines, names, delimiter, decimal, refused, empty)
+    if not len(values):
+        raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
+    return Table(
+        file=file,
+        columns=dict(zip(names, values.T, strict=True)),
+        refused=refused,
+        empty=empty,
+        row=partial(_row, path, has_header),
+        hint="the first line has" if has_header else "",
+        what="a text file",
+    )
+
+
+def _lines(path: Path) -> Lines:
+    """Lines that hold something, comments aside."""
+    number = 0
+    try:
+        with opened(path) as stream, TextIOWrapper(stream, encoding="utf-8-sig") as text:
+            for number, line in enumerate(map(str.strip, text), 1):
+                if line and line[0] != "#":
+                    yield number, line
+    except UnicodeDecodeError:
+        raise InputError(
+            f"not a text file in UTF-8 (behind line {number}); {UTF8}", file=path.name
+        ) from None
+
+
+def _row(path: Path, has_header: bool, i: int) -> str:
+    """The line of sample i, from 0."""
+    number, _ = next(islice(_lines(path), i + has_header, None))
+    return f"line {number}"
+
+
+def _parsed(path: Path, has_header: bool, delimiter: str | None, decimal: str) -> Array | None:
+    """All numbers, shape (N, k); None where something is no number, or a line has more or fewer."""
+    lines = (line for _, line in islice(_lines(path), has_header, None))
+    if decimal != ".":
+        lines = (_with_point(line, decimal) for line in lines)
+    try:
+        first = next(lines, None)
+        if first is None:
+            return None
+        return np.loadtxt(
+            chain([first], lines), delimiter=delimiter, ndmin=2, comments=None, quotechar='"'
+        )
+    except InputError:
+        raise
+    except ValueError:
+        return None
+
+
+def _with_point(line: str, decimal: str) -> str:
+    """The line with decimal points; ValueError where it has some already: 1.234 may be a thousand."""
+    if "." in line:
+        raise ValueError("a point beside decimal commas")
+    return line.replace(decimal, ".")
+
+
+def _by_fields(
+    file: str,
+    lines: Lines,
+    names: tuple[str, ...],
+    delimiter: str | None,
+    decimal: str,
+    refused: dict[str, InputError],
+    empty: dict[str, str],
+) -> Array:
+    """The numbers of the lines, shape (N, k), nan where a field is none; what stands there is put among the `refused` and the `empty` columns."""
+    numbers = array("d")
+    for count, (number, line) in enumerate(lines):
+        row = f"line {number}"
+        width = _width(line, delimiter)
+        if line.count('"') % 2:
+            message = "a quotation mark that its line does not close; expected one sample a line"
+            raise InputError(message, file=file, row=row)
+        if width != len(names):
+            raise InputError(
+                f"{width} fields; expected {len(names)} ({', '.join(names)}); {_width_hint(delimiter, width > len(names))}",
+                file=file,
+                row=row,
+            )
+        fields = _fields(line, delimiter)
+        values = [_number(field, decimal) for field in fields]
+        if None in values:
+            for name, field, value in zip(names, fields, values, strict=True):
+                if value is None and not field:
+                    empty.setdefault(name, row)
+                elif value is None and name not in refused:
+                    refused[name] = _no_number(file, name, row, field, decimal, first=count == 0)
+        numbers.extend(np.nan if value is None else value for value in values)
+    return np.frombuffer(numbers).reshape(-1, len(names)) if numbers else np.empty((0, len(names)))
+
+
+def _width(line: str, delimiter: str | None) -> int:
+    """Number of fields of a line."""
+    return len(line.split()) if delimiter is None else line.count(delimiter) + 1
+
+
+def _fields(line: str, delimiter: str | None) -> list[str]:
+    return [field.strip().strip('"').strip() for field in line.split(delimiter)]
+
+
+def _number(text: str, decimal: str) -> float | None:
+    """The number that a field holds; None where it holds none."""
+    if "_" in text or (decimal != "." and "." in text):
+        return None
+    try:
+        return float(text if decimal == "." else text.replace(decimal, "."))
+    except ValueError:
+        return None
+
+
+def _width_hint(delimiter: str | None, wider: bool) -> str:
+    if delimiter == "," and wider:
+        return "if decimals are written with commas, separate columns by semicolons and set record.decimal: ','"
+    return "put # before lines that are neither names nor numbers"
+
+
+def _no_number(
+    file: str, name: str, row: str, field: str, decimal: str, *, first: bool
+) -> InputError:
+    """What is wrong with a field that holds something else; first : of the first sample."""
+    what = f"{field!r}; expected a number"
+    hint = ""
+    remedy = None
+    if decimal != "." and "." in field:
+        what = f"{field!r} holds a point, decimals are said to have a comma"
+        hint = "; write numbers without separators of thousands, or set record.decimal: '.'"
+    elif "," in field:
+        hint = "; write decimals with a point, or set record.decimal: ','"
+        remedy = {"decimal": ","}
+    elif CLOCK.search(field):
+        hint = (
+            "; no date or time of day is read: write seconds, or give record.rate without columns.t"
+        )
+    elif first:
+        hint = "; put # before a second line of names or units"
+    return InputError(what + hint, file=file, column=name, row=row, remedy=remedy)

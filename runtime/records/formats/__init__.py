@@ -1,1 +1,0 @@
-"""One file format a module: named columns of numbers out of measured files."""
