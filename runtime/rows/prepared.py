@@ -259,22 +259,6 @@ def observation_of(
     unknown ("missing") or the direction of dry friction is uncertain ("direction") are left out as
     well.
     """
-    observation = rows_of(columns, states, torque, selection, files=files)
-    if not any(observation.rows):
-        left_out = nothing_left(observation.dropped, selection.mask.shape[1])
-        raise InputError(left_out, file=", ".join(files or ()) or None)
-    return observation
-
-
-def rows_of(
-    columns: Columns,
-    states: States,
-    torque: Array,
-    selection: Selection,
-    *,
-    files: Mapping[str, str] | None = None,
-) -> Observation:
-    """The same of a part of a record, which may be without rows."""
     model = columns.model
     check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
     n, K = selection.mask.shape
@@ -285,9 +269,12 @@ def rows_of(
         )
     window = states[selection.samples]
     used = np.flatnonzero(selection.mask.any(axis=0))
-    inside = slice(used[0], used[-1] + 1) if len(used) else slice(0)
+    inside = slice(used[0], used[-1] + 1)
     store = columns.decimated(window, selection.plan, inside)
     selection = certain(model, states, selection, columns.constants)
+    if not selection.mask.any():
+        left_out = nothing_left(selection.dropped, K)
+        raise InputError(left_out, file=", ".join(files or ()) or None)
     mask = selection.mask[:, inside].ravel()
     rows = store.reshape(len(columns.names), len(mask))
     return Observation(
