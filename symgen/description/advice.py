@@ -22,10 +22,11 @@ _YAML = {  # what the scanner says: what to change
         "give rows of one table the same indent"
     ),
     "<block end>, ": (
-        "the lines above are a list (-) or are indented otherwise; write every row "
-        "as "
-        "`1: {...}`, with the same indent"
+        "the lines above are a list (-) or are indented otherwise; write every row as `1: {...}`, "
+        "with the same indent"
     ),
+    "found another document": "a second document starts here; a robot file holds one",
+    "found undefined alias": "anchors and aliases (& and *) are not read; write the value out",
     "expected ',' or '}'": "look here, or at the end of the row above, for a missing , or }",
     "expected ',' or ']'": "look here, or at the end of the row above, for a missing , or ]",
 }

@@ -13,21 +13,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ruamel.yaml import YAML
+from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
 from ruamel.yaml.error import MarkedYAMLError
-from ruamel.yaml.events import (
-    AliasEvent,
-    DocumentStartEvent,
-    Event,
-    MappingEndEvent,
-    MappingStartEvent,
-    ScalarEvent,
-    SequenceEndEvent,
-    SequenceStartEvent,
-)
 
 from symgen.description.advice import yaml_advice
 from symgen.description.element import Element
@@ -39,9 +29,10 @@ from symgen.description.schema import SCHEMA, robot_of
 from symgen.errors import DescriptionError
 
 MAX_BYTES, MAX_NESTING, MAX_SCALAR = 200_000, 12, 4000
+ANCHORS = "anchors and aliases (& and *) are not read; write the value out"
 
-_INTEGER = re.compile(r"[-+]?[0-9]{1,15}\Z")
-_DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,3})?\Z")
+INTEGER = re.compile(r"[-+]?[0-9]{1,15}\Z")
+DECIMAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]{1,3})?\Z")
 CONSTANTS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
 CONSTANTS |= {
     word: value
@@ -89,17 +80,9 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
     if len(content) > MAX_BYTES:
         raise DescriptionError(f"more than {MAX_BYTES} bytes; a robot file has a few thousand")
     try:
-        events = _plain(YAML(typ="safe", pure=True).parse(content.decode("utf-8-sig")))
-        next(events)  # start of the stream
-        if not isinstance(next(events), DocumentStartEvent):
-            return None
-        data = _value(next(events), events, (), lines)
-        next(events)  # end of the document
-        if isinstance(more := next(events), DocumentStartEvent):
-            raise DescriptionError(
-                "a second document starts here; a robot file holds one", line=_line(more)
-            )
-        return data
+        yaml = YAML(typ="safe", pure=True)
+        node = yaml.compose(content.decode("utf-8-sig"))
+        return None if node is None else _value(node, (), lines, yaml.resolver)
     except DescriptionError:
         raise
     except UnicodeDecodeError as error:
@@ -114,72 +97,61 @@ def _document(content: bytes, lines: dict[Path, int]) -> Any:
         raise DescriptionError(
             f"not YAML: {problem}{yaml_advice(problem)}", line=mark.line + 1 if mark else None
         ) from error
+    except RecursionError as error:
+        raise DescriptionError(f"nested more than {MAX_NESTING} deep") from error
     except Exception as error:  # on malformed text the scanner raises IndexError and others too
         first = (str(error) or type(error).__name__).splitlines()[0]
         raise DescriptionError(f"not YAML: {first}") from error
 
 
-def _line(event: Any) -> int:
-    return int(event.start_mark.line) + 1
-
-
-def _plain(events: Iterator[Event]) -> Iterator[Event]:
-    """The events, without what makes a file mean more than it shows."""
-    for event in events:
-        if isinstance(event, AliasEvent) or getattr(event, "anchor", None) is not None:
-            message = "anchors and aliases (& and *) are not read; write the value out"
-            raise DescriptionError(message, line=_line(event))
-        if getattr(event, "tag", None) not in (None, "!"):
-            raise DescriptionError("tags (!) are not read; write a plain value", line=_line(event))
-        yield event
-
-
-def _value(event: Event, events: Iterator[Event], path: Path, lines: dict[Path, int]) -> Any:
-    """Plain data of the value that starts with `event`."""
-    lines.setdefault(path, _line(event))
+def _value(node: Node, path: Path, lines: dict[Path, int], resolver: Any) -> Any:
+    """Plain data of a node, and the line of every key path in it."""
+    line = node.start_mark.line + 1
+    lines.setdefault(path, line)
     if len(path) > MAX_NESTING:
-        raise DescriptionError(f"nested more than {MAX_NESTING} deep", line=_line(event))
-    if isinstance(event, MappingStartEvent):
-        return _mapping(events, path, lines)
-    if not isinstance(event, SequenceStartEvent):
-        return _scalar(event)
-    items: list[Any] = []
-    while not isinstance(item := next(events), SequenceEndEvent):
-        items.append(_value(item, events, (*path, len(items)), lines))
-    return items
-
-
-def _mapping(events: Iterator[Event], path: Path, lines: dict[Path, int]) -> dict[Any, Any]:
+        raise DescriptionError(f"nested more than {MAX_NESTING} deep", line=line)
+    if node.anchor is not None:
+        raise DescriptionError(ANCHORS, line=line)
+    plain = (node.style is None, True) if isinstance(node, ScalarNode) else True
+    if node.tag != resolver.resolve(type(node), node.value, plain):
+        raise DescriptionError("tags (!) are not read; write a plain value", line=line)
+    if isinstance(node, ScalarNode):
+        return _scalar(node, line)
+    if not isinstance(node, MappingNode):
+        return [_value(item, (*path, k), lines, resolver) for k, item in enumerate(node.value)]
     table: dict[Any, Any] = {}
-    while not isinstance(event := next(events), MappingEndEvent):
-        key: Any = _scalar(event) if isinstance(event, ScalarEvent) else None
-        message = ""
+    for name, item in node.value:
+        line = name.start_mark.line + 1
+        key = _scalar(name, line) if isinstance(name, ScalarNode) else None
         if not isinstance(key, int | str) or isinstance(key, bool) or key == "<<":
-            given = getattr(event, "value", "[...]")
-            message = f"key {given!r:.40}: expected a name or a whole number"
-        elif key in table:
+            given = name.value if isinstance(name, ScalarNode) else "[...]"
+            raise DescriptionError(
+                f"key {given!r:.40}: expected a name or a whole number", line=line
+            )
+        if key in table:
             first = lines[(*path, key)]
-            message = f"key {key!r} is given twice (first on line {first}); keep one"
-        if message:
-            raise DescriptionError(message, line=_line(event))
-        lines[(*path, key)] = _line(event)
-        table[key] = _value(next(events), events, (*path, key), lines)
+            raise DescriptionError(
+                f"key {key!r} is given twice (first on line {first}); keep one", line=line
+            )
+        lines[(*path, key)] = line
+        table[key] = _value(item, (*path, key), lines, resolver)
     return table
 
 
-def _scalar(event: Any) -> Any:
+def _scalar(node: ScalarNode, line: int) -> Any:
     """null, bool, int and float of the YAML 1.2 core schema when plain, else text."""
-    text: str = event.value
+    text: str = node.value
     if len(text) > MAX_SCALAR:
-        message = f"text of {len(text)} characters; at most {MAX_SCALAR} are read"
-        raise DescriptionError(message, line=_line(event))
-    if event.style is not None:
+        raise DescriptionError(
+            f"text of {len(text)} characters; at most {MAX_SCALAR} are read", line=line
+        )
+    if node.style is not None:
         return text
     if text in CONSTANTS:
         return CONSTANTS[text]
-    if _INTEGER.match(text):
+    if INTEGER.match(text):
         return int(text)
-    decimal = _DECIMAL.match(text)
+    decimal = DECIMAL.match(text)
     return number if decimal and (number := float(text)) - number == 0 else text
 
 
