@@ -38,18 +38,17 @@ import numpy as np
 
 from symgen.certify.texts import TOLERANCE, TextCheck
 from symgen.certify.witness import base_values, is_assumed
-from symgen.derive.angles import rows_of, units_of
+from symgen.derive.angles import roots_of, rows_of, units_of
 from symgen.derive.closure import parts
 from symgen.derive.doubts import nearly_round
 from symgen.derive.exact import Array, Draw, primes_for
 from symgen.derive.loops import close
-from symgen.derive.roots import require_simple_roots
+from symgen.derive.numbers import kept_angle, numbered
 from symgen.description.at_values import WITHIN
 from symgen.description.expression import Call, Expression, Number, quarter_turns
 from symgen.description.robot import REVOLUTE, Frame, Robot
 from symgen.regroup.closed_draw import closed_draw
 from symgen.regroup.finite_field import rref
-from symgen.regroup.numbers import numbered
 from symgen.regroup.regrouping import EXACT, Regrouping
 from symgen.regroup.residues import sample, states_for
 
@@ -250,15 +249,7 @@ def certify_formulas(
     vanishing = vanishing_denominators(regrouping)
     failures += [f"{text}; the formulas do not hold there, {AT_VALUES}" for text in vanishing]
     if rank < len(regrouping) == exact_rank:
-        values = ", ".join(f"{name} = {value:g}" for name, value in robot.constants.items())
-        failures.append(
-            (
-                f"the constants of the file ({values}) are special: the rank is {rank} there, "
-                f"{len(regrouping)} elsewhere; {AT_VALUES}"
-            )
-            if gap > CLEAR and robot.constants and not nearly_round(robot, WITHIN)
-            else hair_off(robot, _too_small(witness.W[:, base]))
-        )
+        failures.append(_special(robot, gap, witness.W[:, base]))
     sizes = sorted(
         (x, f"{x:.2g} m ({e}, frame {robot.labels.get(f.j, f.j)})")
         for f in robot.frames
@@ -280,8 +271,6 @@ def certify_formulas(
             "double precision keeps no digit of that sum. Lengths as small as "
             f"{sizes[0][1]} divide in it; write 0 where nothing is meant"
         )
-    if failures or rank != exact_rank:
-        require_simple_roots(robot)
     return Certificate(
         robot.name,
         regrouping.method,
@@ -296,6 +285,29 @@ def certify_formulas(
         rank_in_floats=len(ranks) < draws,
         error_probability=min(1.0, bound**draws) if primes else 1.0,
     )
+
+
+def _special(robot: Robot, gap: float, W: Array) -> str:
+    """Why the rank of the base columns W at the constants of the file is below that elsewhere."""
+    if roots := independent_roots(robot):
+        return (
+            f"{', '.join(roots)} {'count' if len(roots) > 1 else 'counts'} as any number: the rank "
+            "is smaller where it is one that other roots, cosines or constants make up; write it "
+            f"by them{f', or {AT_VALUES}' if robot.constants else ''}"
+        )
+    if gap > CLEAR and robot.constants and not nearly_round(robot, WITHIN):
+        rank, generic = numeric_rank(W)[0], W.shape[1]
+        values = ", ".join(f"{name} = {value:g}" for name, value in robot.constants.items())
+        return (
+            f"the constants of the file ({values}) are special: the rank is {rank} there, "
+            f"{generic} elsewhere; {AT_VALUES}"
+        )
+    return hair_off(robot, _too_small(W))
+
+
+def independent_roots(robot: Robot) -> list[str]:
+    """The square roots of what is no rational number, which over F_p are related to nothing."""
+    return [root.text for root in roots_of(robot) if root.argument.constant is None]
 
 
 def _too_small(W: Array) -> str:
@@ -346,10 +358,11 @@ def degree(regrouping: Regrouping) -> int:
     An entry of the regressor passes each frame of a path at most three times: outwards in products
     of two velocities, and back.
     """
-    robot, closure, units = regrouping.robot, close(regrouping.robot), units_of(regrouping.robot)
+    robot, closure = regrouping.robot, close(regrouping.robot)
+    units = units_of(numbered(robot))
 
     def angle(e: Expression) -> int:
-        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(e)[1]))
+        return 2 * sum(abs(k) for unit, k in units.of(quarter_turns(kept_angle(e))[1]))
 
     def constant(e: Expression) -> int:
         return max((sum(abs(n) * atom(a) for a, n in m) for m in e.terms), default=0)
@@ -392,8 +405,8 @@ def _modulo(
     if close(robot).tied:
         states = len(own) // len(robot.joints) + 10
         try:  # identities at the numbers of the file, where some were recognised; rank at any
-            draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p)
-            fixed = closed_draw(numbered(robot), seed, states, p=p)
+            draw: Draw = closed_draw(robot, seed, 1, count=FEW_STATES, p=p, at_numbers=True)
+            fixed = closed_draw(robot, seed, states, p=p)
             few = np.moveaxis(sample(draw, names), 0, 1)
             rank = len(rref(sample(fixed, regrouping.own)[0], p, reduced=False)[0])
         except ArithmeticError:

@@ -1,13 +1,6 @@
-"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes
-in which all of them exist.
+"""Fixed angles and square roots of a robot over F_p: the unit angles, the radicands, and the primes in which all of them exist.
 
-Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p.
-Every other fixed angle is a whole multiple of a
-unit that is drawn at random: radians and multiples of constants (transcendental against all
-algebraic numbers), and fractions of pi with a
-large denominator, whose minimal polynomial has a degree of the order of that denominator. Multiples
-are at most LARGEST_MULTIPLE, so that
-degrees stay small against p.
+Fractions of pi with a moderate denominator are whole multiples of pi/D, a root of unity of F_p. Every other fixed angle is a sum of monomials in constants and in numbers as they are written (`derive.numbers`); all multiples of one monomial are whole multiples of a unit angle that is drawn at random, since radians and multiples of constants are transcendental against all algebraic numbers.
 """
 
 from __future__ import annotations
@@ -22,20 +15,13 @@ from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import REVOLUTE, Robot
 
 PI: Monomial = (("pi", 1),)
-# roots of larger primes are drawn by themselves: their fields share nothing with angles of small
-# denominator
+# roots of larger primes are drawn by themselves: their fields share nothing with angles of small denominator
 LARGEST_RADICAND = 100
-LARGEST_DENOMINATOR, LARGEST_ORDER = (
-    360,
-    100_000,
-)  # of a fraction of pi, and of all of them together
-LARGEST_MULTIPLE = 16  # of a unit angle
-SMALL = [k for n in range(1, LARGEST_MULTIPLE + 1) for k in (n, -n)]
-FEW = 4  # of each of two unit angles in a sum
+LARGEST_DENOMINATOR = 360  # of a fraction of pi
+LARGEST_ORDER = 100_000  # of all of them together
 Unit = tuple[Monomial, Fraction]  # the angle fraction * monomial
-Variable = (
-    str | Number | Call | Unit
-)  # what a geometry may give: a constant, "pi", a number, a square root, a unit angle
+# what a geometry may give: a constant, "pi", a number, a square root, a unit angle
+Variable = str | Number | Call | Unit
 
 
 def fixed_angles(robot: Robot) -> tuple[Expression, ...]:
@@ -58,117 +44,47 @@ class Units:
     """
 
     def __init__(self, robot: Robot) -> None:
+        angles = fixed_angles(robot)
         self.D = 2
         for l in radicands(robot):
             self.D = lcm(self.D, 4 if l == 2 else l if l < LARGEST_RADICAND else 1)
-        self.free: dict[Monomial, list[Fraction]] = {}
-        self.multiples: dict[
-            Monomial, dict[Fraction, tuple[Fraction, int]]
-        ] = {}  # {multiple of a free unit, without turns: (unit, k)}
-        self.sums: dict[tuple[Monomial, Fraction], list[tuple[Unit, int]]] = {}
-        self.written: dict[
-            tuple[Monomial, Fraction], list[tuple[Unit, int]]
-        ] = {}  # amounts looked at once
-        angles = fixed_angles(robot)
-        for c in sorted(
-            {e.terms.get(PI, Fraction(0)) for e in angles}, key=lambda c: c.denominator
-        ):
+        fractions = {e.terms.get(PI, Fraction(0)) for e in angles}
+        for c in sorted(fractions, key=lambda c: c.denominator):
             if c.denominator <= LARGEST_DENOMINATOR and lcm(self.D, c.denominator) <= LARGEST_ORDER:
                 self.D = lcm(self.D, c.denominator)
-        for m in dict.fromkeys(m for e in angles for m in e.terms if m != PI):
-            amounts = [abs(e.terms[m]) for e in angles if m in e.terms]
-            common = lcm(*(c.denominator for c in amounts))
-            unit = Fraction(gcd(*(int(c * common) for c in amounts)), common)
-            if max(amounts) / unit <= LARGEST_MULTIPLE:
-                self._new(m, unit)
+        self.free: dict[Monomial, Fraction] = {}
         for e in angles:
-            self.of(e)
-        self._add_sums(robot)
-
-    def _add_sums(self, robot: Robot) -> None:
-        """Sums of the angles about parallel axes in a row are those sums, not new units (`Geometry`
-        turns by them at once).
-        """
-        angles: dict[int, tuple[Expression, ...]] = {}
-        for f in robot.frames:
-            following = robot.constraints.get(f.j) if f.sigma == REVOLUTE else None
-            constant = (
-                Expression()
-                if following is None
-                else following.substitute({f"q{i}": Expression() for i in robot.moving})
-            )
-            parallel = not f.alpha
-            before = angles.get(f.ant, ()) if parallel else ()
-            angles[f.j] = (*before, f.theta0 + constant + (f.gamma if parallel else Expression()))
-            total = sum(angles[f.j], Expression())
-            for m, c in total.terms.items() if before else ():
-                if m != PI and (m, c) not in self.sums:
-                    parts = [self._multiples(m, e.terms[m]) for e in angles[f.j] if m in e.terms]
-                    whole: dict[Unit, int] = {}
-                    for unit, k in (pair for part in parts for pair in part):
-                        whole[unit] = whole.get(unit, 0) + k
-                    self.sums |= {
-                        (m, sign * c): [(unit, sign * k) for unit, k in whole.items() if k]
-                        for sign in (1, -1)
-                    }
+            for m, c in e.terms.items():
+                if not self._is_turn(m, c):
+                    self.free[m] = _common(self.free.get(m, abs(c)), abs(c))
 
     @property
     def all(self) -> list[Unit]:
         """pi/D, then the free ones."""
-        return [
-            (PI, Fraction(1, self.D)),
-            *((m, c) for m, units in self.free.items() for c in units),
-        ]
+        return [(PI, Fraction(1, self.D)), *self.free.items()]
 
     def of(self, angle: Expression) -> list[tuple[Unit, int]]:
-        """[(unit, whole multiple)]; an amount that is no small multiple of units becomes a
-        unit.
-        """
-        return [(unit, k) for m, c in angle.terms.items() for unit, k in self._multiples(m, c)]
+        """[(unit, whole multiple)]; an amount that is no multiple of its unit is a unit of its own."""
+        parts: list[tuple[Unit, int]] = []
+        for m, c in angle.terms.items():
+            if self._is_turn(m, c):
+                parts.append(((PI, Fraction(1, self.D)), int(c * self.D)))
+                continue
+            unit = self.free.get(m, abs(c))
+            if (c / unit).denominator > 1:
+                unit = abs(c)
+            parts.append(((m, unit), int(c / unit)))
+        return parts
 
-    def _multiples(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]]:
-        turns = [((PI, Fraction(1, self.D)), int(c * self.D))]
-        if m == PI and (c * self.D).denominator == 1:
-            return turns
-        if (m, c) in self.sums:
-            return self.sums[m, c]
-        if (m, c) not in self.written:
-            parts = self._in_units(m, c)
-            if parts is None:
-                self._new(m, abs(c))
-                parts = [((m, abs(c)), 1 if c > 0 else -1)]
-            self.written[m, c] = parts
-        return self.written[m, c]
+    def _is_turn(self, m: Monomial, c: Fraction) -> bool:
+        """Whether an amount is a whole multiple of pi/D."""
+        return m == PI and (c * self.D).denominator == 1
 
-    def _in_units(self, m: Monomial, c: Fraction) -> list[tuple[Unit, int]] | None:
-        """c as a multiple of one free unit or of two, and of pi/D, if it is one."""
-        multiples = self.multiples.get(m, {})
-        if (hit := multiples.get(self._part(m, c))) is not None:
-            return self._with_turns(m, c, [hit])
-        for u in self.free.get(m, ()):
-            for k in SMALL[: 2 * FEW]:
-                hit = multiples.get(self._part(m, c - k * u))
-                if hit is not None and abs(hit[1]) <= FEW:
-                    return self._with_turns(m, c, [(u, k), hit])
-        return None
 
-    def _part(self, m: Monomial, c: Fraction) -> Fraction:
-        """What is left of an amount without the multiples of pi/D."""
-        return c % Fraction(1, self.D) if m == PI else c
-
-    def _with_turns(
-        self, m: Monomial, c: Fraction, parts: list[tuple[Fraction, int]]
-    ) -> list[tuple[Unit, int]]:
-        rest = (c - sum(k * u for u, k in parts)) * self.D
-        return [((m, u), k) for u, k in parts] + (
-            [((PI, Fraction(1, self.D)), int(rest))] if rest else []
-        )
-
-    def _new(self, m: Monomial, unit: Fraction) -> None:
-        self.free.setdefault(m, []).append(unit)
-        multiples = self.multiples.setdefault(m, {})
-        for k in SMALL:
-            multiples.setdefault(self._part(m, k * unit), (unit, k))
+def _common(a: Fraction, b: Fraction) -> Fraction:
+    """The largest amount of which both are whole multiples."""
+    d = lcm(a.denominator, b.denominator)
+    return Fraction(gcd(int(a * d), int(b * d)), d)
 
 
 @lru_cache(maxsize=64)
@@ -241,16 +157,6 @@ def radicands(robot: Robot) -> tuple[int, ...]:
     """The whole numbers under square roots: primes, and what no small prime divides."""
     arguments = {a.argument.constant for a in _calls(robot) if a.function == "sqrt"}
     return tuple(sorted({int(c) for c in arguments if c is not None}))
-
-
-def nested_roots(robot: Robot) -> bool:
-    """Whether there are square roots of numbers that hold square roots themselves."""
-    return any(
-        a.function == "sqrt"
-        and not a.argument.symbols
-        and any(isinstance(b, Call) for b in a.argument.atoms)
-        for a in _calls(robot)
-    )
 
 
 def roots_of(robot: Robot) -> tuple[Call, ...]:

@@ -6,12 +6,16 @@ The free joints are those that no relation of the file gives, q = N q_free + c f
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
 from symgen.derive.closure import open_tree
-from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.floats import Floats, states_of
+from symgen.derive.graph import interpret
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loop_residual import Array, coincidence, differences, loop_ends, newton
+from symgen.derive.scalar import Scalar
 from symgen.description.expression import ZERO, Expression
 from symgen.description.parts import row_of
 from symgen.description.robot import Loop, Robot
@@ -47,6 +51,12 @@ def declared_relations(robot: Robot) -> dict[int, tuple[dict[int, Expression], E
     return relations
 
 
+@lru_cache(maxsize=16)
+def open_loops(robot: Robot) -> list[Scalar]:
+    """Differences of the cut and twin frames of every loop, all joints free."""
+    return coincidence(loop_ends(robot, GraphAlgebra(robot), open_tree(robot)))
+
+
 class Assembly:
     """Configurations q (..., free joints), in the order of `free`.
 
@@ -68,7 +78,6 @@ class Assembly:
         self.free = tuple(j for j in robot.moving if j not in relations)
         self.active = [k for k, j in enumerate(self.free) if j in robot.joints]
         self.passive = [k for k, j in enumerate(self.free) if j not in robot.joints]
-        self.tree = open_tree(robot)
         self.N, self.c = np.zeros((len(robot.moving), len(self.free))), np.zeros(len(robot.moving))
         for k, j in enumerate(robot.moving):
             row, constant = relations.get(j, ({j: Expression.number(1)}, ZERO))
@@ -102,8 +111,8 @@ class Assembly:
         joints = dict(
             zip(self.robot.moving, np.moveaxis(q @ self.N.T + self.c, -1, 0), strict=True)
         )
-        algebra = FloatAlgebra(self.robot, joints, constants=self.constants)
-        rows = coincidence(loop_ends(self.robot, algebra, self.tree))
+        floats = Floats(self.robot, states_of(q=joints), self.constants)
+        rows = interpret(open_loops(self.robot), floats)
         shape = (len(self.robot.loops), 12, *q.shape[:-1])
         r = np.array([np.broadcast_to(x, shape[2:]) for x in rows], dtype=float).reshape(shape)
         return np.asarray(np.moveaxis(r, (0, 1), (-2, -1)) * self.scale)

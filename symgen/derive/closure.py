@@ -19,12 +19,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import lcm, prod
 
-from symgen.derive.scalar import Algebra, Scalar, Turn, add, mul
+from symgen.derive.graph import ActiveRow, Turn
+from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.scalar import Scalar, add, mul
 from symgen.description.expression import ONE, ZERO, Expression
 from symgen.description.robot import REVOLUTE, Robot
 from symgen.errors import DescriptionError
 
-ActiveRow = tuple[tuple[int, Expression], ...]
 Relation = tuple[Mapping[int, Expression], Expression]  # row and constant
 
 
@@ -93,7 +94,7 @@ class Closure:
         """The row of s = row q in the independent joints."""
         return tuple(self.relation(row)[0].items())
 
-    def project(self, algebra: Algebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
+    def project(self, algebra: GraphAlgebra, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """G' Gamma_tree, by actuated joint."""
         if not self.robot.passive:
             return dict(torque)

@@ -4,13 +4,10 @@ joints.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from symgen.derive.elements import element_column
-from symgen.derive.exact import Array
 from symgen.derive.newton_euler import Motion
 from symgen.derive.regressor import Axes
 from symgen.derive.scalar import Scalar
@@ -44,25 +41,6 @@ def unit(robot: Robot, name: str) -> str:
         return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
     e, j = element_names(robot)[name]
     return e.unit or KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
-
-
-def sampled_columns(motion: Motion, names: Sequence[str], count: int) -> Array:
-    """D of the parameters `names` at `count` states in floats, shape (actuated joints, count,
-    len(names)).
-    """
-    D = columns(motion, names)
-    return np.array(
-        [
-            np.stack(
-                [
-                    np.broadcast_to(np.asarray(D[name].get(j, 0), dtype=float), (count,))
-                    for name in names
-                ],
-                axis=-1,
-            )
-            for j in motion.robot.joints
-        ]
-    )
 
 
 def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:

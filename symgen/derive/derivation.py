@@ -11,7 +11,7 @@ replaced (`derive.rewrite`), and the table of models (`derive.models`) says whic
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -24,6 +24,7 @@ from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
+from symgen.derive.numbers import numbered
 from symgen.derive.scalar import Matrix, Scalar, Vector, add, mul
 from symgen.description.robot import Robot
 
@@ -72,7 +73,7 @@ class Derivation:
 
     def actuated(self, torque: Mapping[int, Scalar]) -> dict[int, Scalar]:
         """G' Gamma of the moving joints: by actuated joint, all of them."""
-        projected = self.closure.project(self.algebra, torque)
+        projected = self.geometry.closure.project(self.algebra, torque)
         return {i: projected.get(i, 0) for i in self.robot.joints}
 
 
@@ -81,18 +82,22 @@ def derive(robot: Robot) -> Derivation:
     """The derivation of `robot`, made once. Raises DescriptionError where its loops cannot
     close.
     """
-    return derived(robot, close(robot))
+    return derived(robot, close)
 
 
-def derived(robot: Robot, closure: Closure) -> Derivation:
-    """The derivation with the joints of `closure` as the independent ones."""
-    algebra = GraphAlgebra(robot)
-    geometry = Geometry(robot, algebra, closure)
+def derived(robot: Robot, closing: Callable[[Robot], Closure]) -> Derivation:
+    """The derivation with the joints of the closure that `closing` makes as the independent ones.
+
+    Numbers of the file stay as they are written, inputs of the graph: formulas have them so.
+    """
+    written = numbered(robot)
+    closure, algebra = closing(written), GraphAlgebra(written)
+    geometry = Geometry(written, algebra, closure)
     motion = Motion(geometry)
     chi = {name: algebra.parameter(name) for name in robot.parameters}
     torque = joint_torques(motion, chi)
     algebra.section("Friction, actuators")
-    for name, (e, key) in element_names(robot).items():
+    for name, (e, key) in element_names(written).items():
         for i, x in element_column(motion, e, key).items():
             torque[i] = add(torque[i], mul(chi[name], x))
     actuated = closure.project(algebra, torque)
@@ -102,7 +107,9 @@ def derived(robot: Robot, closure: Closure) -> Derivation:
     inertia = projected_twice(closure, algebra, CompositeLinks(geometry, chi).matrix())
     algebra.graph.seal()
     joints = {i: actuated.get(i, 0) for i in robot.joints}
-    return Derivation(robot, closure, algebra, geometry, motion, chi, joints, inertia, D, poses)
+    return Derivation(
+        robot, closing(robot), algebra, geometry, motion, chi, joints, inertia, D, poses
+    )
 
 
 def projected_twice(

@@ -12,8 +12,9 @@ its own, of which exact arithmetic knows nothing but what it is of.
 from __future__ import annotations
 
 from symgen.derive.angles import varies
+from symgen.derive.graph import AT_ZERO, Turn
 from symgen.derive.newton_euler import Motion
-from symgen.derive.scalar import AT_ZERO, Scalar, Turn, add, linear, mul
+from symgen.derive.scalar import Scalar, add, linear, mul
 from symgen.description.expression import ONE, ZERO, Atom, Call, Expression
 from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import Element, Form, Row, parameter

@@ -8,7 +8,9 @@ differences of angles that a product of rotations has are there from the start.
 from __future__ import annotations
 
 from symgen.derive.geometry import Geometry, Rotation, summed
-from symgen.derive.scalar import E3, ZERO3, Algebra, Matrix, Turn, Vector, cross, sub, vadd
+from symgen.derive.graph import Turn
+from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.scalar import E3, ZERO3, Matrix, Vector, cross, sub, vadd
 from symgen.description.expression import Expression
 from symgen.description.robot import REVOLUTE
 
@@ -96,7 +98,7 @@ class Frames:
         (turn, offset), (other, other_offset) = self.geometry.turn[j], self.geometry.turn[i]
         return summed((*turn, *((k, -n) for k, n in other))), offset - other_offset
 
-    def register_angles(self, algebra: Algebra) -> None:
+    def register_angles(self, algebra: GraphAlgebra) -> None:
         """Make the angle of every frame against every other one about the same direction an angle
         of `algebra`.
         """

@@ -1,4 +1,4 @@
-"""Rotations and displacements between the frames of a robot, over any scalars.
+"""Rotations and displacements between the frames of a robot.
 
     iRj = A_j Rot(z, theta_j),   A_j = Rot(z, gamma_j) Rot(x, alpha_j),
             P_ij = b e3 + d A_j e1 + r A_j e3
@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from symgen.derive.closure import Closure
+from symgen.derive.graph import Turn
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.scalar import (
-    Algebra,
     Matrix,
     Scalar,
-    Turn,
     Vector,
     add,
     apply,
@@ -103,11 +103,11 @@ def displacement(A: Matrix, b: Scalar, d: Scalar, r: Scalar) -> Vector:
 
 
 class Geometry:
-    """Rotations, positions and carriers of all frames of `robot`, over the scalars of `algebra`; of
-    those that frame `root` carries alone, where it is not the base.
-    """
+    """Rotations, positions and carriers of all frames of `robot`, as nodes of `algebra`; of those that frame `root` carries alone, where it is not the base."""
 
-    def __init__(self, robot: Robot, algebra: Algebra, closure: Closure, root: int = 0) -> None:
+    def __init__(
+        self, robot: Robot, algebra: GraphAlgebra, closure: Closure, root: int = 0
+    ) -> None:
         self.robot, self.algebra, self.closure, self.root = robot, algebra, closure, root
         self.rotation: dict[int, Rotation] = {}
         self.P: dict[int, Vector] = {}  # P_ij, origin of frame j in frame i = ant(j)

@@ -1,37 +1,28 @@
-"""Hash-consed expression graph: the one intermediate representation between the recursions and
-every printer.
+"""Hash-consed expression graph: the one intermediate representation between the recursions and every printer, and the one evaluator of it.
 
-A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once.
-Signs live on the edges: a
-`Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a
-name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos
-(positive part max(x, 0)), inv (1/x), sqrt of constants; in the laws of columns also OPAQUE.
+A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a `Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
+Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos (positive part max(x, 0)), inv (1/x), sqrt of constants; in the laws of columns also OPAQUE.
+
+`interpret` gives the values of nodes over a domain: residues of F_p, floats, CasADi's SX, SymPy's objects. `rates` gives their time derivatives, as nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
-SYM, CONST, ADD, MUL, COS, SIN, SIGN, POS, SQRT, INV = (
-    "sym",
-    "const",
-    "add",
-    "mul",
-    "cos",
-    "sin",
-    "sign",
-    "pos",
-    "sqrt",
-    "inv",
-)
+from symgen.description.expression import Expression
+
+SYM, CONST, ADD, MUL = "sym", "const", "add", "mul"
+COS, SIN, SIGN, POS, SQRT, INV = "cos", "sin", "sign", "pos", "sqrt", "inv"
 
 OPAQUE = {
     "exp": "exp", "tanh": "tanh", "cosine": "cos", "sine": "sin", "root": "sqrt", "power": "pow",
 }  # fmt: skip
 """Operations that exact arithmetic does not know, with the names of their functions."""
+AT_ZERO = {"sign": 0, "tanh": 0, "sine": 0, "root": 0, "power": 0, "exp": 1, "cosine": 1}
+"""Their values at the structural zero."""
 
 
 class Symbol(NamedTuple):
@@ -40,10 +31,11 @@ class Symbol(NamedTuple):
     Attributes
     ----------
     kind : str
-        constant, pi, q, qd, qdd, qdr, qddr, channel, torque, rate (of a tied joint), parameter
-        or gravity.
+        constant, pi, number, q, qd, qdd, qdr, qddr, channel, torque, rate (of a tied joint),
+        parameter or gravity.
     name : str
-        As it is written: D3, q1, QP1, QDP1, GAM1, G31, XX1; of gravity the axis, 0 to 2.
+        As it is written: D3, q1, QP1, QDP1, GAM1, G31, XX1; of gravity the axis, 0 to 2; of a
+        number of the robot file its value, 2159/5000.
     """
 
     kind: str
@@ -53,11 +45,36 @@ class Symbol(NamedTuple):
         return self.name
 
 
+Turn = tuple[tuple[int, int | Fraction], ...]  # ((j, n), ...): the angle sum_j n q_j
+ActiveRow = tuple[tuple[int, Expression], ...]  # ((i, G_i), ...): the velocity sum_i G_i qd_i
+
+
+class Angle(NamedTuple):
+    """The angle sum_j n q_j + offset of a cosine or sine."""
+
+    turn: Turn
+    offset: Expression
+
+    def __neg__(self) -> Angle:
+        return Angle(tuple((j, -n) for j, n in self.turn), -self.offset)
+
+
+class Velocity(NamedTuple):
+    """The velocity G qd of a sign or a positive part, qd of the independent joints."""
+
+    row: ActiveRow
+
+    def __neg__(self) -> Velocity:
+        return Velocity(tuple((i, -g) for i, g in self.row))
+
+
 class Node:
     """One operation of the graph. `operands` are Scalars; `fixed` nodes depend on no sample
     (constants and parameters only).
 
-    `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
+    `value` says what exact arithmetic has to know: the Symbol of an input, the number of a
+    constant, the Angle of a cosine or sine, the Velocity of a sign or positive part, the Expression
+    of a square root; None where it knows nothing but the operands. `name` is what the emitted line is called; `hint` is used for the name of a node that turns out
     to be shared and has none.
     """
 
@@ -66,13 +83,11 @@ class Node:
     def __init__(
         self, index: int, op: str, operands: tuple[Scalar, ...], value: Any, fixed: bool
     ) -> None:
-        self.index, self.op, self.operands, self.value, self.fixed = (
-            index,
-            op,
-            operands,
-            value,
-            fixed,
-        )
+        self.index = index
+        self.op = op
+        self.operands = operands
+        self.value = value
+        self.fixed = fixed
         self.name: str | None = None
         self.hint: str | None = None
         self.name_sign = 1
@@ -210,8 +225,10 @@ class Graph:
         )
         return s if sign > 0 else -s
 
-    def call(self, op: str, x: Scalar, *more: Scalar) -> Scalar:
-        """A function of one operand: cos is even; sin, sign and 1/x are odd; OPAQUE of any."""
+    def call(self, op: str, x: Scalar, *more: Scalar, of: Any = None) -> Scalar:
+        """A function: cos is even; sin, sign and 1/x are odd; OPAQUE of any operands. `of` is what
+        x is, as `Node.value` says it.
+        """
         if op in OPAQUE:
             operands = (x, *more)
             key = (op, *((o.node.index, o.sign) for o in operands))
@@ -219,6 +236,8 @@ class Graph:
         apart = op not in (POS, SQRT)
         operand, kept = (_positive(x), 1) if apart else (x, x.sign)
         s = self._scalar((op, x.node.index, kept), op, (operand,), None, x.node.fixed)
+        if s.node.value is None and of is not None:
+            s.node.value = of if x.sign > 0 else -of
         return -s if apart and op != COS and x.sign < 0 else s
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
@@ -251,13 +270,91 @@ def _positive(x: Scalar) -> Scalar:
     return x if x.sign > 0 else -x
 
 
-def reachable(outputs: Iterable[Scalar | int]) -> list[Node]:
-    """Nodes that the outputs need, in order of creation (operands first)."""
+def reachable(
+    outputs: Iterable[Scalar | int], known: Mapping[int, Any] | None = None
+) -> list[Node]:
+    """Nodes that the outputs need, in order of creation (operands first), but those `known`."""
     nodes: dict[int, Node] = {}
     stack = [o.node for o in outputs if isinstance(o, Scalar)]
     while stack:
         node = stack.pop()
-        if node.index not in nodes:
+        if node.index not in nodes and (known is None or node.index not in known):
             nodes[node.index] = node
             stack.extend(x.node for x in node.operands)
     return [nodes[k] for k in sorted(nodes)]
+
+
+class Domain(Protocol):
+    """Where values of graph nodes are: anything with + * and unary minus."""
+
+    def symbol(self, symbol: Symbol) -> Any:
+        """The value of an input."""
+
+    def number(self, c: Fraction) -> Any:
+        """The value of a rational number."""
+
+    def function(self, node: Node, x: list[Any]) -> Any:
+        """The value of any other operation than + and *, by those of its operands."""
+
+
+def interpret(
+    outputs: Sequence[Scalar | int], domain: Domain, known: dict[int, Any] | None = None
+) -> list[Any]:
+    """The values of graph scalars over a domain; 0, 1 and -1 stay whole numbers.
+
+    known : values of nodes by their index; those that are needed beside them are added.
+    """
+    value: dict[int, Any] = {} if known is None else known
+
+    def signed(s: Scalar | int) -> Any:
+        if isinstance(s, int):
+            return s
+        return value[s.node.index] if s.sign > 0 else -value[s.node.index]
+
+    for node in reachable(outputs, value):
+        x = [signed(operand) for operand in node.operands]
+        match node.op:
+            case "sym":
+                made = domain.symbol(node.value)
+            case "const":
+                made = domain.number(node.value)
+            case "add":
+                made = x[0] + x[1]
+            case "mul":
+                made = x[0] * x[1]
+            case _:
+                made = domain.function(node, x)
+        value[node.index] = made
+    return [signed(s) for s in outputs]
+
+
+def rates(
+    outputs: Sequence[Scalar | int], inputs: Mapping[Symbol, Scalar | int]
+) -> list[Scalar | int]:
+    """The rates of change of graph scalars where inputs change at these rates, in forward mode."""
+    rate: dict[int, Scalar | int] = {}
+
+    def signed(s: Scalar | int) -> Scalar | int:
+        if isinstance(s, int):
+            return 0
+        return rate[s.node.index] if s.sign > 0 else -rate[s.node.index]
+
+    for node in reachable(outputs):
+        x, xd = node.operands, [signed(operand) for operand in node.operands]
+        still = all(isinstance(v, int) and v == 0 for v in xd)
+        match node.op:
+            case "sym":
+                rate[node.index] = inputs.get(node.value, 0)
+            case _ if still:
+                rate[node.index] = 0
+            case "add":
+                rate[node.index] = xd[0] + xd[1]
+            case "mul":
+                rate[node.index] = xd[0] * x[1] + x[0] * xd[1]
+            case "cos":
+                rate[node.index] = -(x[0].graph.call(SIN, x[0], of=node.value) * xd[0])
+            case "sin":
+                rate[node.index] = x[0].graph.call(COS, x[0], of=node.value) * xd[0]
+            case op:
+                raise NotImplementedError(f"the rate of {op}")
+    return [signed(s) for s in outputs]

@@ -1,88 +1,111 @@
-"""The algebra of graph nodes: the recursions over it become text."""
+"""The symbols of a robot as nodes of one graph: constants, angles, joint rates, signs.
+
+Inputs are q1, QP1, QDP1 ... and the constants of the robot file under their names; numbers that formulas keep as they are written are inputs too, so that one graph serves all numbers. `interpret` finds with each node what exact arithmetic has to know of it (see `graph.Node`).
+"""
 
 from __future__ import annotations
 
-from symgen.derive.graph import COS, INV, POS, SIGN, SIN, SQRT, Graph, Symbol
-from symgen.derive.names import Names
-from symgen.derive.scalar import Scalar, Turn
-from symgen.description.expression import Expression, call, quarter_turns
-from symgen.description.robot import Robot
+from fractions import Fraction
 
-ActiveRow = tuple[tuple[int, Expression], ...]
+from symgen.derive.graph import (
+    COS,
+    INV,
+    POS,
+    SIGN,
+    SIN,
+    SQRT,
+    ActiveRow,
+    Angle,
+    Graph,
+    Scalar,
+    Symbol,
+    Turn,
+    Velocity,
+)
+from symgen.derive.names import Names
+from symgen.description.expression import Expression, Number, call, quarter_turns
+from symgen.description.robot import Robot
 
 
 class GraphAlgebra:
-    """Scalars are nodes of one graph: inputs q1, QP1, QDP1 ... and the constants of the robot file
-    under their names.
+    """The graph of a derivation, and what its recursions take from the robot.
 
-    `sections` are (index of the first node, title); `angles` holds the angle of every cos and sin
-    node, `roots` every square root.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    written : bool
+        Whether numbers that it keeps as they are written stay inputs, or are their values.
+
+    Attributes
+    ----------
+    sections : list of (int, str)
+        Index of the first node under each heading.
+    labels : dict
+        Which angle each label of a sum of angles is: 23 for q2 + q3.
     """
 
-    def __init__(self, robot: Robot) -> None:
-        self.robot, self.graph = robot, Graph()
+    def __init__(self, robot: Robot, *, written: bool = True) -> None:
+        self.robot, self.graph, self.written = robot, Graph(), written
         self.named = Names(len(robot.frames))
         self.sections: list[tuple[int, str]] = []
-        self.angles: dict[int, tuple[Turn, Expression]] = {}
-        self.roots: dict[int, Expression] = {}
-        self.labels: dict[str, tuple[Turn, Expression]] = {}
+        self.labels: dict[str, Angle] = {}
 
     def section(self, title: str) -> None:
+        """What follows belongs under this heading."""
         self.sections.append((len(self.graph.nodes), title))
 
-    def constant(self, e: Expression) -> Scalar:
-        return e.evaluate(self._constant, self._call, self.graph.number)
+    def constant(self, e: Expression) -> Scalar | int:
+        """A constant expression: number, length, component of gravity, cos or sin of a fixed angle."""
+        value: Scalar | int = e.evaluate(
+            self._constant, self._call, self.graph.number, self._number
+        )
+        return value
 
     def _constant(self, name: str) -> Scalar:
         return self.graph.symbol(Symbol("pi" if name == "pi" else "constant", name), fixed=True)
+
+    def _number(self, number: Number) -> Scalar | int:
+        if not self.written:
+            return self.graph.number(number.value)
+        return self.graph.symbol(Symbol("number", str(number.value)), fixed=True)
 
     def parameter(self, name: str) -> Scalar:
         """A standard or base parameter."""
         return self.graph.symbol(Symbol("parameter", name), fixed=True)
 
-    def gravity(self, axis: int) -> Scalar:
+    def gravity(self, axis: int) -> Scalar | int:
+        """Component of minus the acceleration of gravity in frame 0, m/s**2."""
         symbol = Symbol("gravity", str(axis))
         return self.graph.symbol(symbol, fixed=True) if self.robot.gravity[axis] else 0
 
     def _call(self, function: str, argument: Expression) -> Scalar:
         x = self.graph.lift(self.constant(argument))
-        if function in ("cos", "sin"):
-            value = self.graph.call(function, x)
-            self.angles[value.node.index] = (
-                (),
-                argument if value.sign > 0 or function == "cos" else -argument,
-            )
-            return value
         if function == "inv":
             return self.graph.call(INV, x)
-        root = self.graph.call(SQRT, x)
-        self.roots[root.node.index] = call("sqrt", argument)
-        return root
+        of = call("sqrt", argument) if function == SQRT else Angle((), argument)
+        return self.graph.call(function, x, of=of)
 
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
+    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar | int, Scalar | int]:
+        """cos and sin of sum n_j q_j + offset."""
         if not turn:
             return self.constant(call("cos", offset)), self.constant(call("sin", offset))
         quarters, rest = quarter_turns(offset)
-        forward = turn[0][1] > 0
-        if not forward:
-            turn, rest = tuple((j, -n) for j, n in turn), -rest
-        angle: Scalar = 0
-        for j, n in turn:
-            term = self.graph.symbol(Symbol("q", f"q{j}"))
+        backward = turn[0][1] < 0
+        about = -Angle(turn, rest) if backward else Angle(turn, rest)
+        angle: Scalar | int = 0
+        for j, n in about.turn:
+            term = self.q(j)
             angle = angle + (term if n == 1 else -term if n == -1 else term * self.graph.lift(n))
-        angle = angle + self.constant(rest)
-        label = self._label(turn)
-        while self.labels.setdefault(label, (turn, rest)) != (turn, rest):
+        angle = self.graph.lift(angle + self.constant(about.offset))
+        label = self._label(about.turn)
+        while self.labels.setdefault(label, about) != about:
             label += "b"  # the same joints with another constant
         self.graph.name(angle, "th" + label)
-        c, s = self.graph.call(COS, angle), self.graph.call(SIN, angle)
-        for value, letter in ((c, "C"), (s, "S")):
-            backward = value.sign < 0
-            self.angles[value.node.index] = (
-                (tuple((j, -n) for j, n in turn), -rest) if backward else (turn, rest)
-            )
-            self.graph.name(value, letter + label)
-        if not forward:
+        c, s = (self.graph.call(op, angle, of=about) for op in (COS, SIN))
+        self.graph.name(c, "C" + label)
+        self.graph.name(s, "S" + label)
+        if backward:
             s = -s
         return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
@@ -95,35 +118,45 @@ class GraphAlgebra:
         return text
 
     def q(self, j: int) -> Scalar:
+        """Position of joint j."""
         return self.graph.symbol(Symbol("q", f"q{j}"))
 
     def qd(self, j: int) -> Scalar:
+        """Velocity of joint j."""
         return self.graph.symbol(Symbol("qd", f"QP{j}"))
 
     def qdd(self, j: int) -> Scalar:
+        """Acceleration of joint j."""
         return self.graph.symbol(Symbol("qdd", f"QDP{j}"))
 
     def channel(self, name: str) -> Scalar:
+        """A constant that is a function of time."""
         return self.graph.symbol(Symbol("channel", name))
 
     def rate(self, u: int, i: int) -> Scalar:
+        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint i."""
         return self.graph.symbol(Symbol("rate", self.named("G", u, i)))
 
     def sign(self, rate: Scalar, row: ActiveRow) -> Scalar:
-        return self.graph.call(SIGN, rate)
-
-    def function(self, op: str, *operands: Scalar) -> Scalar:
-        return self.graph.call(op, *map(self.graph.lift, operands))
+        """sign(sd), sd = G qd = `rate`, G = `row`."""
+        return self.graph.call(SIGN, rate, of=Velocity(row))
 
     def one_sided(self, rate: Scalar, row: ActiveRow, when: str) -> tuple[Scalar, Scalar]:
-        forward = when == "positive"
-        sides = [x if forward else -x for x in (self.graph.call(SIGN, rate), rate)]
-        parts = [self.graph.call(POS, x) for x in sides]
-        direction, speed = (x if forward else -x for x in parts)
-        return direction, speed
+        """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
+        direction = self.sign(rate, row)
+        if when == "positive":
+            return self.graph.call(POS, direction), self.graph.call(POS, rate, of=Velocity(row))
+        backward = self.graph.call(POS, -rate, of=-Velocity(row))
+        return -self.graph.call(POS, -direction), -backward
 
-    def name(self, value: Scalar, name: str) -> Scalar:
+    def function(self, op: str, *operands: Scalar | Fraction | int) -> Scalar:
+        """inv (1/x), sign, exp, tanh, cosine, sine, root or power (x**y) of scalars."""
+        return self.graph.call(op, *map(self.graph.lift, operands))
+
+    def name(self, value: Scalar | int, name: str) -> Scalar | int:
+        """The same value, which later steps call `name`."""
         return self.graph.name(value, name)
 
-    def hint(self, value: Scalar, name: str) -> Scalar:
+    def hint(self, value: Scalar | int, name: str) -> Scalar | int:
+        """The same value, to be called `name` if it is used more than once."""
         return self.graph.hint(value, name)

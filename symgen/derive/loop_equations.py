@@ -1,27 +1,26 @@
-"""The closure equations of general loops: as many as there are tied joints, with Jacobian and
-curvature, over any algebra.
+"""The closure equations of general loops: as many as there are tied joints, with Jacobian and curvature.
 
-`equations` are the rows of `loop_residual.residuals` that determine the tied joints best at the
-start configuration. Then
+`equations` are the rows of `loop_residual.residuals` that determine the tied joints best at the start configuration. Then
 
     r(q) = 0 ,    J qd = 0 ,    J qdd + Jd qd = 0 .
+
+J and Jd qd are the first and second time derivatives of the nodes of r: along the unit rate of each joint, and along qd.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from symgen.derive.closure import Closure
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.jets import Jet, JetAlgebra, jet
+from symgen.derive.derivation import Derivation, derive
+from symgen.derive.floats import Floats, states_of
+from symgen.derive.graph import Symbol, interpret, rates
 from symgen.derive.loop_residual import Array, differences, loop_ends, newton, residuals
-from symgen.derive.loops import close
-from symgen.derive.scalar import Algebra, Scalar, dot
+from symgen.derive.scalar import Scalar, dot
 from symgen.description.robot import REVOLUTE, Robot
 
 PACE = 0.2, 0.25  # rad, or of the longest length: steps of actuated and of tied joints
@@ -36,17 +35,23 @@ class LoopSystem:
 
     Attributes
     ----------
-    robot : Robot
-        The mechanism.
-    closure : Closure
-        Its joints in the independent ones.
+    derivation : Derivation
+        Of the mechanism; the equations are nodes of its graph.
     equations : tuple of int
         Rows of `residuals` that are used, as many as there are tied joints.
     """
 
-    robot: Robot
-    closure: Closure
+    derivation: Derivation
     equations: tuple[int, ...]
+
+    @property
+    def robot(self) -> Robot:
+        return self.derivation.robot
+
+    @property
+    def closure(self) -> Closure:
+        """The joints in the independent ones."""
+        return self.derivation.closure
 
     @property
     def start(self) -> Array:
@@ -58,56 +63,64 @@ class LoopSystem:
         """Places of the tied joints among the independent ones."""
         return slice(len(self.robot.joints), len(self.closure.independent))
 
-    def residual(self, algebra: Algebra) -> list[Scalar]:
-        """r(q)."""
-        rows = residuals(self.robot, algebra, self.closure)
-        return [rows[k] for k in self.equations]
+    @cached_property
+    def rows(self) -> list[Scalar]:
+        """All rows of `residuals`."""
+        geometry = self.derivation.geometry
+        return residuals(geometry.robot, geometry.algebra, geometry.closure)
 
-    def alignment(self, algebra: Algebra) -> list[Scalar]:
+    @cached_property
+    def residual(self) -> list[Scalar]:
+        """r(q)."""
+        return [self.rows[k] for k in self.equations]
+
+    @cached_property
+    def jacobian(self) -> list[list[Scalar]]:
+        """[equation][independent joint]."""
+        columns = [rates(self.rows, {Symbol("q", f"q{i}"): 1}) for i in self.closure.independent]
+        return [[column[k] for column in columns] for k in self.equations]
+
+    @cached_property
+    def curvature(self) -> list[Scalar]:
+        """Jd qd."""
+        qd = self.derivation.algebra.qd
+        along = {Symbol("q", f"q{i}"): qd(i) for i in self.closure.independent}
+        return rates(rates(self.residual, along), along)
+
+    @cached_property
+    def alignment(self) -> list[Scalar]:
         """Trace of A_cut' A_twin: 3 where a loop closes, -1 half a turn from there, where the axial
         vector is zero too.
 
         Of the loops alone whose cut joint is tied: where it is a sum of angles, the orientations
         agree by construction.
         """
-        ends = loop_ends(self.robot, algebra, self.closure)
+        geometry = self.derivation.geometry
+        ends = loop_ends(geometry.robot, geometry.algebra, geometry.closure)
         return [
             dot([x for row in A for x in row], [x for row in B for x in row])
             for loop, ((A, _), (B, _)) in zip(self.robot.loops, ends, strict=True)
             if loop.cut in self.closure.tied
         ]
 
-    def jacobian(self, algebra: Algebra) -> list[list[Scalar]]:
-        """[equation][independent joint]."""
-        columns = [self._jets(algebra, {i: 1}) for i in self.closure.independent]
-        return [[row.xd for row in rows] for rows in zip(*columns, strict=True)]
-
-    def curvature(self, algebra: Algebra) -> list[Scalar]:
-        """Jd qd."""
-        rates = {i: algebra.qd(i) for i in self.closure.independent}
-        return [row.xdd for row in self._jets(algebra, rates)]
-
-    def _jets(self, algebra: Algebra, rates: Mapping[int, Scalar]) -> list[Jet]:
-        """r(q) with its derivatives along the rates."""
-        along: Any = JetAlgebra(algebra, rates)
-        rows = residuals(self.robot, along, self.closure)
-        return [jet(rows[k]) for k in self.equations]
-
-    def floats(self, q: Array) -> FloatAlgebra:
-        """The algebra of floats at q."""
-        joints = zip(self.closure.independent, np.moveaxis(q, -1, 0), strict=True)
-        return FloatAlgebra(self.robot, dict(joints))
+    def floats(self, outputs: Sequence[Scalar], q: Array, qd: Array | None = None) -> Array:
+        """Values at states q (..., independent) of nodes, (..., outputs)."""
+        states = {"q": q} | ({} if qd is None else {"qd": qd})
+        by_joint = {
+            kind: dict(zip(self.closure.independent, np.moveaxis(x, -1, 0), strict=True))
+            for kind, x in states.items()
+        }
+        values = interpret(outputs, Floats(self.robot, states_of(**by_joint)))
+        return np.stack([np.broadcast_to(x, q.shape[:-1]) for x in values], axis=-1)
 
     def residual_floats(self, q: Array) -> Array:
         """r (..., m)."""
-        rows = self.residual(self.floats(q))
-        return np.stack([np.broadcast_to(x, q.shape[:-1]) for x in rows], axis=-1)
+        return self.floats(self.residual, q)
 
     def jacobian_floats(self, q: Array) -> Array:
         """J (..., m, n + m)."""
-        rows = self.jacobian(self.floats(q))
-        J = np.array([[np.broadcast_to(x, q.shape[:-1]) for x in row] for row in rows])
-        return np.moveaxis(J, (0, 1), (-2, -1))
+        J = self.floats([x for row in self.jacobian for x in row], q)
+        return J.reshape(*q.shape[:-1], len(self.equations), -1)
 
     def closed(self, q: Array, *, steps: int, tolerance: float) -> Array:
         """q with tied joints near those given that close the loops, if Newton finds them."""
@@ -154,8 +167,8 @@ def loop_system(robot: Robot) -> LoopSystem:
     """Choose the equations: pivoted elimination of their Jacobian in the tied joints at the start
     configuration.
     """
-    closure = close(robot)
-    rows = LoopSystem(robot, closure, tuple(range(6 * len(robot.loops))))
+    d = derive(robot)
+    closure, rows = d.closure, LoopSystem(d, tuple(range(6 * len(robot.loops))))
     J = rows.jacobian_floats(rows.start)[:, rows.tied]
     equations: list[int] = []
     for _ in closure.tied:
@@ -163,4 +176,4 @@ def loop_system(robot: Robot) -> LoopSystem:
         equations.append(row)
         direction = J[row] / np.linalg.norm(J[row])
         J = J - np.outer(J @ direction, direction)
-    return LoopSystem(robot, closure, tuple(sorted(equations)))
+    return LoopSystem(d, tuple(sorted(equations)))

@@ -1,4 +1,4 @@
-"""The residual of closed loops over any algebra, and Newton's method for it.
+"""The residual of closed loops as nodes of a graph, and Newton's method for it.
 
 A loop closes where its cut frame and its twin coincide, rT_cut = rT_twin, r its root: the last
 frame on the paths of both. `coincidence` says so by twelve differences; `residuals` by six, of
@@ -14,8 +14,9 @@ import numpy as np
 
 from symgen.derive.closure import Closure
 from symgen.derive.geometry import Geometry
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
-from symgen.derive.scalar import Algebra, Matrix, Scalar, Vector, dot, sub
+from symgen.derive.scalar import Matrix, Scalar, Vector, dot, sub
 from symgen.description.robot import Robot
 
 Array = np.ndarray
@@ -25,7 +26,7 @@ DIFFERENCE = 1e-6  # of central differences, rad or m
 ALL = slice(None)
 
 
-def loop_ends(robot: Robot, algebra: Algebra, closure: Closure) -> list[tuple[Pose, Pose]]:
+def loop_ends(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[tuple[Pose, Pose]]:
     """Orientation and origin of the cut frame and of its twin in the root of their loop, which no
     joint before it turns, loop by loop.
     """
@@ -45,7 +46,7 @@ def coincidence(ends: list[tuple[Pose, Pose]]) -> list[Scalar]:
     ]
 
 
-def residuals(robot: Robot, algebra: Algebra, closure: Closure) -> list[Scalar]:
+def residuals(robot: Robot, algebra: GraphAlgebra, closure: Closure) -> list[Scalar]:
     """P_cut - P_twin and the axial vector of A_cut' A_twin, six entries a loop.
 
     Where the cut joint is no independent one, its angle is a sum of others and the orientations

@@ -22,8 +22,10 @@ import numpy as np
 from symgen.derive.assembly import STEPS, TOLERANCE, Assembly, declared_relations
 from symgen.derive.closure import Closure, Relation, open_tree
 from symgen.derive.exact import Draw
-from symgen.derive.float_algebra import FloatAlgebra
+from symgen.derive.floats import Floats, states_of
 from symgen.derive.geometry import Geometry
+from symgen.derive.graph import interpret
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.kinematics import frame_poses
 from symgen.derive.loop_residual import Array, coincidence, loop_ends, newton
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
@@ -157,11 +159,13 @@ def _angle_sum(
     hinges = [(1, j) for j in twin if j not in cut] + [(-1, j) for j in cut if j not in twin]
     hinges = [(sign, j) for sign, j in hinges if robot.frame(j).sigma == REVOLUTE]
     row: dict[int, Expression] = {}
+    pose = frame_poses(Geometry(robot, GraphAlgebra(robot), open_tree(robot)))
+    axes = [axis[2] for _, j in hinges for axis in pose[j][0]]
     for shift in (0.0, 0.3):
-        q = {j: np.asarray(x + shift * k) for k, (j, x) in enumerate(configuration.items())}
-        pose = frame_poses(Geometry(robot, FloatAlgebra(robot, q), assembly.tree))
-        axis = {j: np.array([float(row[2]) for row in pose[j][0]]) for _, j in hinges}
-        along = {j: float(z @ axis[loop.cut]) for j, z in axis.items()}
+        q = {j: x + shift * k for k, (j, x) in enumerate(configuration.items())}
+        z = np.array(interpret(axes, Floats(robot, states_of(q=q))), dtype=float).reshape(-1, 3)
+        axis_of = {j: z[k] for k, (_, j) in enumerate(hinges)}
+        along = {j: float(axis @ axis_of[loop.cut]) for j, axis in axis_of.items()}
         if any(abs(abs(x) - 1) > 1e-9 for x in along.values()):
             return None
         row = {j: Expression.number(s * round(along[j])) for s, j in hinges if j != loop.cut}
@@ -297,8 +301,8 @@ def _coincide(closure: Closure) -> bool:
     """Whether cut and twin frames are equal over F_p for random lengths and positions: the proof of
     the relations.
     """
-    draw = Draw(closure.robot, 17, 3)
-    rows = coincidence(loop_ends(closure.robot, draw, closure))
+    draw, algebra = Draw(closure.robot, 17, 3), GraphAlgebra(closure.robot)
+    rows = interpret(coincidence(loop_ends(closure.robot, algebra, closure)), draw)
     return not any(draw.residues(x).any() for x in rows)
 
 

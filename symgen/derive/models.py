@@ -21,7 +21,7 @@ from symgen.derive.energies import (
 )
 from symgen.derive.frames import Frames
 from symgen.derive.graph import Symbol
-from symgen.derive.loop_equations import LoopSystem, loop_system
+from symgen.derive.loop_equations import LoopSystem
 from symgen.derive.model import Case, Entry, Model, Place, Request, equations
 from symgen.derive.names import Names
 from symgen.derive.rewrite import Input
@@ -236,13 +236,13 @@ def _closure(d: Derivation, r: Request) -> Iterator[Case]:
             f"{d.robot.name} has no closure equations to solve: "
             f"{why if d.robot.passive else 'it has no passive joints'}"
         )
-    residuals = LoopSystem(d.robot, d.closure, equations(d)).residual(d.algebra)
+    residuals = LoopSystem(d, equations(d)).residual
     yield Case([Entry((k,), x) for k, x in enumerate(residuals)])
 
 
 def _linearised(d: Derivation, r: Request) -> Iterator[Case]:
-    system, title = loop_system(d.robot), "Residuals and their derivatives by the joints"
-    rows = zip(system.residual(d.algebra), system.jacobian(d.algebra), strict=True)
+    system, title = LoopSystem(d, equations(d)), "Residuals and their derivatives by the joints"
+    rows = zip(system.residual, system.jacobian, strict=True)
     yield Case(
         [
             Entry((k, column), x, title)
@@ -253,8 +253,8 @@ def _linearised(d: Derivation, r: Request) -> Iterator[Case]:
 
 
 def _curvature(d: Derivation, r: Request) -> Iterator[Case]:
-    system = loop_system(d.robot)
-    values = (*system.curvature(d.algebra), *system.alignment(d.algebra))
+    system = LoopSystem(d, equations(d))
+    values = (*system.curvature, *system.alignment)
     title = "Second derivatives at constant rates"
     yield Case([Entry((k,), x, title) for k, x in enumerate(values)])
 

@@ -1,4 +1,4 @@
-"""Newton-Euler, once: the motion of the links outward and the wrenches inward, over any scalars.
+"""Newton-Euler, once: the motion of the links outward and the wrenches inward.
 
 Link j, frame j, i = ant(j), a_j the acceleration of O_j minus gravity, U = skew(wd) + skew(w)**2:
 
@@ -183,9 +183,10 @@ class Motion:
             (D[0, 1], D[1, 1], D[1, 2]),
             (D[0, 2], D[1, 2], D[2, 2]),
         )
-        DW = tuple(
-            name(sub(DV[k][k], DV[m][m]), named("DW", k + 1, m + 1, j, *self.tag))
-            for k, m in ((1, 2), (2, 0), (0, 1))
+        DW: Vector = (
+            name(sub(DV[1][1], DV[2][2]), named("DW", 2, 3, j, *self.tag)),
+            name(sub(DV[2][2], DV[0][0]), named("DW", 3, 1, j, *self.tag)),
+            name(sub(DV[0][0], DV[1][1]), named("DW", 1, 2, j, *self.tag)),
         )
 
         def off(k: int, m: int, value: Scalar) -> Scalar:

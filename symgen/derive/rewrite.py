@@ -12,13 +12,16 @@ over F_p, which never rounds: nodes with the same value are merged, up to sign.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from symgen.derive.exact import Array, Draw, Fp, power
+from symgen.derive.exact import Draw, Fp
 from symgen.derive.graph import (
     ADD,
+    AT_ZERO,
     CONST,
     COS,
     OPAQUE,
@@ -28,11 +31,11 @@ from symgen.derive.graph import (
     Node,
     Scalar,
     Symbol,
+    interpret,
     reachable,
 )
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
-from symgen.derive.scalar import AT_ZERO
 from symgen.description.expression import Expression
 
 SAMPLES = 3
@@ -41,6 +44,15 @@ RECURSIVE = {"W", "WP", "DV", "DW", "U", "VSP", "VP"}
 
 Input = Expression | Symbol | Callable[[GraphAlgebra], Scalar | int]
 Inputs = Mapping[Symbol, Input]
+
+
+class ByNode(Draw):
+    """A draw in which every velocity has a direction of its own: sign(K qd) is not sign(qd), since
+    K may have either sign.
+    """
+
+    def forward(self, node: Node, rate: Fp) -> Fp:
+        return self._opaque(SIGN, [rate])
 
 
 class Rewrite:
@@ -56,13 +68,12 @@ class Rewrite:
     """
 
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
-        self.source, self.inputs, self.algebra = source, inputs, GraphAlgebra(source.robot)
+        self.source, self.inputs = source, inputs
+        self.algebra = GraphAlgebra(source.robot, written=False)
         self.algebra.labels |= source.labels  # one name, one angle, here as there
         self.graph = self.algebra.graph
-        self.draw = Draw(source.robot, 7, SAMPLES)
-        self._rng = np.random.default_rng(5)
-        self._drawn: dict[object, Array] = {}  # of symbols that are no states, and of directions
-        self._value: dict[int, Array] = {}  # of the nodes of self.graph, over F_p
+        self.draw = ByNode(source.robot, 7, SAMPLES)
+        self._value: dict[int, Any] = {}  # of the nodes of self.graph, over F_p
         self._first: dict[tuple[int, ...], Scalar] = {}  # by value
         self._same: dict[int, Scalar | int] = {}  # of a node: the first one of the same value
         self._image: dict[int, Scalar | int] = {}
@@ -131,28 +142,20 @@ class Rewrite:
             case "mul":
                 return x[0] * x[1]
             case "cos" | "sin" if self._is_given(node):
-                turn, offset = self.source.angles[node.index]
+                turn, offset = node.value
                 given = {j: self.inputs.get(Symbol("q", f"q{j}")) for j, _ in turn}
                 for j, n in turn:
                     if isinstance(value := given[j], Expression):
                         offset = offset + value * n
                 turn = tuple((j, n) for j, n in turn if given[j] is None)
-                turned: Scalar | int = self.algebra.cos_sin(turn, offset)[node.op == "sin"]
-                return turned
+                return self.algebra.cos_sin(turn, offset)[node.op == SIN]
             case "sign" | "pos" if type(x[0]) is int and x[0] == 0:
                 return 0
             case op if op in OPAQUE and type(x[0]) is int and x[0] == 0:
                 return AT_ZERO[op]
         operand, *more = map(graph.lift, x)
-        image = graph.call(node.op, operand, *more)
-        if node.op in (COS, SIN):
-            turn, offset = self.source.angles[node.index]
-            if operand.sign < 0:
-                turn, offset = tuple((j, -n) for j, n in turn), -offset
-            self.algebra.angles.setdefault(image.node.index, (turn, offset))
-        elif node.op == SQRT:
-            self.algebra.roots.setdefault(image.node.index, self.source.roots[node.index])
-        return image
+        of = node.value if node.op in (COS, SIN, SQRT) else None
+        return graph.call(node.op, operand, *more, of=of)
 
     def _sum(self, a: Scalar | int, b: Scalar | int) -> Scalar | int:
         """a + b, without a term of a that b takes away: (x + y) + (z - x) = y + z."""
@@ -163,8 +166,7 @@ class Rewrite:
 
     def _is_given(self, node: Node) -> bool:
         """Whether the angle of a cosine or sine holds a joint position that is replaced."""
-        turn, _ = self.source.angles[node.index]
-        return any(Symbol("q", f"q{j}") in self.inputs for j, _ in turn)
+        return any(Symbol("q", f"q{j}") in self.inputs for j, _ in node.value.turn)
 
     def _symbol(self, symbol: Symbol) -> Scalar | int:
         value = self._case.get(symbol, self.inputs.get(symbol, symbol))
@@ -173,6 +175,8 @@ class Rewrite:
             return given
         if not isinstance(value, Symbol):
             return value(self.algebra)
+        if value.kind == "number":
+            return self.graph.number(Fraction(value.name))
         fixed = value.kind in ("constant", "pi", "parameter", "gravity")
         return self.graph.symbol(value, fixed=fixed)
 
@@ -189,8 +193,8 @@ class Rewrite:
     def _first_of(self, node: Node) -> Scalar | int:
         """0, 1 or -1 where that is the value of the node, else the first node of its value."""
         p = self.draw.p
-        value = self._value_of(node)
-        residues = np.broadcast_to(value % p, SAMPLES).tolist()
+        (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
+        residues = np.broadcast_to(self.draw.residues(value), SAMPLES).tolist()
         number = {0: 0, 1: 1, p - 1: -1}.get(residues[0])
         if number is not None and len({*residues}) == 1 and node.op != CONST:
             return number
@@ -198,64 +202,6 @@ class Rewrite:
         key = tuple(sign * x % p for x in residues)
         first = self._first.setdefault(key, self.graph.scalar(node.index, sign))
         return first if sign > 0 else -first
-
-    def _value_of(self, node: Node) -> Array:
-        if node.index not in self._value:
-            self._value[node.index] = self._evaluated(node)
-        return self._value[node.index]
-
-    def _operand(self, s: Scalar) -> Array:
-        value = self._value_of(s.node)
-        return value if s.sign > 0 else -value % self.draw.p
-
-    def _evaluated(self, node: Node) -> Array:
-        p = self.draw.p
-        match node.op:
-            case "sym":
-                return self._drawn_symbol(node.value)
-            case "const":
-                return np.array([node.value.numerator * pow(node.value.denominator, -1, p) % p])
-            case "add":
-                a, b = map(self._operand, node.operands)
-                return np.asarray((a + b) % p)
-            case "mul":
-                a, b = map(self._operand, node.operands)
-                return np.asarray(a * b % p)
-            case "cos" | "sin":
-                point = self.draw.cos_sin(*self.algebra.angles[node.index])[node.op == "sin"]
-                return point.x if isinstance(point, Fp) else np.array([point % p])
-            case "sqrt":
-                return np.asarray(self.draw.constant(self.algebra.roots[node.index]).x)
-            case "inv":
-                return power(self._operand(node.operands[0]), p - 2, p)
-            case op if op in OPAQUE:
-                return self._random((op, *((x.node.index, x.sign) for x in node.operands)))
-        return self._directed(node)
-
-    def _directed(self, node: Node) -> Array:
-        """sign(x) = 2b - 1, max(x, 0) = b x, max(sign(x), 0) = b, with b of the node x."""
-        p = self.draw.p
-        (x,) = node.operands
-        of_sign = x.node.op == SIGN
-        b = self._random(x.node.operands[0].node.index if of_sign else x.node.index)
-        if node.op == SIGN:
-            return (2 * b - 1) % p
-        step = b if x.sign > 0 else (1 - b) % p
-        return step if of_sign else step * self._operand(x) % p
-
-    def _drawn_symbol(self, symbol: Symbol) -> Array:
-        state = {"q": self.draw.q, "qd": self.draw.qd, "qdd": self.draw.qdd}.get(symbol.kind)
-        if state:
-            return np.asarray(state(int(symbol.name.lstrip("qQDP"))).x)
-        if symbol.kind == "constant":
-            return np.asarray(self.draw.constant(Expression.symbol(symbol.name)).x)
-        return self._random(symbol)
-
-    def _random(self, key: object) -> Array:
-        """A residue for each state, the same whenever it is asked for."""
-        if key not in self._drawn:
-            self._drawn[key] = self._rng.integers(1, self.draw.p, SAMPLES)
-        return self._drawn[key]
 
 
 def _parted(s: Scalar | int) -> Iterator[tuple[Scalar, Scalar | int]]:

@@ -1,101 +1,24 @@
-"""The scalar protocol: what the recursions need of a number, and vectors of three of them.
+"""Vectors and matrices of graph scalars.
 
-A scalar is anything with + - * and unary minus: a float array, an array over F_p, a graph node, a
-CasADi SX. The Python integers 0,
-1 and -1 are structural in every algebra: they are known while the recursion runs, cost nothing and
-never reach the scalar.
-An `Algebra` turns the symbols of a robot (constants, angles, joint rates, signs) into scalars and
-receives the name of each step.
+A scalar is a node of the graph with a sign, or a constant expression: anything with + - * and unary minus. The Python integers 0, 1 and -1 are structural: they are known while the recursion runs, cost nothing and never reach the graph.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
+from symgen.derive.graph import Turn
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.description.expression import Expression
-from symgen.description.robot import Robot
 
 K = TypeVar("K")
 Scalar = Any
 Vector = tuple[Scalar, Scalar, Scalar]
 Matrix = tuple[Vector, Vector, Vector]  # rows
-Turn = tuple[tuple[int, int | Fraction], ...]  # ((j, n), ...): the angle sum_j n q_j
 
-AT_ZERO = {"sign": 0, "tanh": 0, "sine": 0, "root": 0, "power": 0, "exp": 1, "cosine": 1}
-"""Values of `Algebra.function` at the structural zero."""
 ZERO3: Vector = (0, 0, 0)
 E3: Vector = (0, 0, 1)
-
-
-class Algebra(Protocol):
-    """Where the scalars of one derivation come from."""
-
-    def constant(self, e: Expression) -> Scalar:
-        """A constant expression: number, length, component of gravity, cos or sin of a fixed
-        angle.
-        """
-
-    def gravity(self, axis: int) -> Scalar:
-        """Component of minus the acceleration of gravity in frame 0, m/s**2."""
-
-    def cos_sin(self, turn: Turn, offset: Expression) -> tuple[Scalar, Scalar]:
-        """cos and sin of sum n_j q_j + offset."""
-
-    def q(self, j: int) -> Scalar:
-        """Position of joint j."""
-
-    def qd(self, j: int) -> Scalar:
-        """Velocity of joint j."""
-
-    def qdd(self, j: int) -> Scalar:
-        """Acceleration of joint j."""
-
-    def channel(self, name: str) -> Scalar:
-        """A constant that is a function of time."""
-
-    def rate(self, u: int, i: int) -> Scalar:
-        """dq_u/dq_i of a passive joint u that only the loop equations tie to the actuated joint
-        i.
-        """
-
-    def sign(self, rate: Scalar, row: tuple[tuple[int, Expression], ...]) -> Scalar:
-        """sign(sd), sd = G qd = `rate`, G = `row`."""
-
-    def one_sided(
-        self, rate: Scalar, row: tuple[tuple[int, Expression], ...], when: str
-    ) -> tuple[Scalar, Scalar]:
-        """(sign(sd), sd) where the motion has the direction `when`, (0, 0) elsewhere."""
-
-    def function(self, op: str, *operands: Scalar) -> Scalar:
-        """inv (1/x), sign, exp, tanh, cosine, sine, root or power (x**y) of scalars."""
-
-    def name(self, value: Scalar, name: str) -> Scalar:
-        """The same value, which later steps call `name`."""
-
-    def hint(self, value: Scalar, name: str) -> Scalar:
-        """The same value, to be called `name` if it is used more than once."""
-
-    def section(self, title: str) -> None:
-        """What follows belongs under this heading."""
-
-
-class Unnamed:
-    """Part of an algebra of numbers, which prints nothing: names and headings are left aside."""
-
-    robot: Robot
-
-    def gravity(self, axis: int) -> Scalar:
-        return self.constant(-self.robot.gravity[axis])  # type: ignore[attr-defined]
-
-    def name(self, value: Scalar, name: str) -> Scalar:
-        return value
-
-    hint = name
-
-    def section(self, title: str) -> None:
-        return None
 
 
 def is_zero(v: Vector) -> bool:
@@ -134,12 +57,12 @@ def dot(u: Sequence[Scalar], v: Sequence[Scalar]) -> Scalar:
     return total
 
 
-def linear(algebra: Algebra, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
+def linear(algebra: GraphAlgebra, row: Mapping[K, Expression], x: Mapping[K, Scalar]) -> Scalar:
     """sum_i row_i x_i."""
     return dot([algebra.constant(g) for g in row.values()], [x[i] for i in row])
 
 
-def turned(algebra: Algebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
+def turned(algebra: GraphAlgebra, turn: Turn, x: Mapping[int, Scalar]) -> Scalar:
     """sum n_j x_j of a turn; 0 for a joint that x leaves out."""
     row = {j: Expression.number(n) for j, n in turn}
     return linear(algebra, row, {j: x.get(j, 0) for j in row})

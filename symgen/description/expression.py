@@ -65,7 +65,7 @@ class Call:
 @dataclass(frozen=True)
 class Number:
     """A positive rational that formulas keep as the robot file writes it: 0.4318**2, not
-    0.18645124. See `regroup.numbers`.
+    0.18645124. See `derive.numbers`.
     """
 
     value: Fraction

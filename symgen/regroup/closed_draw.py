@@ -1,4 +1,4 @@
-"""Points of a closed mechanism over F_p.
+"""Points of a closed mechanism over F_p, a domain of graph nodes.
 
 The tied joints are algebraic functions of the actuated ones. Where the orientations of every loop
 agree by construction (sums of angles), the closure equations r = 0 are positions. Lengths and
@@ -30,8 +30,11 @@ import numpy as np
 
 from symgen.derive.angles import Variable
 from symgen.derive.exact import Array, Draw, Point, power, primes_for
+from symgen.derive.graph import Symbol, interpret
+from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.loop_equations import loop_system
-from symgen.derive.loop_residual import coincidence, loop_ends, residuals
+from symgen.derive.loop_residual import coincidence, loop_ends
+from symgen.derive.numbers import numbered
 from symgen.derive.scalar import Scalar
 from symgen.description.expression import Call, Number
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot
@@ -46,8 +49,9 @@ ON_BRANCH = 1e-6  # rad
 class ClosedDraw(Draw):
     """`samples` closed states at each of `count` random geometries.
 
-    `geometry` gives residues, shape (count, 1), of what varies; default: all lengths. `wide` times
-    as many states as usual are drawn. Raises ArithmeticError where no two joints close each loop.
+    `geometry` gives residues, shape (count, 1), of what varies; default: all lengths, or those that
+    are constants where `at_numbers` leaves the others at their values. `wide` times as many states
+    as usual are drawn. Raises ArithmeticError where no two joints close each loop.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class ClosedDraw(Draw):
         count: int = 1,
         p: int | None = None,
         geometry: Mapping[Variable, Array] | None = None,
+        at_numbers: bool = False,
         wide: int = 1,
     ) -> None:
         self.system = loop_system(robot)
@@ -71,17 +76,21 @@ class ClosedDraw(Draw):
         p = p if p is not None else primes_for(robot, 1)[0]
         rng = np.random.default_rng([seed, 1])
         if geometry is None:
-            geometry = {v: rng.integers(1, p, count) for v in lengths_of(robot)}
+            lengths = lengths_of(robot if at_numbers else numbered(robot))
+            geometry = {v: rng.integers(1, p, count) for v in lengths}
         # half of the draws close a loop
         more = wide * (int(samples * 2.4 ** len(robot.loops)) + SPARE)
         drawn = {v: np.repeat(x, more) for v, x in geometry.items()}
         super().__init__(robot, seed, count * more, p=p, geometry=drawn)
+        self.rng = rng
         hinges = [u for u in self.tied if robot.frame(u).sigma == REVOLUTE]
         self.parts |= dict.fromkeys(hinges, 1)  # of second degree in points of q_u alone
         self.shape = (count, samples)
         self._take(self._close().reshape(-1, more))
-        ends = loop_ends(robot, self, self.system.closure)
-        if any(self.residues(x).any() for x in coincidence(ends)):
+        geometry_of_all = self.system.derivation.geometry
+        algebra = GraphAlgebra(geometry_of_all.robot)
+        ends = loop_ends(geometry_of_all.robot, algebra, geometry_of_all.closure)
+        if any(self.residues(x).any() for x in interpret(coincidence(ends), self)):
             raise ArithmeticError("the loops do not close by their positions alone")
         self._move()
 
@@ -117,20 +126,20 @@ class ClosedDraw(Draw):
 
         r = sum_ik R_ik y_i z_k with y = (1, cos u, sin u) or (1, u), z = (1, cos v, sin v).
         """
-        p, slides = self.p, self.robot.frame(u).sigma == PRISMATIC
+        p, slides, q_u = self.p, self.robot.frame(u).sigma == PRISMATIC, Symbol("q", f"q{u}")
         # where half-angle tangents are zero: a fold has half a turn, whose tangent is none
-        zero = self._circle(1)
+        zero = self._point_at(self.rng.integers(1, p, 1))
         whole = np.ones(self.samples, dtype=np.int64)
         corners: list[Point] = [(0 * whole, 0 * whole), (whole, 0 * whole), (0 * whole, whole)]
 
         def equations(i: int, k: int) -> Array:
-            self._point[v] = corners[k]
+            self._points[v] = corners[k]
             if slides:
-                self._q[u] = i * whole
+                self._residues[q_u] = i * whole
             else:
-                self._point[u] = corners[i]
-            r = residuals(self.robot, self, self.system.closure)
-            return np.stack([self._array(r[row]) for row in rows])
+                self._points[u] = corners[i]
+            r = interpret([self.system.rows[row] for row in rows], self)
+            return np.stack([self._array(x) for x in r])
 
         R = np.array([[equations(i, k) for k in range(3)] for i in range(2 if slides else 3)])
         R[1:] -= R[:1]
@@ -139,10 +148,10 @@ class ClosedDraw(Draw):
         def place(x: Array) -> Array:
             """Joint u at the half-angle tangent or stroke x; y there, or 1, x, x**2."""
             if slides:
-                self._q[u] = x
+                self._residues[q_u] = x
                 return np.stack([whole, x, x * x % p])
-            self._point[u] = self._turned(self._point_at(x), zero)
-            return np.stack([whole, *self._point[u]])
+            self._points[u] = self._turned(self._point_at(x), zero)
+            return np.stack([whole, *self._points[u]])
 
         def tip(y: Array) -> tuple[Point, Array]:
             """(cos v, sin v) that closes the loop, on the circle or not, and the determinant of its
@@ -154,7 +163,7 @@ class ClosedDraw(Draw):
 
         basis, excess = [], []
         for _ in range(4):
-            basis.append(place(self._random(self.samples)))
+            basis.append(place(self.rng.integers(1, p, self.samples)))
             (c, s), scale = tip(basis[-1])
             excess.append((c * c + s * s - 1) % p * scale % p)
         none, one, two = coefficients = self._solved(np.stack(basis[:3]), np.stack(excess[:3]))
@@ -171,13 +180,13 @@ class ClosedDraw(Draw):
         ends: list[tuple[Array, Point, Point | None]] = []
         for sign in (1, -1):
             x = (sign * root - one) % p * power(2 * two % p, p - 2, p) % p
-            ends.append((x, tip(place(x))[0], self._point.get(u)))
+            ends.append((x, tip(place(x))[0], self._points.get(u)))
         second = self.rng.integers(0, 2, self.samples).astype(bool)
         if square.all():
             label, a, b = (v, ends[0][1], ends[1][1]) if slides else (u, ends[0][2], ends[1][2])
             second = ~self._branch(label, a, b, around)  # type: ignore[arg-type]
         place(np.where(second, ends[1][0], ends[0][0]))
-        self._point[v] = (
+        self._points[v] = (
             np.where(second, ends[1][1][0], ends[0][1][0]),
             np.where(second, ends[1][1][1], ends[0][1][1]),
         )
@@ -197,7 +206,7 @@ class ClosedDraw(Draw):
                 np.zeros(self.samples, dtype=np.int64),
             )
             for i, n in zip(hinges, turns, strict=True):
-                turned = self._turned(turned, self._multiple(self._point[i], n))
+                turned = self._turned(turned, self._multiple(self._joint(i), n))
             for k in range(4):
                 on = [
                     ((a[0] - turned[0]) % p == 0) & ((a[1] - turned[1]) % p == 0)
@@ -225,30 +234,32 @@ class ClosedDraw(Draw):
         if (closed.sum(axis=1) < count).any():
             raise ArithmeticError(SINGULAR)
         places = np.flatnonzero(closed & (closed.cumsum(axis=1) <= count))
-        tables: Any = (self._geometry, self._constants, self._q, self._qd, self._qdd)
-        for table in tables:
+        residues: Any = (self._geometry, self._residues)
+        for table in residues:
             table |= {key: x[places] for key, x in table.items() if len(x) == whole}
-        tables = (self._point, self._angles)
-        for table in tables:
-            table |= {k: (c[places], s[places]) for k, (c, s) in table.items() if len(c) == whole}
+        self._points |= {
+            key: (c[places], s[places]) for key, (c, s) in self._points.items() if len(c) == whole
+        }
         self.samples = len(places)
 
     def _move(self) -> None:
         """Rates and accelerations of the tied joints."""
         joints, n = self.robot.joints, len(self.robot.joints)
-        J = np.stack(
-            [np.stack([self._array(x) for x in row]) for row in self.system.jacobian(self)]
-        )
+        named = self.system.derivation.algebra.named
+        rows = [interpret(row, self) for row in self.system.jacobian]
+        J = np.stack([np.stack([self._array(x) for x in row]) for row in rows])
         J_u = J[:, n:]
         G = np.stack([self._solved(J_u, -J[:, k] % self.p) for k in range(n)], axis=1)
+        qd = np.stack([self._state(Symbol("qd", f"QP{i}")) for i in joints])
+        qdd = np.stack([self._state(Symbol("qdd", f"QDP{i}")) for i in joints])
         for a, u in enumerate(self.tied):  # G (tied, n, samples)
-            self._rate |= {(u, i): G[a, k] for k, i in enumerate(joints)}
-            self._qd[u] = (G[a] * np.stack([self._qd[i] for i in joints]) % self.p).sum(axis=0)
-            self._qd[u] %= self.p
-        B = np.stack([self._array(x) for x in self.system.curvature(self)])
+            for k, i in enumerate(joints):
+                self._residues[Symbol("rate", named("G", u, i))] = G[a, k]
+            self._residues[Symbol("qd", f"QP{u}")] = (G[a] * qd % self.p).sum(axis=0) % self.p
+        B = np.stack([self._array(x) for x in interpret(self.system.curvature, self)])
         for a, (u, bend) in enumerate(zip(self.tied, self._solved(J_u, -B % self.p), strict=True)):
-            along = (G[a] * np.stack([self._qdd[i] for i in joints]) % self.p).sum(axis=0)
-            self._qdd[u] = (along + bend) % self.p
+            along = (G[a] * qdd % self.p).sum(axis=0)
+            self._residues[Symbol("qdd", f"QDP{u}")] = (along + bend) % self.p
 
     def _solved(self, A: Array, b: Array) -> Array:
         """x with A x = b sample by sample, A of shape (m, m, samples); a singular sample gives

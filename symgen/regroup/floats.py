@@ -13,14 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from symgen.derive.closure import Closure
-from symgen.derive.columns import sampled_columns
+from symgen.derive.derivation import derive
 from symgen.derive.exact import Array
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
+from symgen.derive.floats import Floats, states_of
+from symgen.derive.graph import Symbol, interpret
 from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.errors import SymgenError
@@ -69,9 +67,8 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
             states[0] *= np.pi
             states[1] *= 10 ** rng.uniform(*DECADES, states[1].shape)
         q, qd, qdd = (dict(zip(robot.moving, x, strict=True)) for x in states)
-        algebra = FloatAlgebra(robot, q, qd, qdd, constants=_in_time(robot, rng, count))
-        D = _columns(closure, algebra, names, count)
-        return D.reshape(-1, len(names))
+        floats = Floats(robot, states_of(q=q, qd=qd, qdd=qdd), _in_time(robot, rng, count))
+        return sampled_columns(floats, names, count).reshape(-1, len(names))
     system, count = loop_system(robot), 3 * len(names) // len(robot.joints) + 10
     blocks: list[Array] = []
     closed = tried = 0
@@ -87,8 +84,14 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
     return np.concatenate(blocks, axis=1)[:, :count].reshape(-1, len(names))
 
 
-def _columns(closure: Closure, algebra: FloatAlgebra, names: Sequence[str], count: int) -> Array:
-    return sampled_columns(Motion(Geometry(closure.robot, algebra, closure)), names, count)
+def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
+    """D of the parameters `names` at `count` states, shape (actuated joints, count, names)."""
+    robot, D = floats.robot, derive(floats.robot).columns
+    entries = [D[name].get(j, 0) for j in robot.joints for name in names]
+    values = [
+        np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
+    ]
+    return np.stack(values).reshape(len(robot.joints), len(names), count).swapaxes(1, 2)
 
 
 def _columns_near_start(
@@ -114,15 +117,17 @@ def _columns_near_start(
         return dict(zip(closure.independent, x.T, strict=True))
 
     qd = np.concatenate([qd, G @ qd], axis=1)[..., 0]
-    algebra = FloatAlgebra(robot, joints(q), joints(qd))
-    B = np.stack([np.broadcast_to(x, len(q)) for x in system.curvature(algebra)], axis=-1)
+    B = system.floats(system.curvature, q, qd)
     qdd = np.concatenate([qdd, G @ qdd - np.linalg.solve(J_u, B[..., None])], axis=1)[..., 0]
+    named = system.derivation.algebra.named
     rate = {
-        (u, i): G[:, a, k] for a, u in enumerate(closure.tied) for k, i in enumerate(robot.joints)
+        Symbol("rate", named("G", u, i)): G[:, a, k]
+        for a, u in enumerate(closure.tied)
+        for k, i in enumerate(robot.joints)
     }
-    drawn = _in_time(robot, rng, len(q))
-    algebra = FloatAlgebra(robot, joints(q), joints(qd), joints(qdd), rate, constants=drawn)
-    return _columns(closure, algebra, names, len(q))
+    states = states_of(q=joints(q), qd=joints(qd), qdd=joints(qdd)) | rate
+    floats = Floats(robot, states, _in_time(robot, rng, len(q)))
+    return sampled_columns(floats, names, len(q))
 
 
 def _in_time(robot: Robot, rng: np.random.Generator, count: int) -> Any:

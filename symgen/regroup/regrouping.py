@@ -18,6 +18,7 @@ from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.elements import is_opaque
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
+from symgen.derive.numbers import numbered
 from symgen.derive.time_limit import limited
 from symgen.description.expression import (
     ONE,
@@ -31,7 +32,6 @@ from symgen.description.robot import PRISMATIC, Robot
 from symgen.regroup.finite_field import rref
 from symgen.regroup.floats import float_relations, numeric_coefficients
 from symgen.regroup.formula import Formula
-from symgen.regroup.numbers import numbered
 from symgen.regroup.residues import drawn, sample, states_for
 from symgen.regroup.rules import Combination, Step, Transfer
 from symgen.regroup.solve import coefficients
@@ -139,7 +139,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
     names = preference(robot, transfer.remaining)
     reason = ""
     try:
-        draw = drawn(robot, seed, states_for(robot, names))
+        draw = drawn(given, seed, states_for(given, names))
         pivots, R = rref(sample(draw, names).reshape(-1, len(names)), draw.p)
     except ArithmeticError as error:
         base, relations = float_relations(given, names)
@@ -159,7 +159,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
             for c, name in enumerate(names)
             if c not in pivots
         }
-        exact, missing = coefficients(robot, supports)
+        exact, missing = coefficients(given, supports)
         betas = exact | {n: numeric_coefficients(given, n, supports[n]) for n in missing}
         relations = {
             name: dict(zip(support, betas.get(name, []), strict=True))
@@ -167,7 +167,7 @@ def _regrouped(robot: Robot, seed: int) -> Regrouping:
         }
         reason = _reason(missing) if missing else ""
     method = f"{NUMERIC}; {reason}" if reason else EXACT
-    regrouping = _assemble(robot, transfer, base, relations, Draw(robot, seed, 1))
+    regrouping = _assemble(robot, transfer, base, relations, Draw(given, seed, 1))
     return replace(regrouping, robot=given, method=method)
 
 

@@ -8,11 +8,10 @@ from functools import lru_cache
 import numpy as np
 
 from symgen.derive.angles import Variable
-from symgen.derive.columns import columns
+from symgen.derive.derivation import derive
 from symgen.derive.exact import Array, Draw
-from symgen.derive.geometry import Geometry
+from symgen.derive.graph import interpret
 from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion
 from symgen.description.robot import Robot
 from symgen.regroup.closed_draw import closed_draw
 
@@ -38,13 +37,16 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     """The regressor columns `names` at the draw's states, shape (..., n_active * samples,
     len(names)), int64 residues.
     """
-    robot = draw.robot
-    D = columns(Motion(Geometry(robot, draw, close(robot))), names)
+    robot, D = draw.robot, derive(draw.robot).columns
+    entries = {
+        (k, row): D[name][j]
+        for k, name in enumerate(names)
+        for row, j in enumerate(robot.joints)
+        if j in D[name]
+    }
     W = np.zeros((len(names), len(robot.joints), *draw.shape), dtype=np.int64)
-    for k, name in enumerate(names):
-        for row, j in enumerate(robot.joints):
-            if j in D[name]:
-                W[k, row] = draw.spread(D[name][j])
+    for place, value in zip(entries, interpret([*entries.values()], draw), strict=True):
+        W[place] = draw.spread(value)
     W = np.moveaxis(W, -1, 2)  # names, joints, samples, geometries
     return np.moveaxis(W.reshape(len(names), -1, *draw.shape[:-1]), (0, 1), (-1, -2))
 

@@ -29,11 +29,11 @@ import numpy as np
 
 from symgen.derive.angles import PI, Variable, fixed_angles, roots_of, units_of
 from symgen.derive.exact import Array, Draw, primes_for
+from symgen.derive.numbers import numbered, numbers_of
 from symgen.derive.time_limit import require_time
 from symgen.description.expression import Call, Expression, Number
 from symgen.description.robot import Robot
 from symgen.regroup.finite_field import rref, small_rational, solve_each
-from symgen.regroup.numbers import numbers_of
 from symgen.regroup.residues import drawn, sample, states_for
 
 MAX_UNKNOWNS = 500
@@ -97,13 +97,16 @@ class Pool:
         self.names = tuple(
             dict.fromkeys(name for d, support in supports.items() for name in (*support, d))
         )
-        whole = (PI, Fraction(1, units_of(robot).D))
-        units = [
-            u for u in units_of(robot).all if u != whole or ("pi" in free and fixed_angles(robot))
+        written = numbered(robot)
+        whole = (PI, Fraction(1, units_of(written).D))
+        turns = "pi" in free and fixed_angles(written)
+        units = [u for u in units_of(written).all if u != whole or turns]
+        numbers: list[Variable] = [*numbers_of(written)] if "numbers" in free else []
+        numbers += [
+            root
+            for root in roots_of(written)
+            if "numbers" in free or root.argument.constant is None
         ]
-        numbers: list[Variable] = (
-            [*numbers_of(robot), *roots_of(robot)] if "numbers" in free else []
-        )
         self.variables: tuple[Variable, ...] = (*robot.constants, "pi", *units, *numbers)
         self.p = primes_for(robot, k + 1)[k]
         self.rng = np.random.default_rng(len(supports) + 1000 * k)
@@ -341,8 +344,9 @@ class Recognition:
         """Fixed angles of the robot whose cos and sin may enter: none, one of them, two, all; they
         hold every unit that matters.
         """
-        units, written = {v for v in matters if isinstance(v, tuple)}, units_of(self.robot)
-        held = {e: units & {unit for unit, _ in written.of(e)} for e in fixed_angles(self.robot)}
+        units, written = {v for v in matters if isinstance(v, tuple)}, numbered(self.robot)
+        every = units_of(written)
+        held = {e: units & {unit for unit, _ in every.of(e)} for e in fixed_angles(written)}
         angles = [e for e in held if held[e]]
         choices = [
             c

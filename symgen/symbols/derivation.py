@@ -72,7 +72,7 @@ class Source:
         """The derivation, with all passive joints on their own where they stay symbols."""
         if self.closure is self.relations:
             return derive(self.robot)
-        return derived(self.robot, self.closure)
+        return derived(self.robot, open_tree)
 
     def request(self, of: int = 0, frame: int = 0) -> Request:
         """A request of a model over the parameters, with the given values."""

@@ -29,7 +29,7 @@ from symgen.symbols.derivation import source_of
 from symgen.symbols.printers import MathML, latex, latex_symbol, math, math_terms
 from symgen.symbols.printers import text as plain
 from symgen.symbols.symbolic_model import SymbolicModel
-from symgen.symbols.sympy_objects import of_listing, of_model, operated, source_text
+from symgen.symbols.sympy_objects import Objects, of_listing, of_model, source_text
 
 FORMS = ("closed", "recursive")
 FORMATS = ("text", "latex", "latex-fragment", "sympy", "json")
@@ -265,8 +265,8 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
         sections = {"Angles": angles} if angles else {}
     else:
         listing = model.listing
-        operate = partial(operated, number=partial(expressions.product, factors=()))
-        steps, outputs = listing.steps(operate, expressions.symbol)
+        objects = Objects(partial(expressions.product, factors=()))
+        steps, outputs = listing.steps(objects, expressions.symbol)
         values = dict(zip(listing.places, outputs, strict=True))
         sections = {}
         for equation in listing.lines:

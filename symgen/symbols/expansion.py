@@ -20,15 +20,15 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
-from symgen.derive.graph import OPAQUE, Node, Scalar, reachable
+from symgen.derive.graph import OPAQUE, Angle, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.numbers import numbered, numbers_of
 from symgen.description.expression import Expression, call
 from symgen.errors import SymgenError
-from symgen.regroup.numbers import numbered, numbers_of
 from symgen.symbols import expressions
 from symgen.symbols.expressions import Tree
 from symgen.symbols.factors import Factors
-from symgen.symbols.identities import Angle, Coefficient, Identities, forward, number
+from symgen.symbols.identities import Coefficient, Identities, forward, number
 
 Polynomial = Any  # of the ring of the parameters
 CONSTANT, SLIDE, TURN, RATE, DIRECTION = 1, 2, 3, 4, 5  # ranks: the order of factors in a product
@@ -101,15 +101,14 @@ class Expansion:
         """What the cosine and the sine of every angle of the graph are called."""
         names: dict[Angle, tuple[Tree, Tree]] = {}
         for node in self.algebra.graph.nodes:
-            if node.index not in self.algebra.angles:
+            if not isinstance(node.value, Angle):
                 continue
-            turn, rest = self.algebra.angles[node.index]
-            if turn:
+            if node.value.turn:
                 C, S = (f"{letter}{str(node.name)[1:]}" for letter in "CS")
                 while {C, S} & taken:
                     C, S = f"{C}_", f"{S}_"
-                turn, rest, _ = forward(turn, rest)
-                names.setdefault((turn, rest), (expressions.symbol(C), expressions.symbol(S)))
+                angle, _ = forward(node.value)
+                names.setdefault(angle, (expressions.symbol(C), expressions.symbol(S)))
         return names
 
     def _generators(self, node: Node) -> Iterable[tuple[Tree, int]]:
@@ -137,8 +136,9 @@ class Expansion:
         zero.
         """
         if node.op == "sqrt":
-            return self.algebra.roots[node.index]
-        turn, rest = self.algebra.angles[node.index]
+            root: Expression = node.value
+            return root
+        turn, rest = node.value
         return Expression() if turn else call(node.op, rest)
 
     def _node(self, node: Node) -> Polynomial:
@@ -155,9 +155,9 @@ class Expansion:
                 return self.checked(x[0] + x[1])
             case "mul":
                 return self.mul(x[0], x[1])
-            case "cos" | "sin" if self.algebra.angles[node.index][0]:
-                turn, rest, sign = forward(*self.algebra.angles[node.index])
-                C, S = self.identities.pairs[turn, rest]
+            case "cos" | "sin" if node.value.turn:
+                angle, sign = forward(node.value)
+                C, S = self.identities.pairs[angle]
                 return self._lifted(C if node.op == "cos" else sign * S)
             case "cos" | "sin" | "sqrt":
                 return self._lifted(

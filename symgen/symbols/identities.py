@@ -16,11 +16,10 @@ from itertools import combinations, product
 from typing import Any
 
 from symgen.derive.geometry import summed
-from symgen.derive.scalar import Turn
-from symgen.description.expression import Expression, quarter_turns
+from symgen.derive.graph import Angle
+from symgen.description.expression import quarter_turns
 
 Coefficient = Any  # of the ring of cosines, sines, constants and rates
-Angle = tuple[Turn, Expression]  # sum n_j q_j + rest, the first n_j positive
 
 
 class Identities:
@@ -89,14 +88,15 @@ class Identities:
 
     def _whole(self, a: Angle, b: Angle, way: int) -> tuple[Coefficient, Coefficient] | None:
         """cos and sin of a + way b, where that is an angle of the model."""
-        turn = summed((*a[0], *((j, way * n) for j, n in b[0])))
+        turn = summed((*a.turn, *((j, way * n) for j, n in b.turn)))
         if not turn:
             return None
-        turn, rest, sign = forward(turn, a[1] + b[1] * way)
-        quarters, rest = quarter_turns(rest)
-        if (turn, rest) not in self.pairs:
+        angle, sign = forward(Angle(turn, a.offset + b.offset * way))
+        quarters, rest = quarter_turns(angle.offset)
+        angle = Angle(angle.turn, rest)
+        if angle not in self.pairs:
             return None
-        C, S = self.pairs[turn, rest]
+        C, S = self.pairs[angle]
         c, s = ((C, S), (-S, C), (-C, -S), (S, -C))[quarters % 4]
         return c, sign * s
 
@@ -112,8 +112,6 @@ def _ends(monomial: tuple[int, ...]) -> tuple[int, int]:
     return inside[0], inside[-1]
 
 
-def forward(turn: Turn, rest: Expression) -> tuple[Turn, Expression, int]:
+def forward(angle: Angle) -> tuple[Angle, int]:
     """The angle with its first joint positive, and the sign of its sine."""
-    if turn[0][1] > 0:
-        return turn, rest, 1
-    return tuple((j, -n) for j, n in turn), -rest, -1
+    return (angle, 1) if angle.turn[0][1] > 0 else (-angle, -1)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from symgen.derive.graph import SYM, Node, Scalar
+from symgen.derive.graph import SYM, Domain, Scalar, interpret
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.description.namespace import Namespace
 from symgen.emit.printers import PLAIN, Text
@@ -48,7 +48,7 @@ class Listing:
         places: Sequence[tuple[int, ...]],
         parameters: Iterable[str],
     ) -> None:
-        self.outputs, self.places = dict(outputs), list(places)
+        self.graph, self.outputs, self.places = algebra.graph, dict(outputs), list(places)
         values = list(self.outputs.values())
         names = Namespace((*algebra.robot.constants, *parameters))
         labels = [x.replace("(", "").replace(")", "").replace(",", "") for x in self.outputs]
@@ -70,28 +70,19 @@ class Listing:
         return steps + results
 
     def steps(
-        self, operate: Callable[[Node, list[Any]], Any], symbol: Callable[[str], Any]
+        self, domain: Domain, symbol: Callable[[str], Any]
     ) -> tuple[dict[str, Any], list[Any]]:
         """The same in other objects: {name: value} of every step, and the outputs.
 
-        operate : makes a value from a node and the values of its operands. symbol : makes one from
-        a name.
+        domain : where the values of nodes are. symbol : makes one from a name.
         """
         text = self.text
-        value: dict[int, Any] = {}
+        value = {n.index: symbol(text.called[n.index]) for n in text.nodes if n.op == SYM}
         steps: dict[str, Any] = {}
-
-        def signed(x: Scalar | int) -> Any:
-            return x if isinstance(x, int) else x.sign * value[x.node.index]
-
         for node in text.nodes:
-            if node.op == SYM:
-                made = symbol(text.called[node.index])
-            else:
-                made = operate(node, [signed(x) for x in node.operands])
             if node.index in text.named:
-                name = text.called[node.index]
-                steps[name] = text.sign[node.index] * made
-                made = text.sign[node.index] * symbol(name)
-            value[node.index] = made
-        return steps, [signed(x) for x in self.outputs.values()]
+                name, sign = text.called[node.index], text.sign[node.index]
+                (made,) = interpret([self.graph.scalar(node.index, sign)], domain, value)
+                steps[name] = made
+                value[node.index] = sign * symbol(name)
+        return steps, interpret([*self.outputs.values()], domain, value)

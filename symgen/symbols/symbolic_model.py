@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 from symgen.derive.frames import Frames
-from symgen.derive.graph import Scalar, Symbol
+from symgen.derive.graph import Angle, Scalar, Symbol
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.model import Model, Place, Request, labels, rewriting
 from symgen.derive.models import MODELS
@@ -150,7 +150,8 @@ class SymbolicModel:
             for model in models
         ]
         Frames(d.geometry).register_angles(rewrite.algebra)
-        for turn, offset in dict.fromkeys(d.algebra.angles.values()):
+        angles = (n.value for n in d.algebra.graph.nodes if isinstance(n.value, Angle))
+        for turn, offset in dict.fromkeys(angles):
             if turn and not any(Symbol("q", f"q{j}") in request.inputs for j, _ in turn):
                 rewrite.algebra.cos_sin(turn, offset)
         return rewrite.algebra, *entries

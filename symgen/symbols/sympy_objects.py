@@ -14,7 +14,7 @@ from typing import Any
 
 import sympy
 
-from symgen.derive.graph import OPAQUE, Node
+from symgen.derive.graph import INV, OPAQUE, POS, Node, Symbol
 from symgen.symbols.expressions import angle, evaluated, opaque, rational, symbol
 from symgen.symbols.symbolic_model import SymbolicModel
 
@@ -42,7 +42,7 @@ def of_listing(model: SymbolicModel) -> tuple[list[tuple[Any, Any]], Any]:
     """The recursion of a model as `sympy.cse` gives it: [(symbol, expression)] and the model in
     these symbols.
     """
-    steps, outputs = model.listing.steps(operated, symbol)
+    steps, outputs = model.listing.steps(Objects(), symbol)
     values = dict(zip(model.listing.places, map(sympy.sympify, outputs), strict=True))
     return [(symbol(name), x) for name, x in steps.items()], _shaped(model, values)
 
@@ -59,22 +59,23 @@ def _shaped(model: SymbolicModel, values: Mapping[tuple[int, ...], Any]) -> Any:
     )
 
 
-def operated(node: Node, x: list[Any], number: Callable[[Fraction], Any] = rational) -> Any:
-    """The value of a node by the values of its operands, of a constant by `number`."""
-    match node.op:
-        case "const":
-            return number(node.value)
-        case "add":
-            return x[0] + x[1]
-        case "mul":
-            return x[0] * x[1]
-        case "inv":
+class Objects:
+    """SymPy objects, a domain of graph nodes; `rational` makes a number."""
+
+    def __init__(self, rational: Callable[[Fraction], Any] = rational) -> None:
+        self.number = rational
+
+    def symbol(self, symbol_: Symbol) -> Any:
+        """An input by its name."""
+        return symbol(symbol_.name)
+
+    def function(self, node: Node, x: list[Any]) -> Any:
+        """A function of SymPy."""
+        if node.op == INV:
             return 1 / x[0]
-        case "pos":
+        if node.op == POS:
             return sympy.Max(x[0], 0)
-        case op if op in OPAQUE:
-            return opaque(op, x)
-    return getattr(sympy, node.op)(x[0])
+        return opaque(node.op, x) if node.op in OPAQUE else getattr(sympy, node.op)(x[0])
 
 
 def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:

@@ -4,54 +4,85 @@ from __future__ import annotations
 
 import copy
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign import sampled, some
+from typer.testing import CliRunner
 
 import symgen
+from symgen.certify.certificate import independent
+from symgen.cli.main import app
 from symgen.derive.derivation import derive
-from symgen.derive.graph_algebra import GraphAlgebra
+from symgen.derive.loop_equations import loop_system
+from symgen.derive.loops import close
 from symgen.derive.models import MODELS
 from symgen.derive.newton_euler import Motion
-from symgen.description import load_robot, packaged_robots
+from symgen.description import Robot, load_robot, packaged_robots
 from symgen.emit.generate import generate_files
 from symgen.emit.spec import module_spec, spec_of
-from symgen.regroup.regrouping import regroup
+from symgen.regroup.regrouping import _regrouped, regroup
+from symgen.regroup.residues import _acting
 from symgen.report.page import robot_page
 
 TARGETS = ("numpy", "casadi", "xp", "c")
 
 
 @pytest.fixture
-def derivations(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The robots whose recursion was run over graph nodes, as it happens."""
-    robots: list[str] = []
+def derivations(monkeypatch: pytest.MonkeyPatch) -> list[Robot]:
+    """The robots whose recursion was run, as it happens."""
+    robots: list[Robot] = []
     start = Motion.__init__
 
     def counted(self: Motion, geometry, **options) -> None:
-        if isinstance(geometry.algebra, GraphAlgebra):
-            robots.append(geometry.robot.name)
+        robots.append(geometry.robot)
         start(self, geometry, **options)
 
     monkeypatch.setattr(Motion, "__init__", counted)
-    for cached in (derive, spec_of):
+    for cached in (derive, spec_of, _regrouped, independent, loop_system, close, _acting):
         cached.cache_clear()
     return robots
 
 
-def test_four_targets_are_one_derivation(derivations: list[str]) -> None:
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["generate", "tx40", "two_branch", "sr400", "five_bar"],
+        ["check", "two_branch"],
+        ["show", "two_branch"],
+        ["show", "five_bar", "--model", "inertia_matrix"],
+        ["identify", "emps", "emps"],
+    ],
+    ids=" ".join,
+)
+def test_a_command_runs_the_recursion_at_most_once_per_robot(
+    command: list[str],
+    derivations: list[Robot],
+    emps_data,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Regrouping, proofs, loops, numbers of the file: all are values of one graph."""
+    monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path))
+    output = ["-o", str(tmp_path / "out")] if command[0] in ("generate", "identify") else []
+    done = CliRunner().invoke(app, [*command, *output])
+    assert done.exit_code == 0, done.output
+    assert len(derivations) == len({*derivations}) and derivations[0].name in command
+
+
+def test_four_targets_are_one_derivation(derivations: list[Robot]) -> None:
     generate_files(load_robot("tx40"), targets=TARGETS)
-    assert derivations == ["tx40"]
+    assert [robot.name for robot in derivations] == ["tx40"]
 
 
-def test_everything_else_reads_the_same_derivation(derivations: list[str]) -> None:
+def test_everything_else_reads_the_same_derivation(derivations: list[Robot]) -> None:
     robot = load_robot("scara")
     generate_files(robot, targets=TARGETS)
     symgen.symbolic(robot).show("inertia_matrix")
     symgen.symbolic(robot).equations("inverse_dynamics")
     robot_page(regroup(robot))
-    assert derivations == ["scara"]
+    assert [robot.name for robot in derivations] == ["scara"]
 
 
 @pytest.mark.parametrize(

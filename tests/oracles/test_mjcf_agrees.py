@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 
 from oracles.mjcf_robots import ARM, GRIPPER, NAMED, random_tree
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
-from symgen.derive.kinematics import frame_poses
+from oracles.poses import poses_in_floats
 from symgen.derive.lagrange import Lagrange
-from symgen.derive.loops import close
 from symgen.description import Robot
 from symgen.description.robot import PRISMATIC
 from symgen.description.tree_robot import read_tree
@@ -98,17 +95,9 @@ def difference(text: str, robot: Robot, notes: tuple[str, ...], seed: int) -> fl
 def pose_difference(text: str, robot: Robot, notes: tuple[str, ...]) -> float:
     names, oracle, largest = legend(notes), MuJoCo(text), 0.0
     for q in motion(robot, 5)[0][0]:
-        poses = frame_poses(
-            Geometry(
-                robot,
-                FloatAlgebra(robot, {j: np.array(x) for j, x in zip(robot.moving, q, strict=True)}),
-                close(robot),
-            )
-        )
+        poses = poses_in_floats(robot, dict(zip(robot.moving, q, strict=True)))
         for j, frame in kept_frames(notes).items():
-            ours = np.column_stack(
-                [np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]
-            )
+            ours = poses[j]
             largest = max(
                 largest,
                 float(np.abs(ours - oracle.pose([names[j] for j in robot.moving], q, frame)).max()),

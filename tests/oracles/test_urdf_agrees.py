@@ -9,12 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from oracles.poses import poses_in_floats
 from oracles.urdf_robots import NAMED, random_tree
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
-from symgen.derive.kinematics import frame_poses
 from symgen.derive.lagrange import Lagrange
-from symgen.derive.loops import close
 from symgen.description import Robot
 from symgen.description.robot import FIXED, PRISMATIC
 from symgen.description.tree_robot import read_tree
@@ -162,19 +159,8 @@ def pose_difference(text: str, robot: Robot, notes: tuple[str, ...], seed: int) 
             np.array([position[f"q{j}"] for j in robot.moving]),
             list(kept.values()),
         )
-        poses = frame_poses(
-            Geometry(
-                robot,
-                FloatAlgebra(robot, {j: np.array(position[f"q{j}"]) for j in robot.moving}),
-                close(robot),
-            )
-        )
-        ours = [
-            np.column_stack(
-                [np.array(poses[j][0], dtype=float), np.array(poses[j][1], dtype=float)]
-            )
-            for j in kept
-        ]
+        poses = poses_in_floats(robot, {j: position[f"q{j}"] for j in robot.moving})
+        ours = [poses[j] for j in kept]
         largest = max(largest, float(np.abs(np.array(ours) - theirs[:, :3]).max()))
     return largest
 

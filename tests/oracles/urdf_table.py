@@ -16,10 +16,9 @@ import numpy as np
 
 from oracles.test_urdf_agrees import Pinocchio, legend
 from symgen.certify.modules import certify
-from symgen.derive.float_algebra import FloatAlgebra
-from symgen.derive.geometry import Geometry
-from symgen.derive.loops import close
-from symgen.derive.newton_euler import Motion, joint_torques
+from symgen.derive.derivation import derive
+from symgen.derive.floats import Floats, states_of
+from symgen.derive.graph import Symbol, interpret
 from symgen.description import Robot
 from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
@@ -72,16 +71,17 @@ def difference(text: str, robot: Robot, names: dict[int, str]) -> float:
     reach = np.array(
         [1.0 if f.sigma == PRISMATIC else np.pi for f in tree.frames if f.sigma != FIXED]
     )
-    oracle, closure, largest, error = Pinocchio(text), close(tree), 0.0, 0.0
+    oracle, torque, largest, error = Pinocchio(text), derive(tree).torque, 0.0, 0.0
     for _ in range(3):
         x = rng.standard_normal((3, len(reach)))
         x[0] = rng.uniform(-1, 1, len(reach)) * reach
         theirs = oracle.torque([names[j] for j in tree.joints], *x)
-        states = [{j: np.array(v) for j, v in zip(tree.joints, row, strict=True)} for row in x]
-        gamma = joint_torques(
-            Motion(Geometry(tree, FloatAlgebra(tree, *states), closure)), dict(tree.values)
-        )
-        ours = np.array([float(gamma[j]) for j in tree.joints])
+        q, qd, qdd = (dict(zip(tree.joints, row, strict=True)) for row in x)
+        parameters = {
+            Symbol("parameter", name): tree.values.get(name, 0.0) for name in tree.parameters
+        }
+        floats = Floats(tree, states_of(q=q, qd=qd, qdd=qdd) | parameters)
+        ours = np.array(interpret([torque[j] for j in tree.joints], floats), dtype=float)
         largest, error = max(largest, np.abs(theirs).max()), max(error, np.abs(ours - theirs).max())
     return error / largest if largest else error
 

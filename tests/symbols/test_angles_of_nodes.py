@@ -36,7 +36,7 @@ def test_angles_are_those_of_the_nodes() -> None:
                     value[node.index] = sum(x)
                 case _:
                     value[node.index] = getattr(math, node.op)(x[0])
-        told, _ = algebra.angles[s.node.index]
+        told, _ = s.node.value
         assert math.isclose(value[s.node.index], math.sin(sum(n * q[f"q{j}"] for j, n in told)))
         assert math.isclose(
             s.sign * value[s.node.index], math.sin(sum(n * q[f"q{j}"] for j, n in turn))

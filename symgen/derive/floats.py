@@ -1,0 +1,76 @@
+"""Floats, a domain of graph nodes: arrays of any one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from symgen.derive.graph import INV, OPAQUE, POS, SQRT, Node, Symbol
+from symgen.description.robot import Robot
+
+Array = np.ndarray[Any, Any]
+LETTERS = {"q": "q", "qd": "QP", "qdd": "QDP"}
+
+
+class Floats:
+    """The constants of a robot, and states.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    states : mapping, optional
+        Value of each input that is no constant; rad or m and seconds.
+    constants : mapping, optional
+        In place of those of the robot file.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        states: Mapping[Symbol, Any] | None = None,
+        constants: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.robot, self.states = robot, states or {}
+        self.constants = {**robot.constants, **(constants or {})}
+
+    def symbol(self, symbol: Symbol) -> Any:
+        """The value of an input."""
+        match symbol.kind:
+            case "constant" | "channel":
+                return self.constants[symbol.name]
+            case "pi":
+                return np.pi
+            case "number":
+                return float(Fraction(symbol.name))
+            case "gravity":
+                return -self.robot.gravity[int(symbol.name)].value(self.constants)
+        return self.states[symbol]
+
+    def number(self, c: Fraction) -> float:
+        """A rational, rounded."""
+        return float(c)
+
+    def function(self, node: Node, x: list[Any]) -> Any:
+        """A function of NumPy."""
+        if node.op == INV:
+            return 1.0 / x[0]
+        if node.op == POS:
+            return np.maximum(x[0], 0.0)
+        if node.op == SQRT:  # of constants, which may have none
+            with np.errstate(invalid="raise"):
+                return np.sqrt(x[0])
+        name = OPAQUE.get(node.op, node.op)
+        return getattr(np, {"pow": "power"}.get(name, name))(*x)
+
+
+def states_of(**states: Mapping[int, Any]) -> dict[Symbol, Any]:
+    """States by input, from q, qd and qdd of the joints by their numbers."""
+    return {
+        Symbol(kind, f"{LETTERS[kind]}{j}"): x
+        for kind, by_joint in states.items()
+        for j, x in by_joint.items()
+    }
