@@ -46,6 +46,7 @@ from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
+from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.resolution.cestac import cestac, levels_of
@@ -142,7 +143,8 @@ def workers(model: GeneratedModel, record: Record, study: Study, runs: int, roun
 
     def wall(count: int) -> float:
         start = time.perf_counter()
-        cestac(model, record, replace(study, cestac=settings), workers=count)
+        with processes(count) as several:
+            cestac(model, record, replace(study, cestac=settings), map=several)
         return time.perf_counter() - start
 
     per_round, spent = [], {1: [], 2: []}

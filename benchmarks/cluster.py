@@ -37,9 +37,11 @@ import numpy as np
 from c_speed import processor
 
 from runtime import Record, Study, load_model, observe
+from runtime.cluster import cluster as mapped
 from runtime.compiled.model import compiled_model
 from runtime.estimators.essential import essential_of
 from runtime.model.generated import GeneratedModel
+from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.resolution.cestac import Cestac, cestac
@@ -116,13 +118,21 @@ def main() -> None:
             return cestac(model, record, study, columns=names, **how)
 
         few = replace(study, cestac=replace(study.cestac, runs=8))
-        cestac(
-            model, record, few, columns=names, scheduler=address
-        )  # workers import and compile once
+
+        def several() -> Cestac:
+            with processes(2) as own_map:
+                return way(map=own_map)
+
+        def on_cluster(**how: object) -> Cestac:
+            with mapped(address) as own_map:
+                return way(map=own_map, **how)
+
+        with mapped(address) as own_map:  # workers import and compile once
+            cestac(model, record, few, columns=names, map=own_map)
         ways: dict[str, Callable[[], Cestac]] = {
             "one process": way,
-            "2 workers": lambda: way(workers=2),
-            "cluster of 2": lambda: way(scheduler=address),
+            "2 workers": several,
+            "cluster of 2": on_cluster,
         }
         first, spent = None, {name: [] for name in ways}
         order = list(ways)
@@ -139,7 +149,7 @@ def main() -> None:
                 + ", ".join(f"{name} {row[-1]:.1f} s" for name, row in spent.items())
             )
         start = time.perf_counter()
-        with_kill = way(scheduler=address, progress=kill_halfway(cluster))
+        with_kill = on_cluster(progress=kill_halfway(cluster))
         seconds = time.perf_counter() - start
         if not same_bits(with_kill, first):
             raise SystemExit("one worker killed: other bits")

@@ -44,7 +44,7 @@ from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
-from runtime.parallel import results
+from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.records.record import Record
@@ -179,7 +179,7 @@ def settings_of(b: Bench, method: str, key: Key) -> EstimateSettings:
     return EstimateSettings(method, options=options.get(method, {}))
 
 
-def estimates(_: None, key: Key) -> list[dict[str, Any]]:
+def estimates(key: Key) -> list[dict[str, Any]]:
     """Estimates of one record by every method of the key."""
     b = bench(key.robot)
     _, loop = made(key)
@@ -214,8 +214,8 @@ def computed(file: Path, keys: Sequence[Key], workers: int) -> list[dict[str, An
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     there = {(r["robot"], r["step"], r["seed"], r["method"]) for r in rows}
     missing = [key for key in keys if (key.robot, key.step, key.seed, key.methods[0]) not in there]
-    with file.open("a") as out:
-        for found in results(estimates, None, missing, workers):
+    with file.open("a") as out, processes(workers) as several:
+        for found in several(estimates, missing):
             rows += found
             out.writelines(json.dumps(row) + "\n" for row in found)
             out.flush()

@@ -32,6 +32,7 @@ from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
+from runtime.parallel import processes
 from runtime.reading.names import study_of
 from runtime.reading.records import read_records
 from runtime.rows.observe import observe
@@ -62,13 +63,14 @@ def main() -> None:
         columns=given.columns, starts=given.starts, criterion=given.criterion, rate=RATE
     )
     begin = time.perf_counter()
-    found = excite(
-        model,
-        record,
-        replace(study, excitation=settings),
-        workers=given.workers,
-        progress=lambda done, total: print(f"  {done} of {total} starts", flush=True),
-    )
+    with processes(given.workers) as several:
+        found = excite(
+            model,
+            record,
+            replace(study, excitation=settings),
+            map=several,
+            progress=lambda done, total: print(f"  {done} of {total} starts", flush=True),
+        )
     wall, known = time.perf_counter() - begin, found.known
     ratio = found.condition / known.condition
     print(

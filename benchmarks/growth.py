@@ -40,6 +40,7 @@ from matplotlib.ticker import NullFormatter
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
 from runtime.model.generated import GeneratedModel, load_model
+from runtime.parallel import processes
 from runtime.records.record import Record
 from runtime.resolution.cestac import cestac
 from runtime.rows.regressor import Columns
@@ -236,12 +237,9 @@ def by_workers(
     for label, model in models.items():
         for count in workers:
             start = time.perf_counter()
-            cestac(
-                model,
-                record,
-                Study(cestac=CestacSettings(delta=(1e-3,), runs=runs, columns="all")),
-                workers=count,
-            )
+            settings = CestacSettings(delta=(1e-3,), runs=runs, columns="all")
+            with processes(count) as several:
+                cestac(model, record, Study(cestac=settings), map=several)
             found.setdefault(label, []).append((count, time.perf_counter() - start))
     return found
 

@@ -4,11 +4,9 @@ bit of a sum.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from functools import partial, wraps
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -20,6 +18,7 @@ BLAS_THREADS = (
     "VECLIB_MAXIMUM_THREADS",
     "BLIS_NUM_THREADS",
 )
+"""Variables of the environment that say so before numpy is loaded."""
 
 
 def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
@@ -28,34 +27,15 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
     """
 
     @wraps(function)
-    def alone(*args: P.args, **kwargs: P.kwargs) -> R:
-        with single_thread()():
+    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, user_api="blas"):
             return function(*args, **kwargs)
 
-    return alone
+    return limited
 
 
-def single_thread() -> Callable[[], AbstractContextManager[Any]]:
-    """What gives a context with one BLAS thread; the libraries are sought here, once, which takes a
-    sixth of the time of a short run.
-    """
-    from threadpoolctl import ThreadpoolController
-
-    return partial(ThreadpoolController().limit, limits=1, user_api="blas")
-
-
-@contextmanager
-def inherited_single_thread() -> Iterator[None]:
-    """The environment of processes that are started meanwhile, whose BLAS then has one thread; as
-    before afterwards.
-    """
-    before = {name: os.environ.get(name) for name in BLAS_THREADS}
-    os.environ.update(dict.fromkeys(BLAS_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+def alone(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    """The value of the function, made with one BLAS thread."""
+    return single_threaded(function)(*args, **kwargs)

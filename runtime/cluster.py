@@ -1,148 +1,89 @@
-"""Tasks on several machines, by a Dask cluster (extra `scale`).
+"""A map over the workers of a Dask cluster (extra `scale`), for whoever takes `map=`.
 
 Its workers must have the versions of this process and run what this process sends; trust the
-scheduler you name. Numbers are those of one process in
-every bit on one kind of machine.
+scheduler you name. Numbers are those of one process in every bit on one kind of machine.
 """
 
 from __future__ import annotations
 
-import sys
+import asyncio
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import lru_cache
 from importlib.metadata import version
-from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from runtime.blas import single_threaded
 from runtime.errors import InputError
+from runtime.parallel import packed, there
 
 TIMEOUT = 10.0  # s that a scheduler has to answer
-RESTART = 60.0  # s that its workers may take to come back after all of them died
 PACKAGES = ("symgen", "numpy", "scipy")  # whose versions decide the bits
 
 
-def packed(task: Callable[..., Any], context: Any) -> bytes:
-    """Task and context as they travel, once."""
-    return bytes(ForkingPickler.dumps((task, context)))
-
-
-@lru_cache(maxsize=1)
-def unpacked(job: bytes) -> tuple[Callable[..., Any], Any]:
-    """Task and context, of one job at a time."""
-    sent: tuple[Callable[..., Any], Any] = ForkingPickler.loads(job)
-    return sent
-
-
-class Cluster:
-    """The workers of a scheduler; a worker of `runtime.parallel`."""
-
-    most = sys.maxsize
-
-    def __init__(self, client: Any) -> None:
-        from distributed import KilledWorker
-
-        self.client, self.lost = client, (KilledWorker, CancelledError)
-        self.who = f"workers of {client.scheduler.address}"
-        self.executor = client.get_executor(pure=False)
-
-    def prepare(self, task: Callable[..., Any], context: Any) -> None:
-        """Send the context to every worker; those that died have some time to come back."""
-        with _answering(self.client.scheduler.address):
-            self.client.wait_for_workers(1, timeout=RESTART)
-            job = packed(task, context)
-            self.job = self.client.scatter(job, broadcast=True, hash=False, timeout=RESTART)
-
-    def submit(self, key: Any) -> Future[Any]:
-        """The task of a key."""
-        future: Future[Any] = self.executor.submit(_run_there, self.job, key)
-        return future
-
-    def end(self) -> None:
-        """The workers are the scheduler's: what they do is given up when the connection closes."""
-
-
 @contextmanager
-def connected(scheduler: str, timeout: float) -> Iterator[Cluster]:
-    """A connection to a scheduler that has workers with our versions."""
-    import asyncio
+def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., Iterator[Any]]]:
+    """A map over the workers of the scheduler at this address, such as tcp://10.0.0.1:8786.
 
+    Raises
+    ------
+    InputError
+        No answer from the scheduler or its workers; workers of other versions, or that die.
+    """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
     except ImportError as e:
         raise InputError(
             "a Dask cluster needs an optional library: pip install symgen[scale]"
         ) from e
-    with _answering(scheduler):
-        with ThreadPoolExecutor(
-            1
-        ) as thread:  # an event loop of its own, wherever we are called from
-            thread.submit(asyncio.run, _shake_hands(scheduler, timeout)).result()
-        client = Client(scheduler, timeout=timeout, set_as_default=False)
+    silence = (OSError, ValueError, RuntimeError, CancelledError, KilledWorker)
     try:
-        with _answering(scheduler):
+        with ThreadPoolExecutor(1) as thread:  # an event loop of its own, wherever we are called
+            thread.submit(asyncio.run, _shake_hands(scheduler, timeout)).result()
+        with Client(scheduler, timeout=timeout, set_as_default=False) as client:
             client.wait_for_workers(1, timeout=timeout)
-        _check_versions(client)
-        yield Cluster(client)
-    finally:
-        client.close()
+            _check_versions(client)
+            yield lambda function, keys: _mapped(client, function, keys)
+    except InputError:
+        raise
+    except silence as e:
+        reason = str(e).partition("\n")[0] or "no reply in time"
+        raise InputError(
+            f"no answer from the scheduler {scheduler} or its workers: {reason}"
+        ) from e
+
+
+def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[Any]:
+    """Results in the order of the keys; the function travels once to each worker."""
+    sent = client.scatter(packed(function), broadcast=True, hash=False)
+    for future in [client.submit(there, sent, key, pure=False) for key in keys]:
+        yield future.result()
 
 
 async def _shake_hands(scheduler: str, timeout: float) -> None:
     """Connect once: something that listens and never answers would keep a Client waiting for
     ever.
     """
-    from asyncio import wait_for
-
     from distributed.comm import connect
 
-    comm = await wait_for(connect(scheduler, timeout=timeout), timeout)
+    comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)
     await comm.close()
-
-
-@contextmanager
-def _answering(scheduler: str) -> Iterator[None]:
-    """Errors of a connection as one line."""
-    try:
-        yield
-    except InputError:
-        raise
-    except (
-        OSError,
-        ValueError,
-        RuntimeError,
-        CancelledError,
-    ) as e:  # TimeoutError and errors of communication are OSErrors
-        raise InputError(
-            f"no answer from the scheduler {scheduler} or its workers: "
-            f"{str(e).partition(chr(10))[0] or 'no reply in time'}"
-        ) from e
 
 
 def _check_versions(client: Any) -> None:
     """Refuse workers whose bits could differ, or that cannot run our tasks."""
-    own = _versions()
+    here = _versions()
     try:
         of_workers = client.run(_versions)
     except ImportError as e:
         raise InputError(
             f"the workers cannot run tasks of symgen ({e}): install the same symgen there"
         ) from e
-    other = {address: versions for address, versions in of_workers.items() if versions != own}
-    if other:
-        address, versions = next(iter(other.items()))
-        raise InputError(
-            f"{len(other)} of {len(of_workers)} workers have other versions, such as {address}: "
-            f"{versions}; this process {own}. Install the same"
-        )
+    for address, versions in of_workers.items():
+        if versions != here:
+            raise InputError(
+                f"the worker {address} has other versions: {versions}; this process {here}. Install the same"
+            )
 
 
 def _versions() -> dict[str, str]:
     return {package: version(package) for package in PACKAGES}
-
-
-def _run_there(job: bytes, key: Any) -> Any:
-    task, context = unpacked(job)
-    return single_threaded(task)(context, key)

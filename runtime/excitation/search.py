@@ -11,14 +11,16 @@ figure of the result is that of the rows the identification will use, with sign(
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from runtime.blas import single_threaded
 from runtime.errors import InputError
 from runtime.estimators.essential import essential_of
 from runtime.excitation.criteria import (
@@ -39,7 +41,6 @@ from runtime.loop.methods import estimate_of
 from runtime.model.casadi import casadi_path
 from runtime.model.generated import GeneratedModel, require, require_no_channels
 from runtime.model.loading import is_trusted
-from runtime.parallel import results
 from runtime.records.record import Record
 from runtime.rows.observe import observe
 from runtime.rows.prepared import resolved
@@ -51,13 +52,14 @@ from runtime.signals.states import require_motion
 Array = np.ndarray
 
 
+@single_threaded
 def excite(
     model: GeneratedModel,
     records: Record | Sequence[Record] = (),
     study: Study | None = None,
     *,
     symbolic: str | Path | ModuleType | None = None,
-    workers: int = 0,
+    map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
     """The motion of smallest criterion over all starts of study.excitation, within the limits at
@@ -73,8 +75,8 @@ def excite(
         Families, limits, criterion, filters and rows; default: Study().
     symbolic : str, Path or module, optional
         CasADi model of the same robot; default: the file beside that of `model`.
-    workers : int
-        Processes, this one among them; results do not depend on it.
+    map : callable, optional
+        As the built-in one, such as `runtime.parallel.processes`; results do not depend on it.
     progress : callable, optional
         Called after each start with the number done and their total.
 
@@ -109,7 +111,7 @@ def excite(
     smooth = dry_friction(model).smooth
     problem = Problem(path, settings, weights, limits, known.X, smooth, trust)
     starts = []
-    for start in results(one_start, problem, range(settings.starts), workers):
+    for start in map(partial(one_start, problem), range(settings.starts)):
         starts.append(start)
         if progress is not None:
             progress(len(starts), settings.starts)

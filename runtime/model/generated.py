@@ -133,7 +133,7 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
     file = getattr(module, "__file__", None)
     if not file:
         raise InputError(
-            "this model was not loaded from a file, which other processes need; use workers=0"
+            "this model was not loaded from a file, which other processes need; use one process alone"
         )
     return run, (Path(file).read_text(encoding="utf-8"), Path(file))
 

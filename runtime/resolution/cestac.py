@@ -20,7 +20,7 @@ the settings of the result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from runtime.blas import single_threaded
 from runtime.compiled.model import target_of
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
@@ -36,7 +37,6 @@ from runtime.limits import LIMIT
 from runtime.loop.methods import estimate_of, point_estimate
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, require_no_channels
-from runtime.parallel import results
 from runtime.records.law import require_found
 from runtime.records.provenance import origin, processor
 from runtime.records.record import Record
@@ -61,8 +61,10 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]
+Map = Callable[..., Iterable[Any]]
 
 
+@single_threaded
 def cestac(
     model: GeneratedModel,
     records: Record | Prepared | Sequence[Record | Prepared],
@@ -71,8 +73,7 @@ def cestac(
     columns: Sequence[str] | None = None,
     drives: Drives | None = None,
     constants: Mapping[str, float] | None = None,
-    workers: int = 0,
-    scheduler: str | None = None,
+    map: Map = map,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -96,12 +97,9 @@ def cestac(
         Motor side; default: DRIVES of the model.
     constants : mapping, optional
         Values in place of the robot file's.
-    workers : int
-        Processes, this one among them (`runtime.parallel`); the results do not depend on it. A
-        script that asks for processes needs the usual
-        `if __name__ == "__main__"`.
-    scheduler : str, optional
-        Address of a Dask cluster that works instead (`runtime.cluster`), with the same results.
+    map : callable, optional
+        As the built-in one; computes the runs, in processes (`runtime.parallel.processes`) or by a
+        Dask cluster (`runtime.cluster.cluster`). The results do not depend on it in any bit.
     progress : callable, optional
         Called with the number of runs done and their total.
     checkpoint : Checkpoint, optional
@@ -119,7 +117,7 @@ def cestac(
         Motor side without drives, a column that is no base parameter, or a closed loop that the
         study does not tell.
     InputError
-        Both workers and a scheduler; a method that finds no estimate, or fewer than two at one of
+        A method that finds no estimate, or fewer than two at one of
         the steps.
     """
     several = records if isinstance(records, Sequence) else (records,)
@@ -147,8 +145,6 @@ def cestac(
             ),
             path=("cestac", "rounding"),
         )
-    if scheduler and workers:
-        raise InputError("a scheduler has workers of its own; leave out workers")
     loop = loop_of(model, [own.record for own in as_measured], study, simulator)
     if loop is not None and constants:
         raise InputError(
@@ -193,8 +189,7 @@ def cestac(
     runs = _all_runs(
         task,
         partial(_identity, task, described, reference.provenance),
-        workers,
-        scheduler,
+        map,
         progress,
         checkpoint,
     )
@@ -287,8 +282,7 @@ def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> lis
 def _all_runs(
     task: Task,
     identity: Callable[[], Mapping[str, Any]],
-    workers: int,
-    scheduler: str | None,
+    map: Map,
     progress: Progress | None,
     checkpoint: Checkpoint | None,
 ) -> Runs:
@@ -302,7 +296,7 @@ def _all_runs(
     missing = [key for level in levels for run in range(runs) if (key := (level, run)) not in known]
     try:
         blocks = key_blocks(missing, runs, len(levels), task.settings.common)
-        for part in results(run_block, task, blocks, workers, scheduler=scheduler):
+        for part in map(partial(run_block, task), blocks):
             parts.append(part)
             done += len(part)
             if checkpoint is not None:

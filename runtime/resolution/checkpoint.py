@@ -1,12 +1,9 @@
 """Runs of a long study on disk, so that it can be killed and go on.
 
-    FOLDER/runs/study.json
-            what makes the runs: settings, hashes of record and model, versions
-    FOLDER/runs/000000.npz ...
-            the runs, some thousand in each: level, run, X, residual_norm
+    FOLDER/runs.npz     level, run, X, residual_norm of the runs; `study`, JSON of what makes them:
+                        settings, hashes of record and model, versions
 
-Every file is written whole under another name and then renamed; an archive once written is not
-touched again. A study goes on only where study.json
+The file is written whole under another name and then renamed. A study goes on only where `study`
 says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits
 of an uninterrupted one.
 """
@@ -15,195 +12,113 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from io import BytesIO
+from collections.abc import Mapping
 from pathlib import Path
 from time import monotonic
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
 from runtime.errors import InputError
 from runtime.limits import LIMIT
-from runtime.reading.numpy_files import archive_of
 from runtime.resolution.runs import Runs
 
-FOLDER = "runs"
-STUDY, UNFINISHED = "study.json", ".unfinished"
+FILE = "runs.npz"
+UNFINISHED = ".unfinished"
 
 
 class Checkpoint:
-    """The runs of one study in FOLDER/runs; nothing is written before the first `every` seconds, or
-    `flush`.
+    """The runs of one study in FOLDER; written every `every` seconds, and by `flush`."""
 
-    Parameters
-    ----------
-    folder : str or Path
-    every : float, s
-        Between two archives.
-    clock : callable
-        Time, s.
-    """
-
-    def __init__(
-        self,
-        folder: str | Path,
-        *,
-        every: float = LIMIT.ARCHIVE_PERIOD,
-        clock: Callable[[], float] = monotonic,
-    ) -> None:
-        self.folder, self.every, self.clock = Path(folder) / FOLDER, every, clock
+    def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
+        self.file = Path(folder) / FILE
+        self.every = every
         self.written = 0  # runs on disk
-        self._identity: Mapping[str, Any] = {}
-        self._new: list[Runs] = []
-        self._last = clock()
+        self._study = ""
+        self._runs: list[Runs] = []
+        self._last = monotonic()
 
     def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
-        """The runs that an earlier, interrupted study left.
+        """The runs, b parameters each, that an earlier study left.
 
-        Parameters
-        ----------
-        identity : mapping
-            JSON values that tell studies apart.
-        b : int
-            Parameters of a run.
+        identity : JSON values that tell studies apart.
 
         Raises
         ------
         InputError
-            The runs are those of another study, or a file is damaged.
+            The runs are those of another study, or the file is damaged.
         """
-        self._identity, self._last = json.loads(json.dumps(identity)), self.clock()
-        for left in self.folder.glob(f"*{UNFINISHED}"):
-            left.unlink()
-        if not (self.folder / STUDY).is_file():
-            return Runs.of((), b)
-        self._compare(_json(self.folder / STUDY))
-        runs = Runs.joined([_read(path, b) for path in self._archives()], b)
-        self.written = len(runs)
-        return runs
+        self._study = json.dumps(identity, sort_keys=True)
+        self._last = monotonic()
+        self._runs = [self._read(b)] if self.file.exists() else [Runs.of((), b)]
+        self.written = len(self._runs[0])
+        return self._runs[0]
 
     def add(self, runs: Runs) -> None:
         """Take new runs; write them when it is time."""
-        self._new.append(runs)
-        if self.clock() - self._last > self.every or sum(map(len, self._new)) >= LIMIT.ARCHIVE_RUNS:
+        self._runs.append(runs)
+        if monotonic() - self._last > self.every:
             self.flush()
 
     def flush(self) -> None:
-        """Write what was taken since the last archive."""
-        count = sum(map(len, self._new))
-        if count:
+        """Write the runs, where there are new ones."""
+        runs = Runs.joined(self._runs, self._runs[0].X.shape[1])
+        if len(runs) > self.written:
+            unfinished = self.file.with_name(FILE + UNFINISHED)
             try:
-                self._write(Runs.joined(self._new, self._new[0].X.shape[1]))
+                self.file.parent.mkdir(parents=True, exist_ok=True)
+                with unfinished.open("wb") as file:
+                    np.savez(file, study=self._study, **vars(runs))
+                    file.flush()
+                    os.fsync(file.fileno())
+                unfinished.replace(self.file)
             except OSError as e:
-                self._leave_no_empty_folder()
+                unfinished.unlink(missing_ok=True)
                 raise InputError(
-                    (
-                        f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make "
-                        "room and repeat the command to go on"
-                    ),
-                    file=str(self.folder),
+                    f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make room and repeat the command to go on",
+                    file=str(self.file),
                 ) from e
-            self.written += count
-        self._new, self._last = [], self.clock()
+            self.written = len(runs)
+        self._runs = [runs]
+        self._last = monotonic()
 
     def remove(self) -> None:
-        """Delete the archives, once other files hold their runs."""
-        for path in [*self._archives(), self.folder / STUDY]:
-            path.unlink(missing_ok=True)
-        self._leave_no_empty_folder()
+        """Delete the file, once other files hold its runs."""
+        self.file.unlink(missing_ok=True)
+        self.file.with_name(FILE + UNFINISHED).unlink(missing_ok=True)
 
-    def _leave_no_empty_folder(self) -> None:
-        with suppress(OSError):  # not empty, or missing
-            self.folder.rmdir()
-
-    def _archives(self) -> list[Path]:
-        return sorted(self.folder.glob("[0-9]*.npz"))
-
-    def _write(self, runs: Runs) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        if not (self.folder / STUDY).is_file():
-            _write_whole(
-                self.folder / STUDY, (json.dumps(self._identity, indent=2) + "\n").encode("utf-8")
-            )
-        data = BytesIO()
-        np.savez(data, **{name: getattr(runs, name) for name in Runs.__dataclass_fields__})
-        archives = self._archives()
-        number = int(archives[-1].stem) + 1 if archives else 0
-        _write_whole(self.folder / f"{number:06d}.npz", data.getvalue())
-
-    def _compare(self, earlier: Mapping[str, Any]) -> None:
-        other = sorted(
-            key
-            for key in {*earlier, *self._identity}
-            if earlier.get(key) != self._identity.get(key)
-        )
+    def _read(self, b: int) -> Runs:
+        """The runs of the file; pickled objects are refused."""
+        try:
+            with np.load(self.file, allow_pickle=False) as archive:
+                study = str(archive["study"])
+                runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
+            earlier = dict(json.loads(study))
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            EOFError,
+            RecursionError,
+            BadZipFile,
+        ) as e:
+            raise InputError(
+                f"damaged ({e}); delete this file, its runs are computed again", file=str(self.file)
+            ) from e
+        identity = json.loads(self._study)
+        keys = sorted({*earlier, *identity})
+        other = [key for key in keys if earlier.get(key) != identity.get(key)]
         if other:
             raise InputError(
-                (
-                    f"holds runs of another study, {', '.join(other)} differ; use another folder, "
-                    "or "
-                    "delete this one"
-                ),
-                file=str(self.folder),
+                f"holds runs of another study, {', '.join(other)} differ; use another folder, or delete this file",
+                file=str(self.file),
             )
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """The file appears complete or not at all; the unfinished one is removed, whatever happens
-    short of a kill.
-    """
-    unfinished = path.with_name(path.name + UNFINISHED)
-    try:
-        with unfinished.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except BaseException:
-        unfinished.unlink(missing_ok=True)
-        raise
-
-
-def _json(path: Path) -> Mapping[str, Any]:
-    try:
-        study = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as e:
-        raise InputError(
-            f"cannot be read ({e}); delete {path.parent} to start again", file=str(path)
-        ) from e
-    if not isinstance(study, dict):
-        raise InputError(
-            f"not the settings of a study; delete {path.parent} to start again", file=str(path)
-        )
-    return study
-
-
-def _read(path: Path, b: int) -> Runs:
-    """The runs of one archive; pickled objects are refused."""
-    try:
-        archive = archive_of(path)
-        runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
-    except (InputError, KeyError) as e:
-        reason = e.message if isinstance(e, InputError) else f"no array {e}"
-        raise InputError(
-            f"damaged ({reason}); delete this file, its runs are computed again", file=str(path)
-        ) from e
-    R = len(runs)
-    shapes = {
-        name: (getattr(runs, name).shape, getattr(runs, name).dtype.kind)
-        for name in Runs.__dataclass_fields__
-    }
-    wanted = {
-        "level": ((R,), "i"),
-        "run": ((R,), "i"),
-        "X": ((R, b), "f"),
-        "residual_norm": ((R,), "f"),
-    }
-    if shapes != wanted:
-        raise InputError(
-            f"holds {shapes}; expected {wanted}; delete this file, its runs are computed again",
-            file=str(path),
-        )
-    return runs
+        R = len(runs.run)
+        if [x.shape for x in vars(runs).values()] != [(R,), (R,), (R, b), (R,)]:
+            raise InputError(
+                f"holds runs of another shape than ({R}, {b}); delete this file, its runs are computed again",
+                file=str(self.file),
+            )
+        return runs

@@ -49,7 +49,7 @@ def cestac(
     contradict the prediction. Encoders are read as positions and as counts; with --reader by that
     one alone, lowpass in a sixth of the time.
 
-    A long study with -o keeps its runs in DIR/runs as it goes: interrupted or killed, the same
+    A long study with -o keeps its runs in DIR/runs.npz as it goes: interrupted or killed, the same
     command goes on.
     """
     with session.results_in(output) as results:
@@ -92,15 +92,15 @@ def cestac(
                     )
                     said, good = advice.verdict, not advice.negative
                 else:
-                    result = resolution = runtime.cestac(
-                        model,
-                        records,
-                        study,
-                        workers=workers,
-                        scheduler=scheduler,
-                        progress=progress,
-                        checkpoint=checkpoint,
-                    )
+                    with session.map_of(workers, scheduler) as own_map:
+                        result = resolution = runtime.cestac(
+                            model,
+                            records,
+                            study,
+                            map=own_map,
+                            progress=progress,
+                            checkpoint=checkpoint,
+                        )
                     said, good = resolution.message, resolution.verdict != "biased"
         except KeyboardInterrupt:
             session.stopped(checkpoint)

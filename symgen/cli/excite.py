@@ -71,8 +71,8 @@ def excite(
             },
         )
         records = read_records(study.record, model, missing=study.signals.admits_missing)
-        with session.progress_bar("starts") as progress:
-            seek: Any = partial(runtime.excite, workers=workers, progress=progress)
+        with session.progress_bar("starts") as progress, session.map_of(workers) as own_map:
+            seek: Any = partial(runtime.excite, map=own_map, progress=progress)
             still = study.excitation is not None and study.excitation.poses is not None
             result = (runtime.static_poses if still else seek)(model, records, study)
         if results is not None:

@@ -55,7 +55,7 @@ Columns = Annotated[Text, typer.Option(help="essential, all, or names separated 
 Seed = Annotated[int | None, typer.Option(help="Seed of what is drawn at random.")]
 Workers = Annotated[
     int,
-    typer.Option(min=0, help="Processes, this one among them. The results do not depend on it."),
+    typer.Option(min=0, help="Processes; 0 and 1: this one. The results do not depend on it."),
 ]
 Scheduler = Annotated[
     Text,

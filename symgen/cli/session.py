@@ -307,10 +307,23 @@ def names_of(text: str | None) -> str | list[str] | None:
     return text if text in (None, "essential", "all") else text.split(",")
 
 
+@contextmanager
+def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
+    """The map of --workers, or of --scheduler."""
+    from runtime.cluster import cluster
+    from runtime.errors import InputError
+    from runtime.parallel import processes
+
+    if scheduler and workers:
+        raise InputError("a scheduler has workers of its own; leave out workers")
+    with cluster(scheduler) if scheduler else processes(workers) as own_map:
+        yield own_map
+
+
 def stopped(checkpoint: Checkpoint | None) -> NoReturn:
     """Ctrl-C says what is left of a study and ends with code 130."""
     rest = (
-        f"{checkpoint.written} runs are in {checkpoint.folder}: the same command goes on"
+        f"{checkpoint.written} runs are in {checkpoint.file}: the same command goes on"
         if checkpoint and checkpoint.written
         else "nothing is kept"
     )

@@ -6,7 +6,13 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from importlib import import_module
+from multiprocessing import get_context, parent_process
+from typing import Any
 
 MOST_MEMORY = 8 * 2**30  # bytes of address space of one process, or what the machine has
 MOST_SECONDS = 3600  # processor time of one command
@@ -32,3 +38,46 @@ def limited(seconds: int = 10**9) -> None:
         memory = max(MOST_MEMORY, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+
+
+class ViewProcess:
+    """A spawned process that computes views; a new one where it was ended."""
+
+    def __init__(self) -> None:
+        self.pool: ProcessPoolExecutor | None = None
+
+    def start(self) -> ProcessPoolExecutor:
+        """Spawn it, unless it is there; it loads the views meanwhile."""
+        if self.pool is None:
+            self.pool = ProcessPoolExecutor(
+                1, mp_context=get_context("spawn"), initializer=_of_parent
+            )
+            self.number = self.pool.submit(os.getpid)
+            self.pool.submit(import_module, "symgen.studio.views")
+        return self.pool
+
+    def submit(self, view: Callable[..., Any], *args: Any) -> Future[Any]:
+        """A view, as soon as the ones before are done."""
+        return self.start().submit(view, *args)
+
+    def end(self) -> None:
+        """End it at once, whatever it does."""
+        if self.pool is not None:
+            with suppress(BrokenProcessPool, ProcessLookupError):
+                os.kill(self.number.result(), signal.SIGKILL)
+            self.pool.shutdown()
+            self.pool = None
+
+
+def _of_parent() -> None:
+    """Limits of memory; Ctrl-C is for the server, whose end is that of this process."""
+    limited()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -14,7 +14,6 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, Response
 
-from runtime.parallel import OtherProcess
 from symgen.studio import child, views
 from symgen.studio.folder import DRAFT, WorkFolder
 from symgen.studio.jobs import Jobs
@@ -46,7 +45,7 @@ class Server:
         self.version, self.pages = 0, 0
         self.before, self.left_out = "", list[str]()
         self.news = asyncio.Event()
-        self.process = OtherProcess()
+        self.process = child.ViewProcess()
         self.viewing = asyncio.Lock()
         self.views: dict[Any, dict[str, Any]] = {}
 
@@ -67,10 +66,8 @@ class Server:
             if key in self.views:
                 return self.views[key]
             try:
-                if self.process.pool is None:
-                    self.process.start().submit(child.limited)
-                future = asyncio.wrap_future(self.process.start().submit(view, *args))
-                value = await asyncio.wait_for(future, VIEW_PATIENCE)
+                future = asyncio.wrap_future(self.process.submit(view, *args))
+                value: dict[str, Any] = await asyncio.wait_for(future, VIEW_PATIENCE)
             except (TimeoutError, BrokenProcessPool):
                 await asyncio.to_thread(self.process.end)
                 return {

@@ -99,7 +99,7 @@ def serve(
     if record is not None:
         work.take_record_of(record)
     server = Server(work, programs)
-    server.process.start("symgen.studio.views")
+    server.process.start()
     listening = socket.create_server(("127.0.0.1", port))
     port = listening.getsockname()[1]
     own: list[uvicorn.Server] = []

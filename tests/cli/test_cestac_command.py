@@ -160,8 +160,11 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
         patch.setattr(Checkpoint, "add", interrupted)
         stopped = run(*arguments)
     assert stopped.exit_code == 130
-    assert f"stopped; 6 runs are in {tmp_path / 'runs'}: the same command goes on" in stopped.stderr
-    assert {p.name for p in tmp_path.iterdir()} == {"runs"}
+    assert (
+        f"stopped; 6 runs are in {tmp_path / 'runs.npz'}: the same command goes on"
+        in stopped.stderr
+    )
+    assert {p.name for p in tmp_path.iterdir()} == {"runs.npz"}
     other = run(*arguments[:-2], "--seed", 2, "-o", tmp_path)
     assert other.exit_code == 2 and "another study, cestac.seed differ" in other.stderr
     whole = run(*arguments)
@@ -190,9 +193,9 @@ def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
         tmp_path,
     )
     assert result.exit_code == 0
-    assert {p.name for p in tmp_path.iterdir()} == FILES | {"runs"}
+    assert {p.name for p in tmp_path.iterdir()} == FILES | {"runs.npz"}
     assert json.loads((tmp_path / "cestac.json").read_text())["levels"][1]["runs"] is None
-    with np.load(tmp_path / "runs" / "000000.npz") as archive:
+    with np.load(tmp_path / "runs.npz") as archive:
         assert archive["X"].shape == (1002, 1)
 
 

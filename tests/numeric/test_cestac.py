@@ -14,6 +14,7 @@ from scipy.stats import t
 from runtime.errors import InputError, SettingsError
 from runtime.loop.methods import estimate_of
 from runtime.model.drives import Drives
+from runtime.parallel import processes
 from runtime.resolution.cestac import cestac, key_blocks, levels_of
 from runtime.resolution.perturbed import perturbed_position, perturbed_torque
 from runtime.resolution.result import deciding_names, level_result, runs_needed
@@ -89,9 +90,14 @@ def test_statistics_are_equations_18_to_22(small):
 def test_processes_give_the_same_bits(small):
     """Of this one, too: BLAS has one thread in all of them (conftest.py)."""
     calls = []
-    two = cestac(
-        planar, RECORD, study(), workers=2, progress=lambda done, total: calls.append((done, total))
-    )
+    with processes(2) as several:
+        two = cestac(
+            planar,
+            RECORD,
+            study(),
+            map=several,
+            progress=lambda done, total: calls.append((done, total)),
+        )
     assert two.to_json() == small.to_json()
     assert calls == [(done, 6) for done in range(1, 7)]
 
@@ -274,8 +280,8 @@ def test_motor_side_divides_the_step_by_the_ratio():
     )
     with pytest.raises(SettingsError, match="no drives"):
         cestac(blind, RECORD, study(side="motor"))
-    with pytest.raises(InputError, match="workers=0"):
-        cestac(blind, RECORD, study(), workers=2)
+    with pytest.raises(InputError, match="one process alone"), processes(2) as several:
+        cestac(blind, RECORD, study(), map=several)
 
 
 def test_verdicts():

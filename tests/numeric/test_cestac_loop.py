@@ -13,6 +13,7 @@ from runtime.errors import InputError, SettingsError
 from runtime.loop.closed_loop import closed_loop
 from runtime.loop.methods import estimate_of
 from runtime.loop.simulation import Simulator
+from runtime.parallel import processes
 from runtime.resolution.cestac import cestac
 from runtime.resolution.loop import loop_of
 from runtime.resolution.rounding import rounded, stream
@@ -134,10 +135,9 @@ def test_didim_sees_the_encoder_in_the_loop(arm, study, simulator):  # noqa: F81
 
 @campaign
 def test_other_processes_simulate_the_same_loop(arm, study, simulator):  # noqa: F811
-    one, two = (
-        cestac(arm[0], (), in_loop(study), simulator=simulator, workers=workers)
-        for workers in (0, 2)
-    )
+    one = cestac(arm[0], (), in_loop(study), simulator=simulator)
+    with processes(2) as several:
+        two = cestac(arm[0], (), in_loop(study), simulator=simulator, map=several)
     assert np.allclose(
         [run.X for run in one.levels[0].runs], [run.X for run in two.levels[0].runs], rtol=1e-9
     )

@@ -56,14 +56,14 @@ def stopping_after(count, kind=KeyboardInterrupt):
 
 
 def files(folder):
-    return sorted(p.name for p in (folder / "runs").iterdir()) if (folder / "runs").exists() else []
+    return sorted(p.name for p in folder.iterdir())
 
 
 def test_interrupted_and_resumed(tmp_path, whole):
     first = Checkpoint(tmp_path)
     with pytest.raises(KeyboardInterrupt):
         cestac(planar, RECORD, study(), checkpoint=first, progress=stopping_after(7))
-    assert files(tmp_path) == ["000000.npz", "study.json"] and first.written >= 7
+    assert files(tmp_path) == ["runs.npz"] and first.written >= 7
     seen = []
     second = cestac(
         planar,
@@ -122,12 +122,12 @@ def started(folder, limit=0):
 def test_killed_and_resumed(tmp_path, whole):
     process = started(tmp_path)
     limit = time.monotonic() + 60
-    while len(files(tmp_path)) < 4 and process.poll() is None and time.monotonic() < limit:
+    while files(tmp_path) != ["runs.npz"] and process.poll() is None and time.monotonic() < limit:
         time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
-    (tmp_path / "runs" / "000099.npz.unfinished").write_bytes(
+    (tmp_path / "runs.npz.unfinished").write_bytes(
         b"PK half of an archi"
     )  # as a kill in the middle of writing leaves it
     checkpoint = Checkpoint(tmp_path)
@@ -138,7 +138,7 @@ def test_killed_and_resumed(tmp_path, whole):
 
 @pytest.mark.campaign  # a process of its own imports this file
 def test_full_disk(tmp_path, whole):
-    """A limit on the size of files, below that of study.json."""
+    """A limit on the size of files, below that of the file."""
     process = started(tmp_path, limit=1000)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 1
@@ -147,7 +147,7 @@ def test_full_disk(tmp_path, whole):
     assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
 
 
-def test_disk_that_fills_up_leaves_earlier_archives(tmp_path, whole, monkeypatch):
+def test_disk_that_fills_up_leaves_earlier_runs(tmp_path, whole, monkeypatch):
     first = Checkpoint(tmp_path)
     with pytest.raises(KeyboardInterrupt):
         cestac(planar, RECORD, study(), checkpoint=first, progress=stopping_after(8))
@@ -155,15 +155,12 @@ def test_disk_that_fills_up_leaves_earlier_archives(tmp_path, whole, monkeypatch
     def full(descriptor):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    before = (tmp_path / "runs" / "000000.npz").read_bytes()
+    before = (tmp_path / "runs.npz").read_bytes()
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(InputError, match=f"No space left on device; {first.written} runs are safe"):
         cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path))
     monkeypatch.undo()
-    assert (
-        files(tmp_path) == ["000000.npz", "study.json"]
-        and (tmp_path / "runs" / "000000.npz").read_bytes() == before
-    )
+    assert files(tmp_path) == ["runs.npz"] and (tmp_path / "runs.npz").read_bytes() == before
     assert same_bits(cestac(planar, RECORD, study(), checkpoint=Checkpoint(tmp_path)), whole)
 
 
@@ -196,28 +193,28 @@ def some_runs(first, count, b=3):
     )
 
 
-def test_archives_are_numbered_and_written_when_it_is_time(tmp_path):
+def test_runs_are_written_when_it_is_time(tmp_path, monkeypatch):
     now = [0.0]
-    checkpoint = Checkpoint(tmp_path, every=10, clock=lambda: now[0])
+    monkeypatch.setattr("runtime.resolution.checkpoint.monotonic", lambda: now[0])
+    checkpoint = Checkpoint(tmp_path, every=10)
     assert len(checkpoint.resume({"a": 1}, 3)) == 0
     checkpoint.add(some_runs(0, 5))
     assert files(tmp_path) == []
     now[0] = 11.0
     checkpoint.add(some_runs(5, 5))
-    assert files(tmp_path) == ["000000.npz", "study.json"]
+    assert files(tmp_path) == ["runs.npz"] and checkpoint.written == 10
     checkpoint.add(some_runs(10, 1))
     checkpoint.flush()
     checkpoint.flush()
-    assert files(tmp_path) == ["000000.npz", "000001.npz", "study.json"]
     found = Checkpoint(tmp_path).resume({"a": 1}, 3)
     assert found.run.tolist() == list(range(11)) and found[10] == Run(
         0, 10, (10.0, 11.0, 12.0), 1.0
     )
     checkpoint.remove()
-    assert not (tmp_path / "runs").exists()
+    assert files(tmp_path) == []
 
 
-def test_archives_are_compact(tmp_path):
+def test_the_file_is_compact(tmp_path):
     """100,000 runs of 60 parameters must fit: no more than their numbers and 10 %."""
     b, R = 60, 20_000
     rng = np.random.default_rng(0)
@@ -230,7 +227,8 @@ def test_archives_are_compact(tmp_path):
     checkpoint = Checkpoint(tmp_path)
     checkpoint.resume({}, b)
     checkpoint.add(runs)
-    assert (tmp_path / "runs" / "000000.npz").stat().st_size < 1.1 * 8 * R * b
+    checkpoint.flush()
+    assert (tmp_path / "runs.npz").stat().st_size < 1.1 * 8 * R * b
 
 
 def damaged(path):
@@ -240,6 +238,7 @@ def damaged(path):
 def pickled(path):
     np.savez(
         path,
+        study="{}",
         X=np.array([{"a": 1}], dtype=object),
         **dict.fromkeys(("level", "run", "residual_norm"), np.zeros(1)),
     )
@@ -248,6 +247,7 @@ def pickled(path):
 def other_shape(path):
     np.savez(
         path,
+        study="{}",
         X=np.zeros((2, 4)),
         level=np.zeros(2, int),
         run=np.zeros(2, int),
@@ -255,28 +255,31 @@ def other_shape(path):
     )
 
 
-@pytest.mark.parametrize("spoil", [damaged, pickled, other_shape])
-def test_bad_archives(tmp_path, spoil):
+def other_text(path):
+    np.savez(
+        path,
+        study="[1]",
+        X=np.zeros((2, 3)),
+        **dict.fromkeys(("level", "run"), np.zeros(2, int)),
+        residual_norm=np.zeros(2),
+    )
+
+
+@pytest.mark.parametrize("spoil", [damaged, pickled, other_shape, other_text])
+def test_bad_files(tmp_path, spoil):
     checkpoint = Checkpoint(tmp_path)
     checkpoint.resume({}, 3)
     checkpoint.add(some_runs(0, 5))
     checkpoint.flush()
-    spoil(tmp_path / "runs" / "000000.npz")
-    with pytest.raises(InputError, match=r"000000\.npz: .*delete this file"):
+    spoil(tmp_path / "runs.npz")
+    with pytest.raises(InputError, match=r"runs\.npz: .*delete this file"):
         Checkpoint(tmp_path).resume({}, 3)
 
 
-@pytest.mark.parametrize("text", ["{", "[1]", "\0"])
-def test_bad_study_file(tmp_path, text):
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "runs" / "study.json").write_text(text)
-    with pytest.raises(InputError, match=r"study\.json.*to start again"):
-        Checkpoint(tmp_path).resume({}, 3)
-
-
-def test_study_file_says_what_was_studied(tmp_path):
+def test_the_file_says_what_was_studied(tmp_path):
     cestac(planar, RECORD, study(runs=2), checkpoint=Checkpoint(tmp_path))
-    found = json.loads((tmp_path / "runs" / "study.json").read_text())
+    with np.load(tmp_path / "runs.npz") as archive:
+        found = json.loads(str(archive["study"]))
     assert (
         found["cestac.seed"] == 1
         and found["robot"] == "planar_2r_test"

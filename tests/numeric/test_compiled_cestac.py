@@ -22,6 +22,7 @@ from runtime.compiled.model import CompiledModel, compiled_model
 from runtime.errors import InputError
 from runtime.estimators.method import linear_system
 from runtime.model.drives import Drives
+from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.records.record import Origin, Record
@@ -229,7 +230,9 @@ def test_columns_in_an_order_of_their_own_and_weights(planar):
 @campaign
 def test_workers_give_the_same_bits(planar):
     record = record_of(planar, 1500, 2)
-    here, there = (cestac(planar, record, study(runs=5), workers=workers) for workers in (0, 2))
+    here = cestac(planar, record, study(runs=5))
+    with processes(2) as several:
+        there = cestac(planar, record, study(runs=5), map=several)
     for level, other in zip(here.levels, there.levels, strict=True):
         assert np.array_equal(level.runs.X, other.runs.X) and np.array_equal(
             level.runs.residual_norm, other.runs.residual_norm

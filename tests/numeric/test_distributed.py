@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import sys
+from functools import partial
 from pathlib import Path
 
 import distributed as dask
@@ -13,8 +14,8 @@ import planar_2r_model as planar
 import pytest
 from planar_data import record
 
+from runtime.cluster import cluster as mapped
 from runtime.errors import InputError
-from runtime.parallel import results
 from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 
@@ -70,8 +71,8 @@ def dying_once(folder, key):
     return key, folder
 
 
-def failing(context, key):
-    if key == context:
+def failing(key):
+    if key == 2:
         raise ValueError(f"key {key}")
     return key
 
@@ -80,13 +81,14 @@ def failing(context, key):
 def test_same_bits_as_one_process(cluster):
     here = cestac(planar, RECORD, STUDY)
     calls = []
-    there = cestac(
-        planar,
-        RECORD,
-        STUDY,
-        scheduler=cluster.scheduler_address,
-        progress=lambda done, total: calls.append((done, total)),
-    )
+    with mapped(cluster.scheduler_address) as dask_map:
+        there = cestac(
+            planar,
+            RECORD,
+            STUDY,
+            map=dask_map,
+            progress=lambda done, total: calls.append((done, total)),
+        )
     assert there.to_json() == here.to_json()
     assert calls[-1] == (24, 24) and len(calls) == 8
 
@@ -100,21 +102,26 @@ def test_a_worker_killed_halfway_changes_nothing(cluster):
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    there = cestac(planar, RECORD, STUDY, scheduler=cluster.scheduler_address, progress=kill_one)
+    with mapped(cluster.scheduler_address) as dask_map:
+        there = cestac(planar, RECORD, STUDY, map=dask_map, progress=kill_one)
     assert killed and there.to_json() == cestac(planar, RECORD, STUDY).to_json()
 
 
 @pytest.mark.campaign
 def test_a_dead_worker_loses_nothing(cluster, tmp_path):
-    found = sorted(results(dying_once, tmp_path, range(20), scheduler=cluster.scheduler_address))
+    with mapped(cluster.scheduler_address) as dask_map:
+        found = list(dask_map(partial(dying_once, tmp_path), range(20)))
     assert found == [(key, tmp_path) for key in range(20)]
     assert (tmp_path / "died").exists()
 
 
 @pytest.mark.campaign
 def test_a_failing_task_is_the_callers_error(cluster):
-    with pytest.raises(ValueError, match="key 2"):
-        list(results(failing, 2, range(5), scheduler=cluster.scheduler_address))
+    with (
+        pytest.raises(ValueError, match="key 2"),
+        mapped(cluster.scheduler_address) as dask_map,
+    ):
+        list(dask_map(failing, range(5)))
 
 
 def test_no_scheduler():
@@ -122,13 +129,18 @@ def test_no_scheduler():
         listening.bind(("127.0.0.1", 0))
         listening.listen()
         port = listening.getsockname()[1]
-        with pytest.raises(
-            InputError, match=f"no answer from the scheduler tcp://127.0.0.1:{port}"
+        address = f"tcp://127.0.0.1:{port}"
+        with (
+            pytest.raises(InputError, match=f"no answer from the scheduler {address}"),
+            mapped(address, timeout=0.5),
         ):
-            list(results(failing, None, range(2), scheduler=f"tcp://127.0.0.1:{port}", timeout=0.5))
+            pass
     for address in (f"tcp://127.0.0.1:{port}", "127.0.0.1", "nonsense://1", " "):
-        with pytest.raises(InputError, match=f"no answer from the scheduler {address}"):
-            list(results(failing, None, range(2), scheduler=address, timeout=0.5))
+        with (
+            pytest.raises(InputError, match=f"no answer from the scheduler {address}"),
+            mapped(address, timeout=0.5),
+        ):
+            pass
 
 
 def test_no_workers():
@@ -137,11 +149,15 @@ def test_no_workers():
             n_workers=0, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
         ) as empty,
         pytest.raises(InputError, match=r"no answer from the scheduler .* or its workers"),
+        mapped(empty.scheduler_address, timeout=0.5),
     ):
-        list(results(failing, None, range(2), scheduler=empty.scheduler_address, timeout=0.5))
+        pass
 
 
 def test_without_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install symgen\[scale\]"):
-        list(results(failing, None, range(2), scheduler="tcp://127.0.0.1:1"))
+    with (
+        pytest.raises(InputError, match=r"pip install symgen\[scale\]"),
+        mapped("tcp://127.0.0.1:1"),
+    ):
+        pass
