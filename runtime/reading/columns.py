@@ -172,9 +172,7 @@ class Conversion:
 
     @property
     def follows(self) -> Array | None:
-        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are
-        joints.
-        """
+        """Joint j follows from column i of the positions, bool, shape (n, n); None: columns are joints."""
         if self.of_positions is None:
             return None
         root = np.linalg.inv(self.of_positions.motion)
@@ -193,29 +191,39 @@ class Conversion:
 def conversion(
     settings: RecordSettings, drives: Drives | None, first: Table, last: Table, n: int
 ) -> Conversion:
-    """How the columns of a record become joint side, SI; first, last : tables of the positions and
-    of the torques.
+    """How the columns of a record become joint side, SI.
+
+    Parameters
+    ----------
+    drives : Drives or None
+        Of the robot.
+    first, last : Table
+        Files of the positions and of the torques.
+    n : int
+        Number of joints.
     """
     positions = _scale(settings.scale.q, first, n, "scale.q") * _position_units(settings, n)
     scale = _scale(settings.scale.tau, last, n, "scale.tau")
-    units, own = _torque_constant(settings, drives, n)
-    constant = units if own is None else units * own
+    units, constant = _torque_constant(settings, drives, n)
+    factors = units if constant is None else units * constant
     if "motor" not in settings.sides:
-        return Conversion(positions, scale * constant, None, None, drives, own)
+        return Conversion(positions, scale * factors, None, None, drives, constant)
     if drives is None:
         raise InputError(
-            (
-                "side is motor but the robot has no drives; give them in the robot file, or a "
-                "record "
-                "of the joint side"
-            ),
+            "side is motor but the robot has no drives; give them in the robot file, or a record of the joint side",
             file=first.file,
         )
-    used = replace(drives, torque_constant=constant, coupling=settings.coupling)
-    of_positions, of_torques = (used if side == "motor" else None for side in settings.sides)
-    commands = scale * constant if of_torques is None else scale
-    coupled = drives.decoupled(settings.coupling)
-    return Conversion(positions, commands, of_positions, of_torques, coupled, own)
+    motors = replace(drives, torque_constant=factors, coupling=settings.coupling)
+    side_of_positions, side_of_torques = settings.sides
+    at_motors = side_of_torques == "motor"
+    return Conversion(
+        positions,
+        commands=scale if at_motors else scale * factors,
+        of_positions=motors if side_of_positions == "motor" else None,
+        of_torques=motors if at_motors else None,
+        drives=drives.decoupled(settings.coupling),
+        constant=constant,
+    )
 
 
 def require_alike(
@@ -268,29 +276,22 @@ def _units(units: str | tuple[str, ...], n: int, key: str) -> tuple[str, ...]:
 def _position_units(settings: RecordSettings, n: int) -> Array:
     """Factors to rad or m, shape (n,)."""
     units = [position_unit(unit) for unit in _units(settings.units.q, n, "units.q")]
-    counts = _per_joint(
-        1.0 if settings.counts_per_revolution is None else settings.counts_per_revolution,
-        n,
-        "counts_per_revolution",
-    )
-    return np.array(
-        [
-            factor / (counts[j] if kind == "counts" else 1.0)
-            for j, (kind, factor) in enumerate(units)
-        ]
-    )
+    counts = np.ones(n)
+    if settings.counts_per_revolution is not None:
+        counts = _per_joint(settings.counts_per_revolution, n, "counts_per_revolution")
+    factors = np.array([factor for _, factor in units])
+    return factors / np.where([kind == "counts" for kind, _ in units], counts, 1.0)
 
 
 def _torque_constant(
     settings: RecordSettings, drives: Drives | None, n: int
 ) -> tuple[Array, Array | None]:
-    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 where the unit is one
-    of torques; None where all are.
-    """
+    """Factors from the unit of tau to SI, shape (n,), and torque constants, 1 where the unit is one of torques; None where all are."""
     names = _units(settings.units.tau, n, "units.tau")
     units = [torque_unit(name) for name in names]
     factors = np.array([factor for _, factor in units])
-    if not any(kind in COMMANDS for kind, _ in units):
+    commands = [kind in COMMANDS for kind, _ in units]
+    if not any(commands):
         return factors, None
     if settings.torque_constant is not None:
         constant = _per_joint(settings.torque_constant, n, "torque_constant")
@@ -298,11 +299,7 @@ def _torque_constant(
         constant = drives.torque_constant
     else:
         raise InputError(
-            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for "
-            "currents of the motors set record.torque_side: motor, "
-            "then gears and torque constants are those of the robot's drives; else set "
-            "record.torque_constant (N*m/A) of every joint with the gears in it; 1 is no constant "
-            "of a motor",
+            f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, then gears and torque constants are those of the robot's drives; else set record.torque_constant (N*m/A) of every joint with the gears in it; 1 is no constant of a motor",
             remedy={"torque_constant": 1.0} if drives is None else {"torque_side": "motor"},
         )
-    return factors, np.where([kind in COMMANDS for kind, _ in units], constant, 1.0)
+    return factors, np.where(commands, constant, 1.0)

@@ -147,27 +147,25 @@ def _pieces(
         simulated=settings.simulated,
     )
     keys = [key for key in samples if key != "t"]
+    pieces = len(stretches)
     records = []
     for k, stretch in enumerate(stretches, start=1):
-        own = dict(zip(keys, stretch.signals, strict=True))
+        piece = dict(zip(keys, stretch.signals, strict=True))
         if law is not None:
-            own = law.signals(stretch.t, own, rate)
+            piece = law.signals(stretch.t, piece, rate)
         channels = (*JOINT_CHANNELS, *columns.further, "law_v")
-        records.append(
-            Record(
-                stretch.t,
-                own["q"],
-                own.get("tau", np.zeros_like(own["q"])),
-                tau_known=own.get("tau_known"),
-                channels={key: own[key] for key in channels if key in own},
-                rate=rate,
-                name=label.name
-                if len(stretches) == 1
-                else f"{label.name} ({k} of {len(stretches)})",
-                missing=Missing(own["missing"], side.follows) if "missing" in own else None,
-                origin=origin,
-            )
+        record = Record(
+            stretch.t,
+            piece["q"],
+            piece.get("tau", np.zeros_like(piece["q"])),
+            tau_known=piece.get("tau_known"),
+            channels={key: piece[key] for key in channels if key in piece},
+            rate=rate,
+            name=label.name if pieces == 1 else f"{label.name} ({k} of {pieces})",
+            missing=Missing(piece["missing"], side.follows) if "missing" in piece else None,
+            origin=origin,
         )
+        records.append(record)
     return records
 
 
@@ -289,11 +287,11 @@ def _joint_side(
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
     """Columns of the joints that have one, `absent` for the others, shape (N, n)."""
-    own = [name != NONE for name in names]
-    if all(own):
+    present = [name != NONE for name in names]
+    if all(present):
         return values
-    spread = np.full((len(values), len(own)), absent)
-    spread[:, own] = values
+    spread = np.full((len(values), len(names)), absent)
+    spread[:, present] = values
     return spread
 
 

@@ -54,8 +54,8 @@ class Table:
         Of a bag.
     note : str
         What a reader of these columns should know, a sentence.
-    hint : str
-        What may be wrong where none of the names that are asked for is among the columns.
+    has_header : bool
+        Whether the names are the first line of a text.
     what : str
         What the file is, in messages.
     digest : str
@@ -70,7 +70,7 @@ class Table:
     joints: tuple[str, ...] | None = None
     topic: str = ""
     note: str = ""
-    hint: str = ""
+    has_header: bool = False
     what: str = "the file"
     digest: str = ""
 
@@ -105,15 +105,16 @@ class Table:
                 )
         missing = [name for name in names if name not in self.columns]
         if missing:
-            above = bool(self.hint) and len(missing) == len(names)
-            has = f"{self.hint if above else 'the file has'} {', '.join(self.names) or 'none'}"
-            advice = "; put # before lines above the names" if above else ""
-            raise InputError(f"no column {', '.join(missing)}; {has}{advice}", file=self.file)
+            present = ", ".join(self.names) or "none"
+            where = f"the file has {present}"
+            if self.has_header and len(missing) == len(names):
+                where = f"the first line has {present}; put # before lines above the names"
+            raise InputError(f"no column {', '.join(missing)}; {where}", file=self.file)
         columns = [self._by_samples(name) for name in names]
         lengths = {name: len(x) for name, x in zip(names, columns, strict=True)}
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} {N}" for name, N in lengths.items())
-            raise InputError(f"columns of different lengths: {told}", file=self.file)
+            listed = ", ".join(f"{name} {N}" for name, N in lengths.items())
+            raise InputError(f"columns of different lengths: {listed}", file=self.file)
         return columns[0] if len(columns) == 1 else np.hstack(columns)
 
     def scalar(self, name: str) -> float:

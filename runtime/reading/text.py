@@ -58,7 +58,7 @@ def read_text(path: Path, options: Options) -> Table:
         refused=refused,
         empty=empty,
         row=partial(_row, path, has_header),
-        hint="the first line has" if has_header else "",
+        has_header=has_header,
         what="a text file",
     )
 
