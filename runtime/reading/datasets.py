@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from runtime.errors import DataUnavailableError, InputError
-from runtime.files import is_file, read_bytes, sha256
+from runtime.files import is_file, sha256_of
 
 TIMEOUT = 10.0  # s, for a connection and between two packets
 
@@ -134,25 +134,13 @@ def listing() -> list[dict[str, Any]]:
     """
     rows: list[dict[str, Any]] = []
     for name, dataset in DATASETS.items():
-        paths = {file: locate(name, file) for file in dataset.files}
-        files = [
-            {
-                "name": file,
-                "url": dataset.url + file,
-                "sha256": digest,
-                "path": None if paths[file] is None else str(paths[file]),
-            }
-            for file, digest in dataset.files.items()
-        ]
-        rows.append(
-            {
-                "name": name,
-                "title": dataset.title,
-                "source": dataset.source,
-                "licence": dataset.licence,
-                "files": files,
-            }
-        )
+        files = []
+        for file, digest in dataset.files.items():
+            path = locate(name, file)
+            address = {"name": file, "url": dataset.url + file, "sha256": digest}
+            files.append({**address, "path": None if path is None else str(path)})
+        about = {"title": dataset.title, "source": dataset.source, "licence": dataset.licence}
+        rows.append({"name": name, **about, "files": files})
     return rows
 
 
@@ -191,10 +179,7 @@ def fetch(name: str, file: str, *, cache: Path | None = None) -> Path:
         tried.append(f"download of {dataset.url}{file}: {reason}")
     lines = "\n".join(f"  - {line}" for line in tried)
     raise DataUnavailableError(
-        (
-            f"{name}/{file} was found nowhere:\n{lines}\nPut it at <folder>/{name}/{file} (or "
-            f"{file}.gz) and set the environment variable SYMGEN_DATA to <folder>."
-        ),
+        f"{name}/{file} was found nowhere:\n{lines}\nPut it at <folder>/{name}/{file} (or {file}.gz) and set the environment variable SYMGEN_DATA to <folder>.",
         tried=tuple(tried),
     )
 
@@ -207,14 +192,10 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
     if data:
         for path in (Path(data) / name / file, Path(data) / name / f"{file}.gz"):
             if is_file(path):
-                found = sha256(read_bytes(path))
-                if found != expected:
+                digest = sha256_of(path)
+                if digest != expected:
                     raise InputError(
-                        (
-                            f"SHA-256 {found}; expected {expected}, that of the public record: "
-                            "replace "
-                            "or remove the file"
-                        ),
+                        f"SHA-256 {digest}; expected {expected}, that of the public record: replace or remove the file",
                         file=str(path),
                     )
                 return path, tried
@@ -222,7 +203,7 @@ def _local(name: str, file: str, cache: Path | None) -> tuple[Path | None, list[
     else:
         tried.append("SYMGEN_DATA is not set")
     cached = _cache(cache) / name / file
-    if cached.is_file() and sha256(read_bytes(cached)) == expected:
+    if cached.is_file() and sha256_of(cached) == expected:
         return cached, tried
     tried.append(f"cache {cached}: {'another hash' if cached.is_file() else 'no such file'}")
     return None, tried
