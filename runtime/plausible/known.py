@@ -85,18 +85,16 @@ class KnownValues(Result):
     def off(self) -> tuple[str, ...]:
         """The ratios outside LIMIT.CAD_RATIOS, and errors above LIMIT.CAD_ERROR, in words."""
         texts = []
+        doubtful = set()
         for name, ratios in (("gravity", self.gravity), ("inertia", self.inertia)):
             for joint, ratio in zip(self.joints, ratios, strict=True):
                 if np.isfinite(ratio) and not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1]:
+                    doubtful.add(joint)
                     texts.append(
                         f"{name} torque of joint {joint} {ratio:.2f} times that of the values"
                     )
         for joint, error in zip(self.joints, self.error, strict=True):
-            if (
-                self.complete
-                and error > LIMIT.CAD_ERROR
-                and not any(f"of joint {joint} " in text for text in texts)
-            ):
+            if self.complete and error > LIMIT.CAD_ERROR and joint not in doubtful:
                 texts.append(
                     f"they leave {error:.0f} % of the torque of joint {joint} unexplained, "
                     "friction fitted"
