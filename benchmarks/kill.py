@@ -40,7 +40,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from runtime import load_model
-from runtime.result_files import FINISHED, LOCK, UNFINISHED
+from runtime.resolution.checkpoint import FILE
+from runtime.result_files import FINISHED, UNFINISHED
 from symgen import load_robot
 from symgen.emit.generate import generate_module
 
@@ -213,17 +214,25 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
+def unfinished(folder: Path) -> list[Path]:
+    """What a run is writing there."""
+    return list(folder.glob(f"{UNFINISHED}*"))
+
+
 def judged(folder: Path, old: dict[str, str], new: dict[str, str]) -> str:
     """What a killed run left: "old", "new" or "to complete"; RuntimeError where it is anything else."""
     if (folder / "notes.txt").read_text() != NOTE:
         raise RuntimeError("the user's file changed")
     found = digests(folder)
     found.pop("notes.txt")
-    own = (LOCK, UNFINISHED, FINISHED, "runs")
     sets: dict[str, list[str]] = {}
     for name in new:
         sets.setdefault(str(Path(name).parent), []).append(name)
-    shown = {name for name in found if not set(Path(name).parts) & set(own)}
+    shown = {
+        name
+        for name in found
+        if not any(part.startswith((UNFINISHED, FINISHED, FILE)) for part in Path(name).parts)
+    }
     if shown != set(new):
         raise RuntimeError(f"files {shown - set(new)} are left, {set(new) - shown} are missing")
     states = set()
@@ -265,7 +274,7 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
         (out / "notes.txt").write_text(NOTE)
         process = job.start("new", out)
         if k % 2:
-            while process.poll() is None and not (out / UNFINISHED).exists():
+            while process.poll() is None and not unfinished(out):
                 time.sleep(POLL)
             time.sleep(chance.uniform(0, writing))
         else:
@@ -273,10 +282,10 @@ def survived(job: Job, kills: int, chance: random.Random) -> Counter[str]:
         process.send_signal(signal.SIGKILL)
         process.communicate()
         state = "finished" if process.returncode != -signal.SIGKILL else judged(out, old, new)
-        if (out / "runs").is_dir():
+        if (out / FILE).is_file():
             counts["with runs to go on from"] += 1
         counts[state] += 1
-        counts["while writing"] += (out / UNFINISHED).exists() or (out / FINISHED).exists()
+        counts["while writing"] += bool(unfinished(out)) or (out / FINISHED).exists()
         if job.run("new", out) != code or digests(out) != new | {
             "notes.txt": hashlib.sha256(NOTE.encode()).hexdigest()
         }:
@@ -301,10 +310,10 @@ def write_time(job: Job, base: Path) -> float:
     out = job.folder / f"{job.verb}-timed"
     shutil.copytree(base, out)
     process = job.start("new", out)
-    while process.poll() is None and not (out / UNFINISHED).exists():
+    while process.poll() is None and not unfinished(out):
         time.sleep(POLL)
     begin = time.monotonic()
-    while process.poll() is None and ((out / UNFINISHED).exists() or (out / FINISHED).exists()):
+    while process.poll() is None and (bool(unfinished(out)) or (out / FINISHED).exists()):
         time.sleep(POLL)
     found = time.monotonic() - begin
     process.communicate()

@@ -50,8 +50,7 @@ def report(
     ----------
     result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses
     folder : str, Path or Results
-        Made where it is missing; or one that this process keeps for itself
-        (`runtime.result_files.reserved`).
+        Made where it is missing; or one that `runtime.result_files.results_in` gave.
     study : Study, optional
         Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An
         Identification holds its own.
@@ -64,7 +63,7 @@ def report(
     Raises
     ------
     OutputError
-        The folder cannot be written, or another process writes there.
+        The folder cannot be written.
     """
     place = folder.folder if isinstance(folder, Results) else Path(folder)
     files = files_of(result, place, study or Study())

@@ -87,9 +87,9 @@ def _noted_angles() -> Iterator[None]:
 def results_in(output: Path | None) -> Iterator[Any]:
     """Like `reported_errors`; the context gives the folder as `Results`, or None."""
     with reported_errors():
-        from runtime.result_files import reserved
+        from runtime import result_files
 
-        with reserved(output) as results:
+        with result_files.results_in(output) as results:
             yield results
 
 
