@@ -151,7 +151,7 @@ def with_encoder(robot: str, step: float) -> Simulator:
     controller = replace(
         b.study.controller, encoder=replace(b.study.controller.encoder, step=step or None)
     )
-    return Simulator(b.model, controller, symbolic=b.simulator.symbolic)
+    return Simulator(b.model, controller)
 
 
 def made(key: Key) -> tuple[Record, ClosedLoop]:

@@ -37,7 +37,7 @@ from rounds import interleave, processor, ratio
 
 from symgen.derive.loops import close
 from symgen.description import load_robot
-from symgen.emit.numpy_target import render
+from symgen.emit.python_target import render
 from symgen.emit.spec import ModuleSpec, function, is_inertial, is_inertial_or_actuator, module_spec
 from symgen.regroup.regrouping import regroup
 

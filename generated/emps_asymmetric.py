@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian at random states,
-# parameters and random constants agree with Lagrange's equations and products of frames to 1e-09;
-# SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
-# FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
-# robot file.
-# sha256 of what follows: 09c54d3b74154f4c41eb5fa6b26785f7c0ad42532f14a370a080f7429c6d6d29
 """EMPS, one prismatic axis, asymmetric friction: base parameters, regressor, dynamics.
 
 GENERATED from emps_asymmetric.yaml, sha256 bca2b7106ba8, by symgen 0.2.0.
@@ -43,13 +35,24 @@ Cost per sample
     regressor          0 multiplications, 0 additions, 0 sin, 0 cos
     inverse_dynamics   5 multiplications, 4 additions, 0 sin, 0 cos
     inertia_matrix     0 multiplications, 0 additions, 0 sin, 0 cos
-    bias               4 multiplications, 3 additions, 0 sin, 0 cos
     gravity            0 multiplications, 0 additions, 0 sin, 0 cos
     frame_poses        0 multiplications, 0 additions, 0 sin, 0 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 1), or (1,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (5,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX, PyTorch, ...;
+            pip install array-api-compat), all float64 or all float32, with any axes before the
+            last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
+CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
+inverse_dynamics_derivatives at random states, parameters and random constants agree with
+Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+packages, by CasADi.
+sha256 of all but these lines: 7cfe5d97b1d07bc051b692490900ab6c1782bd182fbad1801e14b6042683650d
 """
 
 import numpy as np
@@ -87,11 +90,17 @@ def store(N: int) -> Store:
     """Room for N samples, shape (5, 1, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((5, 1, N)).view(Store)
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((5, 1, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 1) each; ValueError unless all have shape
     (N, 1), or all (1,).
@@ -104,28 +113,210 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (5,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (5,):
         raise ValueError(f"X of shape {X.shape}; expected (5,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    xp = _package(*states, *X)
+    if xp is not np:
+        return _gathered(xp, {}, block, shape, states, X, constants)
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
+
+
+def _gathered(xp, table, block, shape, states, X, constants):
+    """The result of `block` on a package whose arrays cannot be written to: it fills a `table`."""
+    block(xp, *map(xp.rows, states), table, *map(xp.parameters, X), *constants)
+    return xp.gathered(table, shape, states[0])
+
+
+_IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of another package
+
+
+def _package(*arrays):
+    """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
+    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
+        return np
+    if any(type(x).__module__.startswith("casadi") for x in arrays):
+        return _Symbols()
+    others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
+    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+        return np if _IN_PLACE else _Arrays(np, arrays)
+    try:
+        from array_api_compat import array_namespace
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"arrays of {type(others[0]).__module__} need array_api_compat: "
+            "pip install array-api-compat"
+        ) from error
+    return _Arrays(array_namespace(*arrays), arrays)
+
+
+class _Arrays:
+    """Functions of an array package under NumPy's names, those of plain numbers by NumPy; TypeError
+    unless all `arrays` are float64, or all float32.
+    """
+
+    pi = np.pi
+
+    def __init__(self, package, arrays):
+        self.package, kinds = package, [x.dtype for x in arrays if hasattr(x, "dtype")]
+        if not any(all(x == kind for x in kinds) for kind in (package.float64, package.float32)):
+            kinds = ", ".join(sorted({*map(str, kinds)}))
+            raise TypeError(f"arrays of {kinds}; expected all float64, or all float32")
+
+    def __getattr__(self, name):
+        function = getattr(self.package, "pow" if name == "power" else name)
+
+        def of(x, *more, **how):
+            if isinstance(x, int | float):
+                return float(getattr(np, name)(x, *more))
+            return function(x, *more, **how)
+
+        return of
+
+    def sign(self, x):
+        """NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+        where = self.package.where
+        return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0*x))
+
+    def maximum(self, x, zero):
+        return self.package.where(x < zero, zero*x, x)
+
+    def minimum(self, x, zero):
+        return self.package.where(x > zero, zero*x, x)
+
+    def rows(self, x):
+        """x[..., k], one by one."""
+        if x.shape[-1:] != (1,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 1)")
+        return [x[..., k] for k in range(1)]
+
+    def parameters(self, X):
+        _parameters(X)
+        return [X[k] for k in range(5)]
+
+    def gathered(self, table, shape, like):
+        """Entries by index as an array, samples first; zero where there is none."""
+        zero = self.package.zeros_like(like[..., 0])
+        entries = [table.get(k[0] if len(k) == 1 else k, 0.0) for k in np.ndindex(*shape)]
+        entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
+        return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
+
+    def solve(self, A, b):
+        return self.package.linalg.solve(A, b[..., None])[..., 0]
+
+
+class _Symbols:
+    """Functions of CasADi under NumPy's names, on columns."""
+
+    def __init__(self):
+        import casadi as ca
+
+        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
+        self.parameters = ca.vertsplit
+
+    def __getattr__(self, name):
+        return getattr(self.package, name)
+
+    def stack(self, entries):
+        return self.package.vertcat(*entries)
+
+    def zeros_like(self, x):
+        return self.package.SX(*x.shape)
+
+    def matrix_transpose(self, x):
+        return x.T
+
+    def gathered(self, table, shape, like):
+        """Entries by index as a matrix, or as matrices; those that are zero stay structural."""
+        if len(shape) == 3:
+            first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
+            return [self.gathered(entries, shape[1:], like) for entries in first]
+        matrix = self.package.SX(*(*shape, 1)[:2])
+        for place, x in table.items():
+            matrix[place] = x
+        return matrix
+
+    def solve(self, A, b):
+        """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+        n = len(JOINTS)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        for j in range(n):
+            for k in range(j):
+                d[j] -= L[j, k]**2*d[k]
+                x[j] -= L[j, k]*x[k]
+            for i in range(j + 1, n):
+                L[i, j] = (A[i, j] - sum(L[i, k]*L[j, k]*d[k] for k in range(j)))/d[j]
+        x = [x[j]/d[j] for j in range(n)]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                x[j] -= L[i, j]*x[i]
+        return self.stack(x)
+
+
+def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
+    """casadi.Function of a function of this module, or, as NAME_derivatives, of the Jacobians of
+    its results by each column that it reads, d<result>_d<column>; `frame` is that of a jacobian.
+
+    Inputs are columns q, qd, qdd, tau (1,), X (5,), standard (15,), then the constants. By name,
+    a constant that is not given has its value in CONSTANTS, another input is nan. Samples stand
+    side by side, q (1, N); the results then do so too. The derivative of sign(qd) is zero.
+    """
+    import casadi as ca
+
+    of = name.removesuffix("_derivatives")
+    if of not in _OUTPUTS:
+        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+    columns, names = [text.split() for text in _OUTPUTS[of]]
+    sizes = {"X": 5, "standard": 15}
+    columns = {x: ca.SX.sym(x, sizes.get(x, 1)) for x in columns}
+    inputs = columns | {x: ca.SX.sym(x) for x in CONSTANTS}
+    given = {} if frame is None else {"frame": frame}
+    value = globals()[of](**inputs, **given)
+    results = dict(zip(names, value if isinstance(value, list | tuple) else [value]))
+    if of != name:
+        results = {
+            f"d{y}_d{x}": ca.jacobian(results[y], columns[x]) for y in names for x in columns
+        }
+    default = {"default_in": [*[np.nan]*len(columns), *CONSTANTS.values()]}
+    return ca.Function(
+        name, [*inputs.values()], [*results.values()], [*inputs], [*results], default
+    )
+
+
+_OUTPUTS = {  # columns, results
+    'base_parameters': ('standard', 'X'),
+    'regressor': ('q qd qdd', 'D'),
+    'inverse_dynamics': ('q qd qdd X', 'GAM'),
+    'inertia_matrix': ('q X', 'A'),
+    'bias': ('q qd X', 'GAM'),
+    'gravity': ('q X', 'GAM'),
+    'forward_dynamics': ('q qd tau X', 'qdd'),
+    'frame_poses': ('q', 'T1'),
+    'jacobian': ('q', 'J'),
+}
 
 
 def elements(*, g: float = 9.81) -> dict:
@@ -142,217 +333,217 @@ def elements(*, g: float = 9.81) -> dict:
 ELEMENTS = elements()
 
 
-def base_parameters(standard: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+def base_parameters(standard: "Array", *, g: float = 9.81) -> "Array":
     """X, shape (5,), from the 15 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+        xp = _package(*standard)
+    else:
+        xp = _package(standard)
+        standard = standard if xp is np else [standard[k] for k in range(15)]
     _, _, _, _, _, _, _, _, _, M1, Ia1, FVP1, FSP1, FVN1, FSN1 = standard
     M1R = M1 + Ia1
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         M1R, FVP1, FSP1, FVN1, FSN1,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, g: float = 9.81
+) -> "Array":
     """D of Gamma = D X. Shape (N, 1, 5).
 
     A view on one store of shape (5, 1, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, ())
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (1*N, 5), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out).reshape(5, -1).T
+    xp, filled = _stored(q, qd, qdd, out, ())
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 5))
+    return filled.reshape(5, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 1, 5)."""
+    states = (q, qd, qdd)
+    xp = _package(*states)
+    if xp is not np:
+        if out is not None:
+            raise ValueError("out: a store holds NumPy's arrays alone")
+        constants = constants
+        D = _gathered(xp, _constant({}), _regressor_block, (5, 1), states, (), constants)
+        return xp, xp.matrix_transpose(D)
+    states = _states(*states)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (5, 1, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(5, 1, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out):
-    """`out`, or a new store, filled."""
-    states = _states(q, qd, qdd)
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, (states[1], states[2]))
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, g: float = 9.81
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _states(q, qd, qdd)
-    result = np.zeros((1, len(states[0])))
-    _fill(_inverse_dynamics_block, result, (states[1], states[2]), X)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (1,), (q, qd, qdd), (X,), ())
 
 
-def inertia_matrix(q: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+def inertia_matrix(q: "Array", X: "Array", *, g: float = 9.81) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 1, 1).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((1, 1, len(states[0])))
-    _fill(_inertia_matrix_block, result, (), X)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (1, 1), (q,), (X,), ())
 
 
-def bias(q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+def bias(q: "Array", qd: "Array", X: "Array", *, g: float = 9.81) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _states(q, qd)
-    result = np.zeros((1, len(states[0])))
-    _fill(_bias_block, result, (states[1],), X)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, g=g)
 
 
-def gravity(q: np.ndarray, X: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+def gravity(q: "Array", X: "Array", *, g: float = 9.81) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((1, len(states[0])))
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (1,), (q,), (X,), ())
 
 
-def frame_poses(q: np.ndarray, *, g: float = 9.81) -> np.ndarray:
+def frame_poses(q: "Array", *, g: float = 9.81) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 1, 4, 4).
     """
-    states = _states(q)
-    result = np.zeros((1, 4, 4, len(states[0])))
-    result[0, 0, 0] = result[0, 1, 1] = result[0, 2, 2] = result[0, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, states)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (1, 4, 4), (q,), (), ())
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, g: float = 9.81
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X)
-    inertia = inertia_matrix(q, X)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
+    xp = _package(q, qd, tau, X)
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    elif tau.shape != q.shape:
+        raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
+    rest = tau - bias(q, qd, X, g=g)
+    inertia = inertia_matrix(q, X, g=g)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
-def jacobian(q: np.ndarray, *, frame: int | None = None, g: float = 9.81) -> np.ndarray:
+def jacobian(q: "Array", *, frame: int | None = None, g: float = 9.81) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 1).
     """
     frame = 1 if frame is None else frame
-    poses = frame_poses(q).reshape(-1, 1, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 2):
+        raise ValueError(f"frame {frame!r}; expected 1 to 1")
+    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame, (), ()))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 1), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 1)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, J, frame, posing, moving):
+    """Fill J, shape (6, 1, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(1, 4, 4), 0.0)
+    _frame_poses_block(xp, q, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for place, value in columns.items():
+        J[place] = value
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 1, ((0, 1.0),)),),
+        1: (0, 1, ((0, 1.0),)),
     }
 
 
-def _regressor_block(qd, qdd, D):
-    """Fill D, shape (5, 1, N), where it is not constant, from qd (1, N); qdd (1, N)."""
+def _regressor_block(xp, q, qd, qdd, D):
+    """Fill D, shape (5, 1, N), where it is not constant, from q (1, N); qd (1, N); qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
     # Friction, actuators
-    DG1FSP1a = np.sign(QP1)
+    DG1FSP1a = xp.sign(QP1)
     # Joint 1
     D[0, 0] = QDP1                       # DG1M1
-    D[1, 0] = np.maximum(QP1, 0.0)       # DG1FVP1
-    D[2, 0] = np.maximum(DG1FSP1a, 0.0)  # DG1FSP1
-    D[3, 0] = np.minimum(QP1, 0.0)       # DG1FVN1
-    D[4, 0] = np.minimum(DG1FSP1a, 0.0)  # DG1FSN1
+    D[1, 0] = xp.maximum(QP1, 0.0)       # DG1FVP1
+    D[2, 0] = xp.maximum(DG1FSP1a, 0.0)  # DG1FSP1
+    D[3, 0] = xp.minimum(QP1, 0.0)       # DG1FVN1
+    D[4, 0] = xp.minimum(DG1FSP1a, 0.0)  # DG1FSN1
 
 
-def _inverse_dynamics_block(qd, qdd, GAM, X):
-    """Fill GAM, shape (1, N), where it is not constant, from qd (1, N); qdd (1, N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
+    """Fill GAM, shape (1, N), from q (1, N); qd (1, N); qdd (1, N)."""
     # Inputs
     QP1 = qd[0]
     QDP1 = qdd[0]
     M1R, FVP1, FSP1, FVN1, FSN1 = X
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
     # Joint 1
     F31 = M1R*QDP1
-    # Friction, actuators
-    GAM1a = np.sign(QP1)
     # Torques
-    GAM[0] = (F31 + FVP1*np.maximum(QP1, 0.0) + FSP1*np.maximum(GAM1a, 0.0) - FVN1*(-np.minimum(QP1,
-        0.0)) - FSN1*(-np.minimum(GAM1a, 0.0)))
+    GAM[0] = (F31 + FVP1*xp.maximum(QP1, 0.0) + FSP1*xp.maximum(GAM1a, 0.0) - FVN1*(-xp.minimum(QP1,
+        0.0)) - FSN1*(-xp.minimum(GAM1a, 0.0)))
 
 
-def _inertia_matrix_block(A, X):
-    """Fill A, shape (1, 1, N), where it is not constant."""
+def _inertia_matrix_block(xp, q, A, X):
+    """Fill A, shape (1, 1, N), from q (1, N)."""
     # Inputs
     M1R = X[0]
     # Inertia matrix
     A[0, 0] = M1R
 
 
-def _bias_block(qd, GAM, X):
-    """Fill GAM, shape (1, N), where it is not constant, from qd (1, N)."""
-    # Inputs
-    QP1 = qd[0]
-    FVP1, FSP1, FVN1, FSN1 = X[1:]
-    # Friction, actuators
-    GAM1a = np.sign(QP1)
-    # Torques
-    GAM[0] = (FVP1*np.maximum(QP1, 0.0) + FSP1*np.maximum(GAM1a, 0.0) - FVN1*(-np.minimum(QP1, 0.0))
-        - FSN1*(-np.minimum(GAM1a, 0.0)))
+def _gravity_block(xp, q, GAM, X):
+    """Fill GAM, shape (1, N), from q (1, N)."""
 
 
-def _frame_poses_block(q, T):
-    """Fill T, shape (1, 4, 4, N), where it is not constant, from q (1, N)."""
+def _frame_poses_block(xp, q, T):
+    """Fill T, shape (1, 4, 4, N), from q (1, N)."""
     # Inputs
     q1 = q[0]
     # Poses
     T[0, 2, 3] = q1
+    # Constants
+    T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
 
 
 # Of the robot file: drives, limits and values, which no function above reads

@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-# states, parameters and random constants agree with Lagrange's equations and products of frames
-# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
-# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
-# VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 0a56ecd62ecc477d98a212d00d3833d8e14544bc88fdd5338ce705588625e0cb
 """Planar five-bar linkage, 2 actuated joints, general closed loop: base parameters, regressor,
     dynamics.
 
@@ -69,7 +61,6 @@ Cost per sample
     regressor          38 multiplications, 22 additions, 4 sin, 4 cos
     inverse_dynamics   49 multiplications, 36 additions, 4 sin, 4 cos
     inertia_matrix     20 multiplications, 17 additions, 2 sin, 1 cos
-    bias               45 multiplications, 30 additions, 4 sin, 4 cos
     gravity            21 multiplications, 14 additions, 4 sin, 4 cos
     frame_poses        8 multiplications, 7 additions, 4 sin, 4 cos
     linearised_closure 8 multiplications, 10 additions, 4 sin, 4 cos
@@ -78,6 +69,14 @@ Cost per sample
 Arguments   q, qd, qdd, tau of shape (N, 2), or (2,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (17,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's, float64: joints that only the closure equations tie are found by iteration
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
+states, parameters and random constants agree with Lagrange's equations and products of frames to
+1e-09, on NumPy's arrays.
+sha256 of all but these lines: fef20350bb8db526b7f52ddda15ee548ec96919f3898061ca0b2cbeb4f8d3d98
 """
 
 import numpy as np
@@ -134,12 +133,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (17, 2, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((17, 2, N)).view(Store)
-    zeros[5, 0] = zeros[14, 1] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((17, 2, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[5, 0] = D[14, 1] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape
     (N, 2), or all (2,).
@@ -152,28 +157,34 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (17,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (17,):
         raise ValueError(f"X of shape {X.shape}; expected (17,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants, closing=None):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    rows = _closed(rows, closing)
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
 
 
 def elements(
@@ -195,14 +206,15 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
-    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+    standard: "Array", *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    L4: float = 0.34, g: float = 9.81
+) -> "Array":
     """X, shape (17,), from the 48 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+    xp = np
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _,
@@ -215,209 +227,201 @@ def base_parameters(
     ZZ3R = ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4
     MX3R = MX3 - L3/L4*MX4 + L3*M4
     ZZ4R = ZZ4 - L4*MX4
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
         ZZ4R, MY4,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, L0: float = 0.2,
+    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array":
     """D of Gamma = D X. Shape (N, 2, 17).
 
     A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3,
+        L4)))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, L0: float = 0.2,
+    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g).reshape(17, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3,
+        L4)))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 17))
+    return filled.reshape(17, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants, closing=None):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 2, 17)."""
+    xp = np
+    states = _closed(_states(q, qd, qdd), closing)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (17, 2, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, L0, L1, L2, L3, L4, g):
-    """`out`, or a new store, filled."""
-    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, L1, L3, g)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, L0: float = 0.2,
-    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 2).
     """
-    X = _parameters(X)
-    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = np.zeros((2, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, L1, L3, g)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (2,), (q, qd, qdd), (X,), (L1, L3, g), closing=((L0,
+        L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    q: "Array", X: "Array", *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
     L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 2, 2).
     """
-    X = _parameters(X)
-    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = np.zeros((2, 2, len(states[0])))
-    _fill(_inertia_matrix_block, result, (states[0], states[3]), X, L1, L3)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (2, 2), (q,), (X,), (L1, L3), closing=((L0, L1, L2, L3,
+        L4), (L1, L2, L3, L4)))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25,
-    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", X: "Array", *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 2).
     """
-    X = _parameters(X)
-    states = _closed(_states(q, qd), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = np.zeros((2, len(states[0])))
-    _fill(_bias_block, result, states, X, L1, L3, g)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
+    q: "Array", X: "Array", *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36,
     L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 2).
     """
-    X = _parameters(X)
-    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = np.zeros((2, len(states[0])))
-    _fill(_gravity_block, result, (states[0], states[3]), X, g)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (2,), (q,), (X,), (g,), closing=((L0, L1, L2, L3, L4), (L1,
+        L2, L3, L4)))
 
 
 def frame_poses(
-    q: np.ndarray, *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
+    q: "Array", *, L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27,
     L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 6, 4, 4).
     """
-    states = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    result = np.zeros((6, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 2, 2] = result[1, 3, 3] = result[2, 2, 2] = 1.0
-    result[2, 3, 3] = result[3, 2, 2] = result[3, 3, 3] = result[4, 2, 2] = result[4, 3, 3] = 1.0
-    result[5, 2, 2] = result[5, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, (states[0],), L0, L1, L2, L3, L4)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (6, 4, 4), (q,), (), (L0, L1, L2, L3, L4), closing=((L0,
+        L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, L0: float = 0.2,
-    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
-    inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, L0: float = 0.2, L1: float = 0.25,
+    L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
+    xp = np
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    rest = tau - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, L0: float = 0.2, L1: float = 0.25,
+    q: "Array", *, frame: int | None = None, L0: float = 0.2, L1: float = 0.25,
     L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 2).
     """
     frame = 6 if frame is None else frame
-    poses = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4).reshape(-1, 6, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    rates = _closed(_states(q), ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))[3].reshape(-1, 2, 2)
-    result = result[..., :2] + result[..., 2:] @ rates
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 7):
+        raise ValueError(f"frame {frame!r}; expected 1 to 6")
+    return _evaluated(_jacobian_block, (6, 2), (q,), (), (frame, (L0, L1, L2, L3, L4), ()),
+        closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 4), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 4)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, qd, qdd, G, J, frame, posing, moving):
+    """Fill J, shape (6, 2, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(6, 4, 4), 0.0)
+    _frame_poses_block(xp, q, qd, qdd, G, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for k, column in np.ndindex(6, 2):
+        J[k, column] = columns.get((k, column), 0.0)
+        for u in range(2):
+            J[k, column] += columns.get((k, 2 + u), 0.0)*G[2*u + column]
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)),),
-        3: ((3, 0, ((1, 1.0),)),), 4: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((2, 1.0),)), (5, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2,
-            -1.0),)),),
-        6: ((3, 0, ((1, 1.0),)), (4, 0, ((3, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((2, 1.0),)), 3: (0, 0, ((1, 1.0),)),
+        4: (3, 0, ((3, 1.0),)), 5: (2, 0, ((1, 1.0), (3, 1.0), (0, -1.0), (2, -1.0))),
+        6: (4, 2, ()),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
-    L0: float = 0.2, L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34,
-    g: float = 9.81
-) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also
-    their accelerations.
+    q: "Array", qd: "Array | None" = None, qdd: "Array | None" = None, *, L0: float = 0.2,
+    L1: float = 0.25, L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
+) -> "Array | tuple":
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd
+    also their accelerations.
     """
-    rates = np.zeros((3, 4))
-    rates[0, 2] = 1.0
-    rates[1, 3] = 1.0
-    rates[2, 1] = 1.0
-    rates[2, 3] = 1.0
-    rates[2, 0] = -1.0
-    rates[2, 2] = -1.0
-    origin = np.array([
-        0.0,
-        0.0,
-        0.0,
-    ])
-    given = [state is not None for state in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
-    states = _closed(states, ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))[:3]
+    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
+    states = _closed(states, ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
+    asked = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
     shape = (*np.shape(q)[:-1], 3)
-    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
-    results[0] += origin
+    results = [
+        _filled(_passive_joints_block, np.zeros((3, len(x))), (x,), (float(k ==
+            0),)).T.reshape(shape)
+        for k, x in enumerate(asked)
+    ]
     return results[0] if len(results) == 1 else tuple(results)
+
+
+def _passive_joints_block(xp, x, P, one):
+    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
+    P[0] = 1.0*x[2]
+    P[1] = 1.0*x[3]
+    P[2] = 1.0*x[1] + 1.0*x[3] - 1.0*x[0] - 1.0*x[2]
 
 
 def _closed(states, constants):
@@ -457,8 +461,7 @@ def _closure(states, L0, L1, L2, L3, L4):
     Shape (2, 5, N).
     """
     result = np.zeros((2, 5, len(states[0])))
-    _fill(_linearised_closure_block, result, (states[0],), L0, L1, L2, L3, L4)
-    return result
+    return _filled(_linearised_closure_block, result, states, (L0, L1, L2, L3, L4))
 
 
 def _curvature(states, L1, L2, L3, L4):
@@ -467,8 +470,7 @@ def _curvature(states, L1, L2, L3, L4):
     Shape (2, N).
     """
     result = np.zeros((2, len(states[0])))
-    _fill(_curvature_block, result, (states[0], states[1]), L1, L2, L3, L4)
-    return result
+    return _filled(_curvature_block, result, states, (L1, L2, L3, L4))
 
 
 def _assembled(q, constants):
@@ -502,7 +504,7 @@ def _assembled(q, constants):
 def _start(constants):
     """Actuated and tied joints of _START, the loops closed anew at other constants."""
     q, x = np.array(_START[:2]), np.array([_START[2:]])
-    given = np.array([CONSTANTS[name] for name in ('L0', 'L1', 'L2', 'L3', 'L4')])
+    given = np.array([CONSTANTS[name] for name in ['L0', 'L1', 'L2', 'L3', 'L4']])
     away = np.array(constants) - given
     for s in np.arange(1, 17) / 16 if away.any() else ():  # along a straight line of the constants
         x, residual = _newton(q[None], x, 20, given + s * away)
@@ -541,23 +543,21 @@ def _solved(J, b):
     return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
-def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
-    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G
-    (4, N)."""
+def _motion(xp, q, qd, qdd, G, L1, L3, g):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     QDP1, QDP3, QDP2, QDP4 = qdd
-    G21, G23, G41, G43 = G
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
     # Link 1
     DV331 = QP1**2
     VP11 = g*S1
@@ -581,6 +581,27 @@ def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
     VSP14 = VP13 - L3*DV333
     VSP24 = VP23 + L3*QDP3
     VP14 = C4*VSP14 + S4*VSP24
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
+    GAM2a = xp.sign(QP3)
+    return (
+        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
+        GAM1a, GAM2a
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, G, D, L1, L3, g):
+    """Fill D, shape (17, 2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G
+    (4, N)."""
+    # Inputs
+    QP1, QP3 = qd[:2]
+    QDP1, QDP3 = qdd[:2]
+    G21, G23, G41, G43 = G
+    # Motion of the links
+    (
+        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
+        GAM1a, GAM2a
+    ) = _motion(xp, q, qd, qdd, G, L1, L3, g)
     # Joint axes Z and velocities V seen from link 2
     V121 = L1*S2
     V221 = L1*C2
@@ -592,7 +613,7 @@ def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
     D[1, 0] = VP21                                       # DG1MX1
     D[2, 0] = -VP11                                      # DG1MY1
     D[3, 0] = QP1                                        # DG1FV1
-    D[4, 0] = np.sign(QP1)                               # DG1FS1
+    D[4, 0] = GAM1a                                      # DG1FS1
     D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
     D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
     D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
@@ -606,55 +627,26 @@ def _regressor_block(q, qd, qdd, G, D, L1, L3, g):
     D[10, 1] = VP23                                       # DG3MX3
     D[11, 1] = -VP13                                      # DG3MY3
     D[12, 1] = QP3                                        # DG3FV3
-    D[13, 1] = np.sign(QP3)                               # DG3FS3
+    D[13, 1] = GAM2a                                      # DG3FS3
     D[15, 1] = WP34 + WP34*G43                            # DG3ZZ4
     D[16, 1] = -VP14 - WP34*V143 - DV334*V243 - VP14*G43  # DG3MY4
 
 
-def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, L3, g):
-    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4,
-    N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, L3, g):
+    """Fill GAM, shape (2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
-    q1, q3, q2, q4 = q
-    QP1, QP3, QP2, QP4 = qd
-    QDP1, QDP3, QDP2, QDP4 = qdd
+    QP1, QP3 = qd[:2]
+    QDP1, QDP3 = qdd[:2]
     G21, G23, G41, G43 = G
     (
         ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
         ZZ4R, MY4
     ) = X
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    # Link 1
-    DV331 = QP1**2
-    VP11 = g*S1
-    VP21 = g*C1
-    # Link 2
-    W32 = QP1 + QP2
-    WP32 = QDP1 + QDP2
-    DV332 = W32**2
-    VSP12 = VP11 - L1*DV331
-    VSP22 = VP21 + L1*QDP1
-    VP12 = C2*VSP12 + S2*VSP22
-    VP22 = C2*VSP22 - S2*VSP12
-    # Link 3
-    DV333 = QP3**2
-    VP13 = g*S3
-    VP23 = g*C3
-    # Link 4
-    W34 = QP3 + QP4
-    WP34 = QDP3 + QDP4
-    DV334 = W34**2
-    VSP14 = VP13 - L3*DV333
-    VSP24 = VP23 + L3*QDP3
-    VP14 = C4*VSP14 + S4*VSP24
+    # Motion of the links
+    (
+        C2, S2, C4, S4, VP11, VP21, WP32, DV332, VP12, VP22, VP13, VP23, WP34, DV334, VP14,
+        GAM1a, GAM2a
+    ) = _motion(xp, q, qd, qdd, G, L1, L3, g)
     # Joint 4
     F14 = -MY4*WP34
     F24 = -MY4*DV334
@@ -672,12 +664,12 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, L3, g):
     N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
     NE31 = N32 + L1*FDI22 + N31
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N34*G41
-    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a + G21*N32 + G41*N34
+    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*GAM2a + G23*N32 + G43*N34
 
 
-def _inertia_matrix_block(q, G, A, X, L1, L3):
-    """Fill A, shape (2, 2, N), where it is not constant, from q (4, N); G (4, N)."""
+def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1, L3):
+    """Fill A, shape (2, 2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q2, q4 = q[2:]
     G21, G23, G41, G43 = G
@@ -689,9 +681,9 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     ZZ4R = X[15]
     MY4 = X[16]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    S4 = np.sin(q4)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    S4 = xp.sin(q4)
     # Composite link 4
     AS14 = -MY4*S4
     L3AS14 = L3*AS14
@@ -713,80 +705,8 @@ def _inertia_matrix_block(q, G, A, X, L1, L3):
     A[1, 1] = JP333 + G43*NE334 + G23*ZZ2R*G23 + G43*(NE334 + ZZ4R*G43)
 
 
-def _bias_block(q, qd, qdd, G, GAM, X, L1, L3, g):
-    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); qd (4, N); qdd (4, N); G (4,
-    N)."""
-    # Inputs
-    q1, q3, q2, q4 = q
-    QP1, QP3, QP2, QP4 = qd
-    QDP2, QDP4 = qdd[2:]
-    G21, G23, G41, G43 = G
-    MX1R = X[1]
-    MY1 = X[2]
-    FV1 = X[3]
-    FS1 = X[4]
-    OFFSET1 = X[5]
-    ZZ2R = X[6]
-    MX2R = X[7]
-    MY2 = X[8]
-    MX3R = X[10]
-    MY3 = X[11]
-    FV3 = X[12]
-    FS3 = X[13]
-    OFFSET3 = X[14]
-    ZZ4R = X[15]
-    MY4 = X[16]
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    # Link 1
-    DV331 = QP1**2
-    VP11 = g*S1
-    VP21 = g*C1
-    # Link 2
-    W32 = QP1 + QP2
-    DV332 = W32**2
-    VSP12 = VP11 - L1*DV331
-    VP12 = C2*VSP12 + S2*VP21
-    VP22 = C2*VP21 - S2*VSP12
-    # Link 3
-    DV333 = QP3**2
-    VP13 = g*S3
-    VP23 = g*C3
-    # Link 4
-    W34 = QP3 + QP4
-    DV334 = W34**2
-    VSP14 = VP13 - L3*DV333
-    VP14 = C4*VSP14 + S4*VP23
-    # Joint 4
-    F14 = -MY4*QDP4
-    F24 = -MY4*DV334
-    N34 = ZZ4R*QDP4 - MY4*VP14
-    FDI24 = S4*F14 + C4*F24
-    # Joint 3
-    N33 = MX3R*VP23 - MY3*VP13
-    NE33 = N34 + L3*FDI24 + N33
-    # Joint 2
-    F12 = -MX2R*DV332 - MY2*QDP2
-    F22 = MX2R*QDP2 - MY2*DV332
-    N32 = ZZ2R*QDP2 + MX2R*VP22 - MY2*VP12
-    FDI22 = S2*F12 + C2*F22
-    # Joint 1
-    N31 = MX1R*VP21 - MY1*VP11
-    NE31 = N32 + L1*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N34*G41
-    GAM[1] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3) + N32*G23 + N34*G43
-
-
-def _gravity_block(q, G, GAM, X, g):
-    """Fill GAM, shape (2, N), where it is not constant, from q (4, N); G (4, N)."""
+def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
+    """Fill GAM, shape (2, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     G21, G23, G41, G43 = G
@@ -800,14 +720,14 @@ def _gravity_block(q, G, GAM, X, g):
     OFFSET3 = X[14]
     MY4 = X[16]
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
     # Link 1
     VP11 = g*S1
     VP21 = g*C1
@@ -834,21 +754,21 @@ def _gravity_block(q, G, GAM, X, g):
     GAM[1] = OFFSET3 + NE33 + N32*G23 + N34*G43
 
 
-def _frame_poses_block(q, T, L0, L1, L2, L3, L4):
-    """Fill T, shape (6, 4, 4, N), where it is not constant, from q (4, N)."""
+def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3, L4):
+    """Fill T, shape (6, 4, 4, N), from q (4, N); qd (4, N); qdd (4, N); G (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     th34 = q3 + q4
-    C34 = np.cos(th34)
-    S34 = np.sin(th34)
+    C34 = xp.cos(th34)
+    S34 = xp.sin(th34)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -895,23 +815,26 @@ def _frame_poses_block(q, T, L0, L1, L2, L3, L4):
     T[5, 1, 0] = S34
     T[5, 1, 1] = C34
     T[5, 1, 3] = P26
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
+    T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = T[5, 2, 2] = T[5, 3, 3] = 1.0
 
 
-def _linearised_closure_block(q, R, L0, L1, L2, L3, L4):
-    """Fill R, shape (2, 5, N), where it is not constant, from q (4, N)."""
+def _linearised_closure_block(xp, q, R, L0, L1, L2, L3, L4):
+    """Fill R, shape (2, 5, N), from q (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     th34 = q3 + q4
-    C34 = np.cos(th34)
-    S34 = np.sin(th34)
+    C34 = xp.cos(th34)
+    S34 = xp.sin(th34)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -942,22 +865,22 @@ def _linearised_closure_block(q, R, L0, L1, L2, L3, L4):
     R[1, 4] = -C34L4
 
 
-def _curvature_block(q, qd, B, L1, L2, L3, L4):
-    """Fill B, shape (2, N), where it is not constant, from q (4, N); qd (4, N)."""
+def _curvature_block(xp, q, qd, B, L1, L2, L3, L4):
+    """Fill B, shape (2, N), from q (4, N); qd (4, N)."""
     # Inputs
     q1, q3, q2, q4 = q
     QP1, QP3, QP2, QP4 = qd
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     th34 = q3 + q4
-    C34 = np.cos(th34)
-    S34 = np.sin(th34)
+    C34 = xp.cos(th34)
+    S34 = xp.sin(th34)
     # Link 2
     W32 = QP1 + QP2
     # Link 4

@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 6e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-# states, parameters and random constants agree with Lagrange's equations and products of frames
-# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
-# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
-# VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: 6254f4bf75b198225e97ddea6c967d817b78e4d97ee75ba7192da6ad6d60f19e
 """Planar four-bar linkage, 1 actuated joint, general closed loop: base parameters, regressor,
     dynamics.
 
@@ -67,7 +59,6 @@ Cost per sample
     regressor          22 multiplications, 13 additions, 3 sin, 2 cos
     inverse_dynamics   30 multiplications, 21 additions, 3 sin, 2 cos
     inertia_matrix     9 multiplications, 8 additions, 1 sin, 1 cos
-    bias               28 multiplications, 18 additions, 3 sin, 2 cos
     gravity            14 multiplications, 8 additions, 3 sin, 2 cos
     frame_poses        6 multiplications, 4 additions, 3 sin, 3 cos
     linearised_closure 6 multiplications, 6 additions, 3 sin, 3 cos
@@ -76,6 +67,14 @@ Cost per sample
 Arguments   q, qd, qdd, tau of shape (N, 1), or (1,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (11,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's, float64: joints that only the closure equations tie are found by iteration
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 6e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
+states, parameters and random constants agree with Lagrange's equations and products of frames to
+1e-09, on NumPy's arrays.
+sha256 of all but these lines: df375c80f8720a91a7936607ced16b1caef28fb677cbd371af1cab4306984196
 """
 
 import numpy as np
@@ -127,12 +126,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (11, 1, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((11, 1, N)).view(Store)
-    zeros[5, 0] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((11, 1, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[5, 0] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 1) each; ValueError unless all have shape
     (N, 1), or all (1,).
@@ -145,28 +150,34 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (11,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (11,):
         raise ValueError(f"X of shape {X.shape}; expected (11,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants, closing=None):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    rows = _closed(rows, closing)
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
 
 
 def elements(
@@ -185,14 +196,15 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
-    L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    standard: "Array", *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4,
+    g: float = 9.81
+) -> "Array":
     """X, shape (11,), from the 34 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+    xp = np
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _
@@ -202,202 +214,197 @@ def base_parameters(
     ZZ2R = ZZ2 + L2**2/L3*MX3
     MX2R = MX2 + L2/L3*MX3
     ZZ3R = ZZ3 - L3*MX3
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, L0: float = 0.45,
+    L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
+) -> "Array":
     """D of Gamma = D X. Shape (N, 1, 11).
 
     A view on one store of shape (11, 1, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, L0, L1, L2, L3, g).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, L0: float = 0.45,
+    L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (1*N, 11), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, L0, L1, L2, L3, g).reshape(11, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 11))
+    return filled.reshape(11, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants, closing=None):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 1, 11)."""
+    xp = np
+    states = _closed(_states(q, qd, qdd), closing)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (11, 1, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(11, 1, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, L0, L1, L2, L3, g):
-    """`out`, or a new store, filled."""
-    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, L1, g)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, L0: float = 0.45,
-    L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, L0: float = 0.45, L1: float = 0.2,
+    L2: float = 0.5, L3: float = 0.4, g: float = 9.81
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _closed(_states(q, qd, qdd), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = np.zeros((1, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, L1, g)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (1,), (q, qd, qdd), (X,), (L1, g), closing=((L0, L1,
+        L2, L3), (L1, L2, L3)))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
+    q: "Array", X: "Array", *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
     L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 1, 1).
     """
-    X = _parameters(X)
-    states = _closed(_states(q), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = np.zeros((1, 1, len(states[0])))
-    _fill(_inertia_matrix_block, result, (states[0], states[3]), X, L1)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (1, 1), (q,), (X,), (L1,), closing=((L0, L1, L2, L3),
+        (L1, L2, L3)))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, L0: float = 0.45, L1: float = 0.2,
-    L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", X: "Array", *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
+    L3: float = 0.4, g: float = 9.81
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _closed(_states(q, qd), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = np.zeros((1, len(states[0])))
-    _fill(_bias_block, result, states, X, L1, g)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
+    q: "Array", X: "Array", *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
     L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 1).
     """
-    X = _parameters(X)
-    states = _closed(_states(q), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = np.zeros((1, len(states[0])))
-    _fill(_gravity_block, result, (states[0], states[3]), X, g)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (1,), (q,), (X,), (g,), closing=((L0, L1, L2, L3), (L1, L2,
+        L3)))
 
 
 def frame_poses(
-    q: np.ndarray, *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4,
+    q: "Array", *, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4,
     g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 5, 4, 4).
     """
-    states = _closed(_states(q), ((L0, L1, L2, L3), (L1, L2, L3)))
-    result = np.zeros((5, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 2, 2] = result[1, 3, 3] = result[2, 2, 2] = 1.0
-    result[2, 3, 3] = result[3, 2, 2] = result[3, 3, 3] = result[4, 2, 2] = result[4, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, (states[0],), L0, L1, L2, L3)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (5, 4, 4), (q,), (), (L0, L1, L2, L3), closing=((L0, L1,
+        L2, L3), (L1, L2, L3)))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, L0: float = 0.45,
-    L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
-    inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, L0: float = 0.45, L1: float = 0.2,
+    L2: float = 0.5, L3: float = 0.4, g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
+    xp = np
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    rest = tau - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
+    inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, L0: float = 0.45, L1: float = 0.2,
-    L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", *, frame: int | None = None, L0: float = 0.45, L1: float = 0.2, L2: float = 0.5,
+    L3: float = 0.4, g: float = 9.81
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 1).
     """
     frame = 5 if frame is None else frame
-    poses = frame_poses(q, L0=L0, L1=L1, L2=L2, L3=L3).reshape(-1, 5, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    rates = _closed(_states(q), ((L0, L1, L2, L3), (L1, L2, L3)))[3].reshape(-1, 2, 1)
-    result = result[..., :1] + result[..., 1:] @ rates
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 6):
+        raise ValueError(f"frame {frame!r}; expected 1 to 5")
+    return _evaluated(_jacobian_block, (6, 1), (q,), (), (frame, (L0, L1, L2, L3), ()),
+        closing=((L0, L1, L2, L3), (L1, L2, L3)))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 3), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 3)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, qd, qdd, G, J, frame, posing, moving):
+    """Fill J, shape (6, 1, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(5, 4, 4), 0.0)
+    _frame_poses_block(xp, q, qd, qdd, G, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for k, column in np.ndindex(6, 1):
+        J[k, column] = columns.get((k, column), 0.0)
+        for u in range(2):
+            J[k, column] += columns.get((k, 1 + u), 0.0)*G[1*u + column]
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
-        3: ((3, 0, ((2, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (4, 0, ((2, 1.0), (0, -1.0), (1, -1.0),)),),
-        5: ((3, 0, ((2, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((1, 1.0),)), 3: (0, 0, ((2, 1.0),)),
+        4: (2, 0, ((2, 1.0), (0, -1.0), (1, -1.0))), 5: (3, 2, ()),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
-    L0: float = 0.45, L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
-) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also
-    their accelerations.
+    q: "Array", qd: "Array | None" = None, qdd: "Array | None" = None, *, L0: float = 0.45,
+    L1: float = 0.2, L2: float = 0.5, L3: float = 0.4, g: float = 9.81
+) -> "Array | tuple":
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd
+    also their accelerations.
     """
-    rates = np.zeros((3, 3))
-    rates[0, 1] = 1.0
-    rates[1, 2] = 1.0
-    rates[2, 2] = 1.0
-    rates[2, 0] = -1.0
-    rates[2, 1] = -1.0
-    origin = np.array([
-        0.0,
-        0.0,
-        0.0,
-    ])
-    given = [state is not None for state in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
-    states = _closed(states, ((L0, L1, L2, L3), (L1, L2, L3)))[:3]
+    states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
+    states = _closed(states, ((L0, L1, L2, L3), (L1, L2, L3)))
+    asked = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
     shape = (*np.shape(q)[:-1], 3)
-    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
-    results[0] += origin
+    results = [
+        _filled(_passive_joints_block, np.zeros((3, len(x))), (x,), (float(k ==
+            0),)).T.reshape(shape)
+        for k, x in enumerate(asked)
+    ]
     return results[0] if len(results) == 1 else tuple(results)
+
+
+def _passive_joints_block(xp, x, P, one):
+    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
+    P[0] = 1.0*x[1]
+    P[1] = 1.0*x[2]
+    P[2] = 1.0*x[2] - 1.0*x[0] - 1.0*x[1]
 
 
 def _closed(states, constants):
@@ -437,8 +444,7 @@ def _closure(states, L0, L1, L2, L3):
     Shape (2, 4, N).
     """
     result = np.zeros((2, 4, len(states[0])))
-    _fill(_linearised_closure_block, result, (states[0],), L0, L1, L2, L3)
-    return result
+    return _filled(_linearised_closure_block, result, states, (L0, L1, L2, L3))
 
 
 def _curvature(states, L1, L2, L3):
@@ -447,8 +453,7 @@ def _curvature(states, L1, L2, L3):
     Shape (2, N).
     """
     result = np.zeros((2, len(states[0])))
-    _fill(_curvature_block, result, (states[0], states[1]), L1, L2, L3)
-    return result
+    return _filled(_curvature_block, result, states, (L1, L2, L3))
 
 
 def _assembled(q, constants):
@@ -484,7 +489,7 @@ def _assembled(q, constants):
 def _start(constants):
     """Actuated and tied joints of _START, the loops closed anew at other constants."""
     q, x = np.array(_START[:1]), np.array([_START[1:]])
-    given = np.array([CONSTANTS[name] for name in ('L0', 'L1', 'L2', 'L3')])
+    given = np.array([CONSTANTS[name] for name in ['L0', 'L1', 'L2', 'L3']])
     away = np.array(constants) - given
     for s in np.arange(1, 17) / 16 if away.any() else ():  # along a straight line of the constants
         x, residual = _newton(q[None], x, 20, given + s * away)
@@ -523,20 +528,18 @@ def _solved(J, b):
     return np.stack([J22*b[0] - J12*b[1], J11*b[1] - J21*b[0]]) / _determinant(J)
 
 
-def _regressor_block(q, qd, qdd, G, D, L1, g):
-    """Fill D, shape (11, 1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G
-    (2, N)."""
+def _motion(xp, q, qd, qdd, G, L1, g):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q1, q2, q3 = q
     QP1, QP2 = qd[:2]
-    QDP1, QDP2, QDP3 = qdd
-    G21, G31 = G
+    QDP1, QDP2 = qdd[:2]
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    S3 = np.sin(q3)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    S3 = xp.sin(q3)
     # Link 1
     DV331 = QP1**2
     VP11 = g*S1
@@ -551,6 +554,23 @@ def _regressor_block(q, qd, qdd, G, D, L1, g):
     VP22 = C2*VSP22 - S2*VSP12
     # Link 3
     VP13 = g*S3
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
+    return (
+        C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, G, D, L1, g):
+    """Fill D, shape (11, 1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G
+    (2, N)."""
+    # Inputs
+    QP1 = qd[0]
+    QDP1 = qdd[0]
+    QDP3 = qdd[2]
+    G21, G31 = G
+    # Motion of the links
+    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a = _motion(xp, q, qd, qdd, G, L1, g)
     # Joint axes Z and velocities V seen from link 2
     V121 = L1*S2
     V221 = L1*C2
@@ -559,7 +579,7 @@ def _regressor_block(q, qd, qdd, G, D, L1, g):
     D[1, 0] = VP21                                       # DG1MX1
     D[2, 0] = -VP11                                      # DG1MY1
     D[3, 0] = QP1                                        # DG1FV1
-    D[4, 0] = np.sign(QP1)                               # DG1FS1
+    D[4, 0] = GAM1a                                      # DG1FS1
     D[6, 0] = WP32 + WP32*G21                            # DG1ZZ2
     D[7, 0] = VP22 + WP32*V221 + VP22*G21 - DV332*V121   # DG1MX2
     D[8, 0] = -VP12 - WP32*V121 - DV332*V221 - VP12*G21  # DG1MY2
@@ -567,35 +587,16 @@ def _regressor_block(q, qd, qdd, G, D, L1, g):
     D[10, 0] = -VP13*G31                                 # DG1MY3
 
 
-def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, g):
-    """Fill GAM, shape (1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G (2,
-    N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, G, GAM, X, L1, g):
+    """Fill GAM, shape (1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
-    q1, q2, q3 = q
-    QP1, QP2 = qd[:2]
-    QDP1, QDP2, QDP3 = qdd
+    QP1 = qd[0]
+    QDP1 = qdd[0]
+    QDP3 = qdd[2]
     G21, G31 = G
     ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    S3 = np.sin(q3)
-    # Link 1
-    DV331 = QP1**2
-    VP11 = g*S1
-    VP21 = g*C1
-    # Link 2
-    W32 = QP1 + QP2
-    WP32 = QDP1 + QDP2
-    DV332 = W32**2
-    VSP12 = VP11 - L1*DV331
-    VSP22 = VP21 + L1*QDP1
-    VP12 = C2*VSP12 + S2*VSP22
-    VP22 = C2*VSP22 - S2*VSP12
-    # Link 3
-    VP13 = g*S3
+    # Motion of the links
+    C2, S2, VP11, VP21, WP32, DV332, VP12, VP22, VP13, GAM1a = _motion(xp, q, qd, qdd, G, L1, g)
     # Joint 3
     N33 = ZZ3R*QDP3 - MY3*VP13
     # Joint 2
@@ -607,11 +608,11 @@ def _inverse_dynamics_block(q, qd, qdd, G, GAM, X, L1, g):
     N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1*VP11
     NE31 = N32 + L1*FDI22 + N31
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N33*G31
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a + G21*N32 + G31*N33
 
 
-def _inertia_matrix_block(q, G, A, X, L1):
-    """Fill A, shape (1, 1, N), where it is not constant, from q (3, N); G (2, N)."""
+def _inertia_matrix_block(xp, q, qd, qdd, G, A, X, L1):
+    """Fill A, shape (1, 1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q2 = q[1]
     G21, G31 = G
@@ -621,8 +622,8 @@ def _inertia_matrix_block(q, G, A, X, L1):
     MY2 = X[8]
     ZZ3R = X[9]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     # Composite link 2
     AS12 = MX2R*C2 - MY2*S2
     L1AS12 = L1*AS12
@@ -633,49 +634,8 @@ def _inertia_matrix_block(q, G, A, X, L1):
     A[0, 0] = JP331 + G21*NE312 + G21*(NE312 + ZZ2R*G21) + G31*ZZ3R*G31
 
 
-def _bias_block(q, qd, qdd, G, GAM, X, L1, g):
-    """Fill GAM, shape (1, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N); G (2,
-    N)."""
-    # Inputs
-    q1, q2, q3 = q
-    QP1, QP2 = qd[:2]
-    QDP2, QDP3 = qdd[1:]
-    G21, G31 = G
-    MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3 = X[1:]
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    S3 = np.sin(q3)
-    # Link 1
-    DV331 = QP1**2
-    VP11 = g*S1
-    VP21 = g*C1
-    # Link 2
-    W32 = QP1 + QP2
-    DV332 = W32**2
-    VSP12 = VP11 - L1*DV331
-    VP12 = C2*VSP12 + S2*VP21
-    VP22 = C2*VP21 - S2*VSP12
-    # Link 3
-    VP13 = g*S3
-    # Joint 3
-    N33 = ZZ3R*QDP3 - MY3*VP13
-    # Joint 2
-    F12 = -MX2R*DV332 - MY2*QDP2
-    F22 = MX2R*QDP2 - MY2*DV332
-    N32 = ZZ2R*QDP2 + MX2R*VP22 - MY2*VP12
-    FDI22 = S2*F12 + C2*F22
-    # Joint 1
-    N31 = MX1R*VP21 - MY1*VP11
-    NE31 = N32 + L1*FDI22 + N31
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1) + N32*G21 + N33*G31
-
-
-def _gravity_block(q, G, GAM, X, g):
-    """Fill GAM, shape (1, N), where it is not constant, from q (3, N); G (2, N)."""
+def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
+    """Fill GAM, shape (1, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q1, q2, q3 = q
     G21, G31 = G
@@ -686,11 +646,11 @@ def _gravity_block(q, G, GAM, X, g):
     MY2 = X[8]
     MY3 = X[10]
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    S3 = np.sin(q3)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    S3 = xp.sin(q3)
     # Link 1
     VP11 = g*S1
     VP21 = g*C1
@@ -710,18 +670,18 @@ def _gravity_block(q, G, GAM, X, g):
     GAM[0] = OFFSET1 + NE31 + N32*G21 + N33*G31
 
 
-def _frame_poses_block(q, T, L0, L1, L2, L3):
-    """Fill T, shape (5, 4, 4, N), where it is not constant, from q (3, N)."""
+def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3):
+    """Fill T, shape (5, 4, 4, N), from q (3, N); qd (3, N); qdd (3, N); G (2, N)."""
     # Inputs
     q1, q2, q3 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -759,20 +719,23 @@ def _frame_poses_block(q, T, L0, L1, L2, L3):
     T[4, 1, 0] = S3
     T[4, 1, 1] = C3
     T[4, 1, 3] = P25
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
+    T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = 1.0
 
 
-def _linearised_closure_block(q, R, L0, L1, L2, L3):
-    """Fill R, shape (2, 4, N), where it is not constant, from q (3, N)."""
+def _linearised_closure_block(xp, q, R, L0, L1, L2, L3):
+    """Fill R, shape (2, 4, N), from q (3, N)."""
     # Inputs
     q1, q2, q3 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     # Frame 2
     P12 = L1*C1
     P22 = L1*S1
@@ -796,19 +759,19 @@ def _linearised_closure_block(q, R, L0, L1, L2, L3):
     R[1, 3] = -C3L3
 
 
-def _curvature_block(q, qd, B, L1, L2, L3):
-    """Fill B, shape (2, N), where it is not constant, from q (3, N); qd (3, N)."""
+def _curvature_block(xp, q, qd, B, L1, L2, L3):
+    """Fill B, shape (2, N), from q (3, N); qd (3, N)."""
     # Inputs
     q1, q2, q3 = q
     QP1, QP2, QP3 = qd
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
     th12 = q1 + q2
-    C12 = np.cos(th12)
-    S12 = np.sin(th12)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C12 = xp.cos(th12)
+    S12 = xp.sin(th12)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     # Link 2
     W32 = QP1 + QP2
     # Second derivatives at constant rates

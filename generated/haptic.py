@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-# states, parameters and random constants agree with Lagrange's equations and products of frames
-# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
-# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
-# VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: c02b8ccf277b6597693ad3b71afb4826a9812a50e9c0729b51492a9e5236129f
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
     parallelogram: base parameters, regressor, dynamics.
 
@@ -80,13 +72,24 @@ Cost per sample
     regressor          97 multiplications, 58 additions, 5 sin, 5 cos
     inverse_dynamics   141 multiplications, 117 additions, 5 sin, 5 cos
     inertia_matrix     46 multiplications, 33 additions, 4 sin, 4 cos
-    bias               131 multiplications, 96 additions, 5 sin, 5 cos
     gravity            42 multiplications, 33 additions, 5 sin, 5 cos
     frame_poses        21 multiplications, 6 additions, 3 sin, 3 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 3), or (3,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (30,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX, PyTorch, ...;
+            pip install array-api-compat), all float64 or all float32, with any axes before the
+            last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
+CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints,
+inverse_dynamics_derivatives at random states, parameters and random constants agree with
+Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+packages, by CasADi.
+sha256 of all but these lines: 1e5237b78b9e15dd121d60341bbd7a40418d3ec8792ced2fc2c6ab669f4af026
 """
 
 import numpy as np
@@ -156,12 +159,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (30, 3, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((30, 3, N)).view(Store)
-    zeros[5, 0] = zeros[15, 1] = zeros[28, 2] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((30, 3, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[5, 0] = D[15, 1] = D[28, 2] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 3) each; ValueError unless all have shape
     (N, 3), or all (3,).
@@ -174,28 +183,211 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (30,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (30,):
         raise ValueError(f"X of shape {X.shape}; expected (30,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    xp = _package(*states, *X)
+    if xp is not np:
+        return _gathered(xp, {}, block, shape, states, X, constants)
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
+
+
+def _gathered(xp, table, block, shape, states, X, constants):
+    """The result of `block` on a package whose arrays cannot be written to: it fills a `table`."""
+    block(xp, *map(xp.rows, states), table, *map(xp.parameters, X), *constants)
+    return xp.gathered(table, shape, states[0])
+
+
+_IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of another package
+
+
+def _package(*arrays):
+    """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
+    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
+        return np
+    if any(type(x).__module__.startswith("casadi") for x in arrays):
+        return _Symbols()
+    others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
+    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+        return np if _IN_PLACE else _Arrays(np, arrays)
+    try:
+        from array_api_compat import array_namespace
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"arrays of {type(others[0]).__module__} need array_api_compat: "
+            "pip install array-api-compat"
+        ) from error
+    return _Arrays(array_namespace(*arrays), arrays)
+
+
+class _Arrays:
+    """Functions of an array package under NumPy's names, those of plain numbers by NumPy; TypeError
+    unless all `arrays` are float64, or all float32.
+    """
+
+    pi = np.pi
+
+    def __init__(self, package, arrays):
+        self.package, kinds = package, [x.dtype for x in arrays if hasattr(x, "dtype")]
+        if not any(all(x == kind for x in kinds) for kind in (package.float64, package.float32)):
+            kinds = ", ".join(sorted({*map(str, kinds)}))
+            raise TypeError(f"arrays of {kinds}; expected all float64, or all float32")
+
+    def __getattr__(self, name):
+        function = getattr(self.package, "pow" if name == "power" else name)
+
+        def of(x, *more, **how):
+            if isinstance(x, int | float):
+                return float(getattr(np, name)(x, *more))
+            return function(x, *more, **how)
+
+        return of
+
+    def sign(self, x):
+        """NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+        where = self.package.where
+        return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0*x))
+
+    def maximum(self, x, zero):
+        return self.package.where(x < zero, zero*x, x)
+
+    def minimum(self, x, zero):
+        return self.package.where(x > zero, zero*x, x)
+
+    def rows(self, x):
+        """x[..., k], one by one."""
+        if x.shape[-1:] != (3,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 3)")
+        return [x[..., k] for k in range(3)]
+
+    def parameters(self, X):
+        _parameters(X)
+        return [X[k] for k in range(30)]
+
+    def gathered(self, table, shape, like):
+        """Entries by index as an array, samples first; zero where there is none."""
+        zero = self.package.zeros_like(like[..., 0])
+        entries = [table.get(k[0] if len(k) == 1 else k, 0.0) for k in np.ndindex(*shape)]
+        entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
+        return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
+
+    def solve(self, A, b):
+        return self.package.linalg.solve(A, b[..., None])[..., 0]
+
+
+class _Symbols:
+    """Functions of CasADi under NumPy's names, on columns."""
+
+    def __init__(self):
+        import casadi as ca
+
+        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
+        self.parameters = ca.vertsplit
+
+    def __getattr__(self, name):
+        return getattr(self.package, name)
+
+    def stack(self, entries):
+        return self.package.vertcat(*entries)
+
+    def zeros_like(self, x):
+        return self.package.SX(*x.shape)
+
+    def matrix_transpose(self, x):
+        return x.T
+
+    def gathered(self, table, shape, like):
+        """Entries by index as a matrix, or as matrices; those that are zero stay structural."""
+        if len(shape) == 3:
+            first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
+            return [self.gathered(entries, shape[1:], like) for entries in first]
+        matrix = self.package.SX(*(*shape, 1)[:2])
+        for place, x in table.items():
+            matrix[place] = x
+        return matrix
+
+    def solve(self, A, b):
+        """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+        n = len(JOINTS)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        for j in range(n):
+            for k in range(j):
+                d[j] -= L[j, k]**2*d[k]
+                x[j] -= L[j, k]*x[k]
+            for i in range(j + 1, n):
+                L[i, j] = (A[i, j] - sum(L[i, k]*L[j, k]*d[k] for k in range(j)))/d[j]
+        x = [x[j]/d[j] for j in range(n)]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                x[j] -= L[i, j]*x[i]
+        return self.stack(x)
+
+
+def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
+    """casadi.Function of a function of this module, or, as NAME_derivatives, of the Jacobians of
+    its results by each column that it reads, d<result>_d<column>; `frame` is that of a jacobian.
+
+    Inputs are columns q, qd, qdd, tau (3,), X (30,), standard (78,), then the constants. By name,
+    a constant that is not given has its value in CONSTANTS, another input is nan. Samples stand
+    side by side, q (3, N); the results then do so too. The derivative of sign(qd) is zero.
+    """
+    import casadi as ca
+
+    of = name.removesuffix("_derivatives")
+    if of not in _OUTPUTS:
+        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+    columns, names = [text.split() for text in _OUTPUTS[of]]
+    sizes = {"X": 30, "standard": 78}
+    columns = {x: ca.SX.sym(x, sizes.get(x, 3)) for x in columns}
+    inputs = columns | {x: ca.SX.sym(x) for x in CONSTANTS}
+    given = {} if frame is None else {"frame": frame}
+    value = globals()[of](**inputs, **given)
+    results = dict(zip(names, value if isinstance(value, list | tuple) else [value]))
+    if of != name:
+        results = {
+            f"d{y}_d{x}": ca.jacobian(results[y], columns[x]) for y in names for x in columns
+        }
+    default = {"default_in": [*[np.nan]*len(columns), *CONSTANTS.values()]}
+    return ca.Function(
+        name, [*inputs.values()], [*results.values()], [*inputs], [*results], default
+    )
+
+
+_OUTPUTS = {  # columns, results
+    'base_parameters': ('standard', 'X'),
+    'regressor': ('q qd qdd', 'D'),
+    'inverse_dynamics': ('q qd qdd X', 'GAM'),
+    'inertia_matrix': ('q X', 'A'),
+    'bias': ('q qd X', 'GAM'),
+    'gravity': ('q X', 'GAM'),
+    'forward_dynamics': ('q qd tau X', 'qdd'),
+    'frame_poses': ('q', 'T1 T2 T3 T4 T5 T6 T7 T8'),
+    'jacobian': ('q', 'J'),
+    'passive_joints': ('q qd qdd', 'q_passive qd_passive qdd_passive'),
+}
 
 
 def elements(
@@ -222,14 +414,18 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    standard: "Array", *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
     gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+) -> "Array":
     """X, shape (30,), from the 78 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+        xp = _package(*standard)
+    else:
+        xp = _package(standard)
+        standard = standard if xp is np else [standard[k] for k in range(78)]
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2,
         ZZ2, MX2, MY2, MZ2, _, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3,
@@ -237,8 +433,8 @@ def base_parameters(
         ZZ5, MX5, MY5, MZ5, _, Ia5, FV5, FS5, OFFSET5, XX6, XY6, XZ6, YY6, YZ6, ZZ6, MX6, MY6,
         MZ6, M6, FVP2, FVP5, FSP2, FSP5
     ) = standard
-    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + np.sin(c)**2*XX4 +
-        2*np.cos(c)*np.sin(c)*XY4 + np.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6)
+    ZZ1R = (ZZ1 + Ia1 + YY2 + YY3 + YY5 + YY6 + D3**2*M3 + xp.sin(c)**2*XX4 +
+        2*xp.cos(c)*xp.sin(c)*XY4 + xp.cos(c)**2*YY4 + (D3**2 + D4**2)*M4 + D6**2*M6)
     MY1R = MY1 + MZ2 + MZ3 + MZ4 + MZ5 + MZ6
     XX2R = XX2 - YY2 + XX6 - YY6 - D3**2*(M3 + M4)
     XY2R = XY2 + XY6
@@ -254,239 +450,227 @@ def base_parameters(
     YZ3R = YZ3 - YZ5
     ZZ3R = ZZ3 + ZZ5 + Ia5 + D4**2*M4 + D6**2*M6
     MX3R = MX3 + D4*M4 - D6/D3*MX6
-    MX4R = MX4 - np.sin(c)/np.cos(c)*MY4
+    MX4R = MX4 - xp.sin(c)/xp.cos(c)*MY4
     MX5R = MX5 - D6/D3*MX6 + D6*M6
     FV5R = FV5 + FV4 + FVP5
     FS5R = FS5 + FS4 + FSP5
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
         OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5, MY6,
     ])
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
-    gy: float = 0.0
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D3: float = 0.2,
+    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
     """D of Gamma = D X. Shape (N, 3, 30).
 
     A view on one store of shape (30, 3, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (D3, D4, D6, c, gx, gy))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
-    gy: float = 0.0
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D3: float = 0.2,
+    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
     """W of Y = W X + rho, shape (3*N, 30), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy).reshape(30, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (D3, D4, D6, c, gx, gy))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 30))
+    return filled.reshape(30, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 3, 30)."""
+    states = (q, qd, qdd)
+    xp = _package(*states)
+    if xp is not np:
+        if out is not None:
+            raise ValueError("out: a store holds NumPy's arrays alone")
+        constants = constants
+        D = _gathered(xp, _constant({}), _regressor_block, (30, 3), states, (), constants)
+        return xp, xp.matrix_transpose(D)
+    states = _states(*states)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (30, 3, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(30, 3, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, D3, D4, D6, c, gx, gy):
-    """`out`, or a new store, filled."""
-    states = _states(q, qd, qdd)
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, D3, D4, D6, c, gx, gy)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D3: float = 0.2,
-    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 3).
     """
-    X = _parameters(X)
-    states = _states(q, qd, qdd)
-    result = np.zeros((3, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, D3, D4, D6, c, gx, gy)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (3,), (q, qd, qdd), (X,), (D3, D4, D6, c, gx, gy))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    q: "Array", X: "Array", *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
     c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 3, 3).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((3, 3, len(states[0])))
-    _fill(_inertia_matrix_block, result, states, X, D3, D4, D6, c)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (3, 3), (q,), (X,), (D3, D4, D6, c))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+    q: "Array", qd: "Array", X: "Array", *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 3).
     """
-    X = _parameters(X)
-    states = _states(q, qd)
-    result = np.zeros((3, len(states[0])))
-    _fill(_bias_block, result, states, X, D3, D4, D6, c, gx, gy)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, D3=D3, D4=D4, D6=D6, c=c, gx=gx,
+        gy=gy)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    q: "Array", X: "Array", *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
     c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 3).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((3, len(states[0])))
-    _fill(_gravity_block, result, states, X, c, gx, gy)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (3,), (q,), (X,), (c, gx, gy))
 
 
 def frame_poses(
-    q: np.ndarray, *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
+    q: "Array", *, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0,
     gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 8, 4, 4).
     """
-    states = _states(q)
-    result = np.zeros((8, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
-    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = result[7, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, states, D3, D4, D6, c)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (8, 4, 4), (q,), (), (D3, D4, D6, c))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D3: float = 0.2,
-    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 3)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
-    inertia = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, D3: float = 0.2, D4: float = 0.22,
+    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 3)."""
+    xp = _package(q, qd, tau, X)
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    elif tau.shape != q.shape:
+        raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
+    rest = tau - bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+    inertia = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D3: float = 0.2, D4: float = 0.22,
-    D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
-) -> np.ndarray:
+    q: "Array", *, frame: int | None = None, D3: float = 0.2, D4: float = 0.22, D6: float = 0.1,
+    c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 3).
     """
     frame = 8 if frame is None else frame
-    poses = frame_poses(q, D3=D3, D4=D4, D6=D6, c=c).reshape(-1, 8, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 9):
+        raise ValueError(f"frame {frame!r}; expected 1 to 8")
+    return _evaluated(_jacobian_block, (6, 3), (q,), (), (frame, (D3, D4, D6, c), ()))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 3), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 3)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, J, frame, posing, moving):
+    """Fill J, shape (6, 3, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(8, 4, 4), 0.0)
+    _frame_poses_block(xp, q, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for place, value in columns.items():
+        J[place] = value
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
-        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)), (4, 0, ((2,
-            -1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)),),
-        7: ((1, 0, ((0, 1.0),)), (5, 0, ((2, 1.0),)), (6, 0, ((1, 1.0), (2, -1.0),)), (7, 0, ((1,
-            -1.0), (2, 1.0),)),),
-        8: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (2, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((1, 1.0),)), 3: (2, 0, ((1, -1.0), (2, 1.0))),
+        4: (3, 0, ((2, -1.0),)), 5: (1, 0, ((2, 1.0),)), 6: (5, 0, ((1, 1.0), (2, -1.0))),
+        7: (6, 0, ((1, -1.0), (2, 1.0))), 8: (3, 2, ()),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
-    D3: float = 0.2, D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81,
-    gy: float = 0.0
-) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd also
-    their accelerations.
+    q: "Array", qd: "Array | None" = None, qdd: "Array | None" = None, *, D3: float = 0.2,
+    D4: float = 0.22, D6: float = 0.1, c: float = 0.0, gx: float = -9.81, gy: float = 0.0
+) -> "Array | tuple":
+    """Positions of the joints PASSIVE, shape (N, 4); with qd also their velocities, with qdd
+    also their accelerations.
     """
-    rates = np.zeros((4, 3))
-    rates[0, 1] = -1.0
-    rates[0, 2] = 1.0
-    rates[1, 2] = -1.0
-    rates[2, 1] = 1.0
-    rates[2, 2] = -1.0
-    rates[3, 1] = -1.0
-    rates[3, 2] = 1.0
-    origin = np.array([
-        np.pi,
-        c,
-        0.0,
-        np.pi,
-    ])
-    given = [state is not None for state in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
-    shape = (*np.shape(q)[:-1], 4)
-    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
-    results[0] += origin
+    given = [state for state in (q, qd, qdd) if state is not None]
+    results = [
+        _evaluated(_passive_joints_block, (4,), (x,), (), (float(k == 0), c))
+        for k, x in enumerate(given)
+    ]
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
-    """Fill D, shape (30, 3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
+def _passive_joints_block(xp, x, P, one, c):
+    """Fill P, shape (4, N), of positions x; of rates where `one` is 0."""
+    P[0] = (xp.pi)*one - 1.0*x[1] + 1.0*x[2]
+    P[1] = (c)*one - 1.0*x[2]
+    P[2] = 1.0*x[1] - 1.0*x[2]
+    P[3] = (xp.pi)*one - 1.0*x[1] + 1.0*x[2]
+
+
+def _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q1, q2, q5 = q
     QP1, QP2, QP5 = qd
     QDP1, QDP2, QDP5 = qdd
     # Constants
-    Z241 = np.cos(c)
-    Z141 = np.sin(c)
+    Z241 = xp.cos(c)
+    Z141 = xp.sin(c)
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m5 = q2 - q5
-    C2m5 = np.cos(th2m5)
-    S2m5 = np.sin(th2m5)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
+    C2m5 = xp.cos(th2m5)
+    S2m5 = xp.sin(th2m5)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
     th5b = q5 - c
-    C5b = np.cos(th5b)
-    S5b = np.sin(th5b)
+    C5b = xp.cos(th5b)
+    S5b = xp.sin(th5b)
     # Link 1
     VP11 = -gx*C1 - gy*S1
     VP21 = gx*S1 - gy*C1
@@ -556,6 +740,31 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     VSP26 = VP25 + D6*U213
     VSP36 = VP21 - D6*U313
     VP16 = C2m5*VSP16 + S2m5*VSP26
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
+    GAM2a = xp.sign(QP2)
+    GAM3a = xp.sign(QP5)
+    return (
+        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, Z241, VP11, VP21, S2QDP1, C2QDP1, DV232, WP12,
+        DV132, DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1,
+        C5QDP1, DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313,
+        U323, VSP33, VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a,
+        GAM2a, GAM3a
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, D, D3, D4, D6, c, gx, gy):
+    """Fill D, shape (30, 3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
+    # Inputs
+    QP1, QP2, QP5 = qd
+    QDP1, QDP2, QDP5 = qdd
+    # Motion of the links
+    (
+        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, Z241, VP11, VP21, S2QDP1, C2QDP1, _, WP12, DV132,
+        DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1, C5QDP1, _,
+        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
+        VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a, GAM2a, GAM3a
+    ) = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
     # Joint axes Z and velocities V seen from link 3
     V331 = D3*C2
     V132 = D3*S2m5
@@ -578,7 +787,7 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     D[1, 0] = VP21                      # DG1MX1
     D[2, 0] = -VP11                     # DG1MY1
     D[3, 0] = QP1                       # DG1FV1
-    D[4, 0] = np.sign(QP1)              # DG1FS1
+    D[4, 0] = GAM1a                     # DG1FS1
     D[6, 0] = -S2*WP12 - C2*DV132       # DG1XX2
     D[7, 0] = S2*U312 - C2*U322         # DG1XY2
     D[8, 0] = -S2*U212 - C2*DW312       # DG1XZ2
@@ -604,7 +813,7 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     D[11, 1] = VP22                              # DG2MX2
     D[12, 1] = -VP12                             # DG2MY2
     D[13, 1] = QP2                               # DG2FV2
-    D[14, 1] = np.sign(QP2)                      # DG2FS2
+    D[14, 1] = GAM2a                             # DG2FS2
     D[21, 1] = U113*V132 + U213*V232             # DG2MX3
     D[22, 1] = U123*V132 + U223*V232             # DG2MY3
     D[23, 1] = DV124*V242 - DV224*V142 - DF3MX4  # DG2MX4
@@ -621,14 +830,13 @@ def _regressor_block(q, qd, qdd, D, D3, D4, D6, c, gx, gy):
     D[24, 2] = VP25                   # DG5MX5
     D[25, 2] = -VP15                  # DG5MY5
     D[26, 2] = QP5                    # DG5FV5
-    D[27, 2] = np.sign(QP5)           # DG5FS5
+    D[27, 2] = GAM3a                  # DG5FS5
     D[29, 2] = U122*V165 + U222*V265  # DG5MY6
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N), where it is not constant, from q (3, N); qd (3, N); qdd (3, N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
+    """Fill GAM, shape (3, N), from q (3, N); qd (3, N); qdd (3, N)."""
     # Inputs
-    q1, q2, q5 = q
     QP1, QP2, QP5 = qd
     QDP1, QDP2, QDP5 = qdd
     (
@@ -636,94 +844,18 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
         OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
         MY6
     ) = X
-    # Constants
-    Z241 = np.cos(c)
-    Z141 = np.sin(c)
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    th2m5 = q2 - q5
-    C2m5 = np.cos(th2m5)
-    S2m5 = np.sin(th2m5)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    th5b = q5 - c
-    C5b = np.cos(th5b)
-    S5b = np.sin(th5b)
-    # Link 1
-    VP11 = -gx*C1 - gy*S1
-    VP21 = gx*S1 - gy*C1
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    S2QDP1 = S2*QDP1
-    C2QDP1 = C2*QDP1
-    DV232 = QP2*W22
-    WP12 = DV232 - S2QDP1
-    DV132 = QP2*W12
-    WP22 = -C2QDP1 - DV132
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U122 = DV122 - QDP2
-    U212 = QDP2 + DV122
-    U222 = -DV112 - DV332
-    U312 = DV132 - WP22
-    U322 = DV232 + WP12
-    VP12 = C2*VP11
-    VP22 = -S2*VP11
-    # Link 3
-    W13 = S5*QP1
-    W23 = C5*QP1
-    S5QDP1 = S5*QDP1
-    C5QDP1 = C5*QDP1
-    DV233 = QP5*W23
-    WP13 = S5QDP1 + DV233
-    DV133 = QP5*W13
-    WP23 = C5QDP1 - DV133
-    DV113 = W13**2
-    DV123 = W13*W23
-    DV223 = W23**2
-    DV333 = QP5**2
-    DW233 = DV223 - DV333
-    DW313 = DV333 - DV113
-    DW123 = DV113 - DV223
-    U113 = -DV223 - DV333
-    U123 = DV123 - QDP5
-    U213 = QDP5 + DV123
-    U223 = -DV113 - DV333
-    U313 = DV133 - WP23
-    U323 = DV233 + WP13
-    VSP13 = VP12 + D3*U112
-    VSP23 = VP22 + D3*U212
-    VSP33 = VP21 + D3*U312
-    VP13 = S2m5*VSP23 - C2m5*VSP13
-    VP23 = -C2m5*VSP23 - S2m5*VSP13
+    # Motion of the links
+    (
+        C2, S2, C2m5, S2m5, C5, S5, C5b, S5b, _, VP11, VP21, S2QDP1, C2QDP1, DV232, WP12, DV132,
+        DV122, DW232, DW312, DW122, U122, U212, U222, U312, U322, VP12, VP22, S5QDP1, C5QDP1,
+        DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323,
+        VSP33, VP13, VP23, WP24, DV124, DV224, VSP34, VP15, VP25, VSP36, VP16, GAM1a, GAM2a,
+        GAM3a
+    ) = _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy)
     # Link 4
-    W14 = Z141*QP1
-    W24 = Z241*QP1
-    WP24 = Z241*QDP1
-    DV124 = W14*W24
-    DV224 = W24**2
     VSP14 = VP13 + D4*U113
     VSP24 = VP23 + D4*U213
-    VSP34 = VSP33 + D4*U313
     VP24 = C5b*VSP24 + S5b*VSP14
-    # Link 5
-    VP15 = C5*VP11
-    VP25 = -S5*VP11
-    # Link 6
-    VSP16 = VP15 + D6*U113
-    VSP26 = VP25 + D6*U213
-    VSP36 = VP21 - D6*U313
-    VP16 = C2m5*VSP16 + S2m5*VSP26
     # Joint 6
     F16 = MY6*U122
     F26 = MY6*U222
@@ -771,13 +903,13 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, D4, D6, c, gx, gy):
     N31 = ZZ1R*QDP1 + MX1*VP21 - MY1R*VP11
     NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*np.sign(QP2) + N36 - NE33
-    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
+    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*GAM2a + N36 - NE33
+    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*GAM3a - N34 - N36
 
 
-def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
-    """Fill A, shape (3, 3, N), where it is not constant, from q (3, N)."""
+def _inertia_matrix_block(xp, q, A, X, D3, D4, D6, c):
+    """Fill A, shape (3, 3, N), from q (3, N)."""
     # Inputs
     q2, q5 = q[1:]
     ZZ1R = X[0]
@@ -796,16 +928,16 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     MX4R = X[23]
     MY6 = X[29]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m5 = q2 - q5
-    C2m5 = np.cos(th2m5)
-    S2m5 = np.sin(th2m5)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
+    C2m5 = xp.cos(th2m5)
+    S2m5 = xp.sin(th2m5)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
     th5b = q5 - c
-    C5b = np.cos(th5b)
-    S5b = np.sin(th5b)
+    C5b = xp.cos(th5b)
+    S5b = xp.sin(th5b)
     # Composite link 7
     C2m5C2m5 = C2m5**2
     C2m5S2m5 = C2m5*S2m5
@@ -852,143 +984,8 @@ def _inertia_matrix_block(q, A, X, D3, D4, D6, c):
     A[2, 2] = ZZ3R
 
 
-def _bias_block(q, qd, GAM, X, D3, D4, D6, c, gx, gy):
-    """Fill GAM, shape (3, N), where it is not constant, from q (3, N); qd (3, N)."""
-    # Inputs
-    q1, q2, q5 = q
-    QP1, QP2, QP5 = qd
-    (
-        MX1, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2R, FS2R,
-        OFFSET2, XX3R, XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3, MX4R, MX5R, MY5, FV5R, FS5R, OFFSET5,
-        MY6
-    ) = X[1:]
-    # Constants
-    Z241 = np.cos(c)
-    Z141 = np.sin(c)
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    th2m5 = q2 - q5
-    C2m5 = np.cos(th2m5)
-    S2m5 = np.sin(th2m5)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    th5b = q5 - c
-    C5b = np.cos(th5b)
-    S5b = np.sin(th5b)
-    # Link 1
-    VP11 = -gx*C1 - gy*S1
-    VP21 = gx*S1 - gy*C1
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    DV232 = QP2*W22
-    DV132 = QP2*W12
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U222 = -DV112 - DV332
-    U312 = 2*DV132
-    U322 = 2*DV232
-    VP12 = C2*VP11
-    VP22 = -S2*VP11
-    # Link 3
-    W13 = S5*QP1
-    W23 = C5*QP1
-    DV233 = QP5*W23
-    DV133 = QP5*W13
-    DV113 = W13**2
-    DV123 = W13*W23
-    DV223 = W23**2
-    DV333 = QP5**2
-    DW233 = DV223 - DV333
-    DW313 = DV333 - DV113
-    DW123 = DV113 - DV223
-    U113 = -DV223 - DV333
-    U223 = -DV113 - DV333
-    U313 = 2*DV133
-    U323 = 2*DV233
-    VSP13 = VP12 + D3*U112
-    VSP23 = VP22 + D3*DV122
-    VSP33 = VP21 + D3*U312
-    VP13 = S2m5*VSP23 - C2m5*VSP13
-    VP23 = -C2m5*VSP23 - S2m5*VSP13
-    # Link 4
-    W14 = Z141*QP1
-    W24 = Z241*QP1
-    DV124 = W14*W24
-    DV224 = W24**2
-    VSP14 = VP13 + D4*U113
-    VSP24 = VP23 + D4*DV123
-    VSP34 = VSP33 + D4*U313
-    VP24 = C5b*VSP24 + S5b*VSP14
-    # Link 5
-    VP15 = C5*VP11
-    VP25 = -S5*VP11
-    # Link 6
-    VSP16 = VP15 + D6*U113
-    VSP26 = VP25 + D6*DV123
-    VSP36 = VP21 - D6*U313
-    VP16 = C2m5*VSP16 + S2m5*VSP26
-    # Joint 6
-    F16 = MY6*DV122
-    F26 = MY6*U222
-    F36 = MY6*U322
-    N16 = MY6*VSP36
-    N36 = -MY6*VP16
-    FDI26 = S2m5*F16 + C2m5*F26
-    # Joint 5
-    N15 = MY5*VP21
-    N25 = -MX5R*VP21
-    N35 = MX5R*VP25 - MY5*VP15
-    NE15 = C2m5*N16 + N15
-    NE25 = S2m5*N16 + N25 - D6*F36
-    NE35 = N36 + D6*FDI26 + N35
-    # Joint 4
-    F14 = -MX4R*DV224
-    F24 = MX4R*DV124
-    N24 = -MX4R*VSP34
-    N34 = MX4R*VP24
-    FDI14 = C5b*F14 + S5b*F24
-    FDI24 = C5b*F24 - S5b*F14
-    # Joint 3
-    F13 = MX3R*U113 + MY3*DV123
-    F23 = MX3R*DV123 + MY3*U223
-    F33 = MX3R*U313 + MY3*U323
-    E13 = FDI14 + F13
-    E23 = FDI24 + F23
-    N13 = XX3R*DV233 + ZZ3R*DV233 + YZ3R*DW233 + XZ3R*DV123 + MY3*VSP33 - XY3R*U313
-    N23 = (XX3R - ZZ3R)*DV133 + XZ3R*DW313 + XY3R*U323 - YZ3R*DV123 - MX3R*VSP33
-    N33 = XY3R*DW123 + MX3R*VP23 - XX3R*DV123 - MY3*VP13
-    NE13 = S5b*N24 + N13
-    NE23 = C5b*N24 + N23
-    NE33 = N34 + D4*FDI24 + N33
-    FDI23 = S2m5*E13 - C2m5*E23
-    # Joint 2
-    N12 = XX2R*DV232 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*DV122 + MY2*VP21 - XY2R*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*DV122 - MX2R*VP21
-    N32 = XY2R*DW122 + MX2R*VP22 - XX2R*DV122 - MY2*VP12
-    NE12 = N12 - C2m5*NE13 - S2m5*NE23
-    NE22 = S2m5*NE13 + N22 - C2m5*NE23 - D3*F33
-    NE32 = NE33 + D3*FDI23 + N32
-    # Joint 1
-    N31 = MX1*VP21 - MY1R*VP11
-    NE31 = N31 - S5*NE15 - C5*NE25 - S2*NE12 - C2*NE22
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2R*QP2 + FS2R*np.sign(QP2) + N36 - NE33
-    GAM[2] = NE33 + OFFSET5 + NE35 + FV5R*QP5 + FS5R*np.sign(QP5) - N34 - N36
-
-
-def _gravity_block(q, GAM, X, c, gx, gy):
-    """Fill GAM, shape (3, N), where it is not constant, from q (3, N)."""
+def _gravity_block(xp, q, GAM, X, c, gx, gy):
+    """Fill GAM, shape (3, N), from q (3, N)."""
     # Inputs
     q1, q2, q5 = q
     MX1 = X[1]
@@ -1005,18 +1002,18 @@ def _gravity_block(q, GAM, X, c, gx, gy):
     OFFSET5 = X[28]
     MY6 = X[29]
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m5 = q2 - q5
-    C2m5 = np.cos(th2m5)
-    S2m5 = np.sin(th2m5)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
+    C2m5 = xp.cos(th2m5)
+    S2m5 = xp.sin(th2m5)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
     th5b = q5 - c
-    C5b = np.cos(th5b)
-    S5b = np.sin(th5b)
+    C5b = xp.cos(th5b)
+    S5b = xp.sin(th5b)
     # Link 1
     VP11 = -gx*C1 - gy*S1
     VP21 = gx*S1 - gy*C1
@@ -1064,20 +1061,20 @@ def _gravity_block(q, GAM, X, c, gx, gy):
     GAM[2] = N33 + OFFSET5 + NE35 - N36
 
 
-def _frame_poses_block(q, T, D3, D4, D6, c):
-    """Fill T, shape (8, 4, 4, N), where it is not constant, from q (3, N)."""
+def _frame_poses_block(xp, q, T, D3, D4, D6, c):
+    """Fill T, shape (8, 4, 4, N), from q (3, N)."""
     # Inputs
     q1, q2, q5 = q
     # Constants
-    Z241 = np.cos(c)
-    Z141 = np.sin(c)
+    Z241 = xp.cos(c)
+    Z141 = xp.sin(c)
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
     # Frame 2
     R112 = C1*C2
     R122 = -C1*S2
@@ -1183,6 +1180,9 @@ def _frame_poses_block(q, T, D3, D4, D6, c):
     T[7, 2, 0] = S5
     T[7, 2, 1] = C5
     T[7, 2, 3] = P37
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
+    T[6, 3, 3] = T[7, 3, 3] = 1.0
 
 
 # Of the robot file: drives, limits and values, which no function above reads

@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-# states, parameters and random constants agree with Lagrange's equations and products of frames
-# to 1e-09; SCHEMA, NAME, SOURCE_SHA256, JOINTS, PASSIVE, CONSTANTS, BASE_PARAMETERS,
-# STANDARD_PARAMETERS, NO_EFFECT, FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS,
-# VALUES, HEADER, DEFAULTS with the robot file.
-# sha256 of what follows: cef057cfe50980928e8bfb2bc94eec00eab7025a81c6d299c019bcd261907e68
 """SR400, 6 actuated joints, one parallelogram: base parameters, regressor, dynamics.
 
 GENERATED from sr400.yaml, sha256 52f8fa1fb7bc, by symgen 0.2.0.
@@ -79,13 +71,24 @@ Cost per sample
     regressor          392 multiplications, 284 additions, 6 sin, 6 cos
     inverse_dynamics   300 multiplications, 276 additions, 6 sin, 6 cos
     inertia_matrix     164 multiplications, 129 additions, 6 sin, 6 cos
-    bias               283 multiplications, 243 additions, 6 sin, 6 cos
     gravity            45 multiplications, 36 additions, 5 sin, 5 cos
     frame_poses        56 multiplications, 29 additions, 6 sin, 6 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (60,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX, PyTorch, ...;
+            pip install array-api-compat), all float64 or all float32, with any axes before the
+            last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
+CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 1e-14; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints,
+inverse_dynamics_derivatives at random states, parameters and random constants agree with
+Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+packages, by CasADi.
+sha256 of all but these lines: 06dab13b01765698b6e9ddf7402b13021c1132c90a16c2c594e41c110a0e079a
 """
 
 import numpy as np
@@ -167,12 +170,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (60, 6, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((60, 6, N)).view(Store)
-    zeros[3, 0] = zeros[13, 1] = zeros[31, 2] = zeros[42, 3] = zeros[53, 4] = zeros[58, 5] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((60, 6, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[3, 0] = D[13, 1] = D[31, 2] = D[42, 3] = D[53, 4] = D[58, 5] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape
     (N, 6), or all (6,).
@@ -185,28 +194,211 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (60,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (60,):
         raise ValueError(f"X of shape {X.shape}; expected (60,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    xp = _package(*states, *X)
+    if xp is not np:
+        return _gathered(xp, {}, block, shape, states, X, constants)
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
+
+
+def _gathered(xp, table, block, shape, states, X, constants):
+    """The result of `block` on a package whose arrays cannot be written to: it fills a `table`."""
+    block(xp, *map(xp.rows, states), table, *map(xp.parameters, X), *constants)
+    return xp.gathered(table, shape, states[0])
+
+
+_IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of another package
+
+
+def _package(*arrays):
+    """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
+    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
+        return np
+    if any(type(x).__module__.startswith("casadi") for x in arrays):
+        return _Symbols()
+    others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
+    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+        return np if _IN_PLACE else _Arrays(np, arrays)
+    try:
+        from array_api_compat import array_namespace
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"arrays of {type(others[0]).__module__} need array_api_compat: "
+            "pip install array-api-compat"
+        ) from error
+    return _Arrays(array_namespace(*arrays), arrays)
+
+
+class _Arrays:
+    """Functions of an array package under NumPy's names, those of plain numbers by NumPy; TypeError
+    unless all `arrays` are float64, or all float32.
+    """
+
+    pi = np.pi
+
+    def __init__(self, package, arrays):
+        self.package, kinds = package, [x.dtype for x in arrays if hasattr(x, "dtype")]
+        if not any(all(x == kind for x in kinds) for kind in (package.float64, package.float32)):
+            kinds = ", ".join(sorted({*map(str, kinds)}))
+            raise TypeError(f"arrays of {kinds}; expected all float64, or all float32")
+
+    def __getattr__(self, name):
+        function = getattr(self.package, "pow" if name == "power" else name)
+
+        def of(x, *more, **how):
+            if isinstance(x, int | float):
+                return float(getattr(np, name)(x, *more))
+            return function(x, *more, **how)
+
+        return of
+
+    def sign(self, x):
+        """NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+        where = self.package.where
+        return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0*x))
+
+    def maximum(self, x, zero):
+        return self.package.where(x < zero, zero*x, x)
+
+    def minimum(self, x, zero):
+        return self.package.where(x > zero, zero*x, x)
+
+    def rows(self, x):
+        """x[..., k], one by one."""
+        if x.shape[-1:] != (6,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 6)")
+        return [x[..., k] for k in range(6)]
+
+    def parameters(self, X):
+        _parameters(X)
+        return [X[k] for k in range(60)]
+
+    def gathered(self, table, shape, like):
+        """Entries by index as an array, samples first; zero where there is none."""
+        zero = self.package.zeros_like(like[..., 0])
+        entries = [table.get(k[0] if len(k) == 1 else k, 0.0) for k in np.ndindex(*shape)]
+        entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
+        return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
+
+    def solve(self, A, b):
+        return self.package.linalg.solve(A, b[..., None])[..., 0]
+
+
+class _Symbols:
+    """Functions of CasADi under NumPy's names, on columns."""
+
+    def __init__(self):
+        import casadi as ca
+
+        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
+        self.parameters = ca.vertsplit
+
+    def __getattr__(self, name):
+        return getattr(self.package, name)
+
+    def stack(self, entries):
+        return self.package.vertcat(*entries)
+
+    def zeros_like(self, x):
+        return self.package.SX(*x.shape)
+
+    def matrix_transpose(self, x):
+        return x.T
+
+    def gathered(self, table, shape, like):
+        """Entries by index as a matrix, or as matrices; those that are zero stay structural."""
+        if len(shape) == 3:
+            first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
+            return [self.gathered(entries, shape[1:], like) for entries in first]
+        matrix = self.package.SX(*(*shape, 1)[:2])
+        for place, x in table.items():
+            matrix[place] = x
+        return matrix
+
+    def solve(self, A, b):
+        """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+        n = len(JOINTS)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        for j in range(n):
+            for k in range(j):
+                d[j] -= L[j, k]**2*d[k]
+                x[j] -= L[j, k]*x[k]
+            for i in range(j + 1, n):
+                L[i, j] = (A[i, j] - sum(L[i, k]*L[j, k]*d[k] for k in range(j)))/d[j]
+        x = [x[j]/d[j] for j in range(n)]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                x[j] -= L[i, j]*x[i]
+        return self.stack(x)
+
+
+def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
+    """casadi.Function of a function of this module, or, as NAME_derivatives, of the Jacobians of
+    its results by each column that it reads, d<result>_d<column>; `frame` is that of a jacobian.
+
+    Inputs are columns q, qd, qdd, tau (6,), X (60,), standard (104,), then the constants. By name,
+    a constant that is not given has its value in CONSTANTS, another input is nan. Samples stand
+    side by side, q (6, N); the results then do so too. The derivative of sign(qd) is zero.
+    """
+    import casadi as ca
+
+    of = name.removesuffix("_derivatives")
+    if of not in _OUTPUTS:
+        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+    columns, names = [text.split() for text in _OUTPUTS[of]]
+    sizes = {"X": 60, "standard": 104}
+    columns = {x: ca.SX.sym(x, sizes.get(x, 6)) for x in columns}
+    inputs = columns | {x: ca.SX.sym(x) for x in CONSTANTS}
+    given = {} if frame is None else {"frame": frame}
+    value = globals()[of](**inputs, **given)
+    results = dict(zip(names, value if isinstance(value, list | tuple) else [value]))
+    if of != name:
+        results = {
+            f"d{y}_d{x}": ca.jacobian(results[y], columns[x]) for y in names for x in columns
+        }
+    default = {"default_in": [*[np.nan]*len(columns), *CONSTANTS.values()]}
+    return ca.Function(
+        name, [*inputs.values()], [*results.values()], [*inputs], [*results], default
+    )
+
+
+_OUTPUTS = {  # columns, results
+    'base_parameters': ('standard', 'X'),
+    'regressor': ('q qd qdd', 'D'),
+    'inverse_dynamics': ('q qd qdd X', 'GAM'),
+    'inertia_matrix': ('q X', 'A'),
+    'bias': ('q qd X', 'GAM'),
+    'gravity': ('q X', 'GAM'),
+    'forward_dynamics': ('q qd tau X', 'qdd'),
+    'frame_poses': ('q', 'T1 T2 T3 T4 T5 T6 T7 T8 T9 T10'),
+    'jacobian': ('q', 'J'),
+    'passive_joints': ('q qd qdd', 'q_passive qd_passive qdd_passive'),
+}
 
 
 def elements(
@@ -236,14 +428,18 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
-    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+    standard: "Array", *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    D8: float = 0.3, g: float = 9.81
+) -> "Array":
     """X, shape (60,), from the 104 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+        xp = _package(*standard)
+    else:
+        xp = _package(standard)
+        standard = standard if xp is np else [standard[k] for k in range(104)]
     (
         _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
         MX2, MY2, _, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3,
@@ -275,7 +471,7 @@ def base_parameters(
     MY5R = MY5 + MZ6
     XX6R = XX6 - YY6
     MX7R = MX7 - D8/D3*MX8 + D8*M8
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R,
         XY3R, XZ3R, YZ3R, ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, FV4, FS4,
         OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R, XY6, XZ6, YZ6,
@@ -284,229 +480,214 @@ def base_parameters(
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D2: float = 0.25,
+    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array":
     """D of Gamma = D X. Shape (N, 6, 60).
 
     A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (D2, D3, D4, RL4, D8, g))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
-    g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D2: float = 0.25,
+    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g).reshape(60, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (D2, D3, D4, RL4, D8, g))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 60))
+    return filled.reshape(60, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 6, 60)."""
+    states = (q, qd, qdd)
+    xp = _package(*states)
+    if xp is not np:
+        if out is not None:
+            raise ValueError("out: a store holds NumPy's arrays alone")
+        constants = constants
+        D = _gathered(xp, _constant({}), _regressor_block, (60, 6), states, (), constants)
+        return xp, xp.matrix_transpose(D)
+    states = _states(*states)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, D2, D3, D4, RL4, D8, g):
-    """`out`, or a new store, filled."""
-    states = _states(q, qd, qdd)
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, D2, D3, D4, RL4, D8, g)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.25,
-    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q, qd, qdd)
-    result = np.zeros((6, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, D2, D3, D4, RL4, D8, g)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (6,), (q, qd, qdd), (X,), (D2, D3, D4, RL4, D8, g))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    q: "Array", X: "Array", *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
     RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 6, 6).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((6, 6, len(states[0])))
-    _fill(_inertia_matrix_block, result, states, X, D2, D3, D4, RL4, D8)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (6, 6), (q,), (X,), (D2, D3, D4, RL4, D8))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6,
-    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", X: "Array", *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q, qd)
-    result = np.zeros((6, len(states[0])))
-    _fill(_bias_block, result, states, X, D2, D3, D4, RL4, D8, g)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, D2=D2, D3=D3, D4=D4, RL4=RL4,
+        D8=D8, g=g)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
+    q: "Array", X: "Array", *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15,
     RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((6, len(states[0])))
-    _fill(_gravity_block, result, states, X, g)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (6,), (q,), (X,), (g,))
 
 
 def frame_poses(
-    q: np.ndarray, *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
+    q: "Array", *, D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7,
     D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 10, 4, 4).
     """
-    states = _states(q)
-    result = np.zeros((10, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
-    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = result[7, 3, 3] = result[8, 3, 3] = 1.0
-    result[9, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, states, D2, D3, D4, RL4, D8)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (10, 4, 4), (q,), (), (D2, D3, D4, RL4, D8))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.25,
-    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
-    inertia = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, D2: float = 0.25, D3: float = 0.6,
+    D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
+    xp = _package(q, qd, tau, X)
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    elif tau.shape != q.shape:
+        raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
+    rest = tau - bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+    inertia = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D2: float = 0.25, D3: float = 0.6,
+    q: "Array", *, frame: int | None = None, D2: float = 0.25, D3: float = 0.6,
     D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 6).
     """
     frame = 10 if frame is None else frame
-    poses = frame_poses(q, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8).reshape(-1, 10, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 11):
+        raise ValueError(f"frame {frame!r}; expected 1 to 10")
+    return _evaluated(_jacobian_block, (6, 6), (q,), (), (frame, (D2, D3, D4, RL4, D8), ()))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 6), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 6)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, J, frame, posing, moving):
+    """Fill J, shape (6, 6, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(10, 4, 4), 0.0)
+    _frame_poses_block(xp, q, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for place, value in columns.items():
+        J[place] = value
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
-        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
-            1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
-            1.0),)), (5, 0, ((3, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)), (4, 0, ((2,
-            1.0),)), (5, 0, ((3, 1.0),)), (6, 0, ((4, 1.0),)),),
-        7: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)),),
-        8: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)),),
-        9: ((1, 0, ((0, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((1, 1.0), (5, -1.0),)), (9, 0, ((1,
-            -1.0), (5, 1.0),)),),
-        10: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((1, -1.0), (5, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((1, 1.0),)), 3: (2, 0, ((1, -1.0), (5, 1.0))),
+        4: (3, 0, ((2, 1.0),)), 5: (4, 0, ((3, 1.0),)), 6: (5, 0, ((4, 1.0),)),
+        7: (1, 0, ((5, 1.0),)), 8: (7, 0, ((1, 1.0), (5, -1.0))), 9: (8, 0, ((1, -1.0), (5, 1.0))),
+        10: (3, 2, ()),
     }
 
 
 def passive_joints(
-    q: np.ndarray, qd: np.ndarray | None = None, qdd: np.ndarray | None = None, *,
-    D2: float = 0.25, D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3,
-    g: float = 9.81
-) -> np.ndarray | tuple:
-    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd also
-    their accelerations.
+    q: "Array", qd: "Array | None" = None, qdd: "Array | None" = None, *, D2: float = 0.25,
+    D3: float = 0.6, D4: float = 0.15, RL4: float = 0.7, D8: float = 0.3, g: float = 9.81
+) -> "Array | tuple":
+    """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd
+    also their accelerations.
     """
-    rates = np.zeros((3, 6))
-    rates[0, 1] = -1.0
-    rates[0, 5] = 1.0
-    rates[1, 1] = 1.0
-    rates[1, 5] = -1.0
-    rates[2, 1] = -1.0
-    rates[2, 5] = 1.0
-    origin = np.array([
-        np.pi/2,
-        0.0,
-        np.pi,
-    ])
-    given = [state is not None for state in (q, qd, qdd)]
-    states = _states(*[np.zeros_like(q) if state is None else state for state in (q, qd, qdd)])
-    shape = (*np.shape(q)[:-1], 3)
-    results = [(x @ rates.T).reshape(shape) for x, asked in zip(states, given) if asked]
-    results[0] += origin
+    given = [state for state in (q, qd, qdd) if state is not None]
+    results = [
+        _evaluated(_passive_joints_block, (3,), (x,), (), (float(k == 0),))
+        for k, x in enumerate(given)
+    ]
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
-    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+def _passive_joints_block(xp, x, P, one):
+    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
+    P[0] = (xp.pi/2)*one - 1.0*x[1] + 1.0*x[5]
+    P[1] = 1.0*x[1] - 1.0*x[5]
+    P[2] = (xp.pi)*one - 1.0*x[1] + 1.0*x[5]
+
+
+def _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m7 = q2 - q7
-    C2m7 = np.cos(th2m7)
-    S2m7 = np.sin(th2m7)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C2m7 = xp.cos(th2m7)
+    S2m7 = xp.sin(th2m7)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Link 1
     DV3_3_1 = QP1**2
     # Link 2
@@ -651,6 +832,46 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     VSP2_8 = VP2_7 - D8*U1_2_3
     VSP3_8 = VSP2_2 - D8*U3_2_3
     VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
+    GAM2a = xp.sign(QP2)
+    GAM3a = xp.sign(QP4)
+    GAM4a = xp.sign(QP5)
+    GAM5a = xp.sign(QP6)
+    GAM6a = xp.sign(QP7)
+    return (
+        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV2_3_2, WP1_2,
+        DV1_3_2, DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2,
+        VSP2_2, VP1_2, VP2_2, C7QDP1, S7QDP1, DV2_3_3, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3,
+        DW3_1_3, DW1_2_3, U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3,
+        WP1_4, WP3_4, DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4,
+        U1_3_4, U2_1_4, U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5,
+        DV1_2_5, DV1_3_5, DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5,
+        U2_2_5, U2_3_5, U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6,
+        DW2_3_6, DW3_1_6, DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6,
+        U3_2_6, VP1_6, VP2_6, VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a,
+        GAM6a
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
+    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+    # Inputs
+    QP1, QP2, QP4, QP5, QP6, QP7 = qd
+    QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
+    # Motion of the links
+    (
+        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, _, WP1_2, DV1_3_2,
+        DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2, VSP2_2,
+        VP1_2, VP2_2, C7QDP1, S7QDP1, _, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3, DW3_1_3, DW1_2_3,
+        U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3, WP1_4, WP3_4,
+        DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4, U1_3_4, U2_1_4,
+        U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5, DV1_2_5, DV1_3_5,
+        DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5, U2_2_5, U2_3_5,
+        U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6, DW2_3_6, DW3_1_6,
+        DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6, U3_2_6, VP1_6, VP2_6,
+        VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a
+    ) = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
     # Joint axes Z and velocities V seen from link 3
     V3_3_1 = D2 + D3*C2
     V1_3_2 = D3*C2m7
@@ -714,7 +935,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     # Joint 1
     D[0, 0] = QDP1                                                    # DG1ZZ1
     D[1, 0] = QP1                                                     # DG1FV1
-    D[2, 0] = np.sign(QP1)                                            # DG1FS1
+    D[2, 0] = GAM1a                                                   # DG1FS1
     D[4, 0] = -S2*WP1_2 - C2*DV1_3_2                                  # DG1XX2
     D[5, 0] = S2*U3_1_2 - C2*U3_2_2                                   # DG1XY2
     D[6, 0] = -S2*U2_1_2 - C2*DW3_1_2                                 # DG1XZ2
@@ -760,7 +981,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[9, 1] = VP2_2                                                   # DG2MX2
     D[10, 1] = -VP1_2                                                 # DG2MY2
     D[11, 1] = QP2                                                    # DG2FV2
-    D[12, 1] = np.sign(QP2)                                           # DG2FS2
+    D[12, 1] = GAM2a                                                  # DG2FS2
     D[19, 1] = U1_1_3*V1_3_2 + U2_1_3*V2_3_2                          # DG2MX3
     D[20, 1] = U1_2_3*V1_3_2 + U2_2_3*V2_3_2                          # DG2MY3
     D[26, 1] = U1_1_4*V1_4_2 + U2_1_4*V2_4_2 + U3_1_4*V3_4_2 - DF3MX4  # DG2MX4
@@ -780,7 +1001,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[27, 2] = -VP1_4                                      # DG4MY4
     D[28, 2] = QDP4                                        # DG4Ia4
     D[29, 2] = QP4                                         # DG4FV4
-    D[30, 2] = np.sign(QP4)                                # DG4FS4
+    D[30, 2] = GAM3a                                       # DG4FS4
     D[32, 2] = S5*WP1_5 + C5DV1_3_5                        # DG4XX5
     D[33, 2] = C5*U3_2_5 - S5*U3_1_5                       # DG4XY5
     D[34, 2] = S5*U2_1_5 + C5*DW3_1_5                      # DG4XZ5
@@ -805,7 +1026,7 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[38, 3] = -VP1_5                   # DG5MY5
     D[39, 3] = QDP5                     # DG5Ia5
     D[40, 3] = QP5                      # DG5FV5
-    D[41, 3] = np.sign(QP5)             # DG5FS5
+    D[41, 3] = GAM4a                    # DG5FS5
     D[43, 3] = -S6*WP1_6 - C6DV1_3_6    # DG5XX6
     D[44, 3] = S6*U3_1_6 - C6*U3_2_6    # DG5XY6
     D[45, 3] = -S6*U2_1_6 - C6*DW3_1_6  # DG5XZ6
@@ -814,16 +1035,16 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[48, 3] = C6*VP2_5                 # DG5MX6
     D[49, 3] = -S6*VP2_5                # DG5MY6
     # Joint 6
-    D[43, 4] = -DV1_2_6      # DG6XX6
-    D[44, 4] = DW1_2_6       # DG6XY6
-    D[45, 4] = -U2_3_6       # DG6XZ6
-    D[46, 4] = U1_3_6        # DG6YZ6
-    D[47, 4] = WP3_6         # DG6ZZ6
-    D[48, 4] = VP2_6         # DG6MX6
-    D[49, 4] = -VP1_6        # DG6MY6
-    D[50, 4] = QDP6          # DG6Ia6
-    D[51, 4] = QP6           # DG6FV6
-    D[52, 4] = np.sign(QP6)  # DG6FS6
+    D[43, 4] = -DV1_2_6  # DG6XX6
+    D[44, 4] = DW1_2_6   # DG6XY6
+    D[45, 4] = -U2_3_6   # DG6XZ6
+    D[46, 4] = U1_3_6    # DG6YZ6
+    D[47, 4] = WP3_6     # DG6ZZ6
+    D[48, 4] = VP2_6     # DG6MX6
+    D[49, 4] = -VP1_6    # DG6MY6
+    D[50, 4] = QDP6      # DG6Ia6
+    D[51, 4] = QP6       # DG6FV6
+    D[52, 4] = GAM5a     # DG6FS6
     # Joint 7
     D[14, 5] = -DV1_2_3                                        # DG7XX3
     D[15, 5] = DW1_2_3                                         # DG7XY3
@@ -856,14 +1077,13 @@ def _regressor_block(q, qd, qdd, D, D2, D3, D4, RL4, D8, g):
     D[54, 5] = VP2_7                                           # DG7MX7
     D[55, 5] = -VP1_7                                          # DG7MY7
     D[56, 5] = QP7                                             # DG7FV7
-    D[57, 5] = np.sign(QP7)                                    # DG7FS7
+    D[57, 5] = GAM6a                                           # DG7FS7
     D[59, 5] = U1_2_2*V1_8_7 + U2_2_2*V2_8_7                   # DG7MY8
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
+    """Fill GAM, shape (6, N), from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2, q4, q5, q6, q7 = q[1:]
     QP1, QP2, QP4, QP5, QP6, QP7 = qd
     QDP1, QDP2, QDP4, QDP5, QDP6, QDP7 = qdd
     (
@@ -872,164 +1092,20 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
         FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5, XX6R,
         XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, MX7R, MY7, FV7, FS7, OFFSET7, MY8
     ) = X
-    # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    th2m7 = q2 - q7
-    C2m7 = np.cos(th2m7)
-    S2m7 = np.sin(th2m7)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    # Link 1
-    DV3_3_1 = QP1**2
-    # Link 2
-    W1_2 = -S2*QP1
-    W2_2 = -C2*QP1
-    S2QDP1 = S2*QDP1
-    C2QDP1 = C2*QDP1
-    DV2_3_2 = QP2*W2_2
-    WP1_2 = DV2_3_2 - S2QDP1
-    DV1_3_2 = QP2*W1_2
-    WP2_2 = -C2QDP1 - DV1_3_2
-    DV1_1_2 = W1_2**2
-    DV1_2_2 = W1_2*W2_2
-    DV2_2_2 = W2_2**2
-    DV3_3_2 = QP2**2
-    DW2_3_2 = DV2_2_2 - DV3_3_2
-    DW3_1_2 = DV3_3_2 - DV1_1_2
-    DW1_2_2 = DV1_1_2 - DV2_2_2
-    U1_1_2 = -DV2_2_2 - DV3_3_2
-    U1_2_2 = DV1_2_2 - QDP2
-    U2_1_2 = QDP2 + DV1_2_2
-    U2_2_2 = -DV1_1_2 - DV3_3_2
-    U3_1_2 = DV1_3_2 - WP2_2
-    U3_2_2 = DV2_3_2 + WP1_2
-    VSP1_2 = -D2*DV3_3_1
-    VSP2_2 = D2*QDP1
-    VP1_2 = C2*VSP1_2 - g*S2
-    VP2_2 = -g*C2 - S2*VSP1_2
-    # Link 3
-    W1_3 = -C7*QP1
-    W2_3 = S7*QP1
-    C7QDP1 = C7*QDP1
-    S7QDP1 = S7*QDP1
-    DV2_3_3 = QP7*W2_3
-    WP1_3 = DV2_3_3 - C7QDP1
-    DV1_3_3 = QP7*W1_3
-    WP2_3 = S7QDP1 - DV1_3_3
-    DV1_1_3 = W1_3**2
-    DV1_2_3 = W1_3*W2_3
-    DV2_2_3 = W2_3**2
-    DV3_3_3 = QP7**2
-    DW2_3_3 = DV2_2_3 - DV3_3_3
-    DW3_1_3 = DV3_3_3 - DV1_1_3
-    DW1_2_3 = DV1_1_3 - DV2_2_3
-    U1_1_3 = -DV2_2_3 - DV3_3_3
-    U1_2_3 = DV1_2_3 - QDP7
-    U2_1_3 = QDP7 + DV1_2_3
-    U2_2_3 = -DV1_1_3 - DV3_3_3
-    U3_1_3 = DV1_3_3 - WP2_3
-    U3_2_3 = DV2_3_3 + WP1_3
-    VSP1_3 = VP1_2 + D3*U1_1_2
-    VSP2_3 = VP2_2 + D3*U2_1_2
-    VSP3_3 = VSP2_2 + D3*U3_1_2
-    VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
-    VP2_3 = S2m7*VSP2_3 - C2m7*VSP1_3
-    # Link 4
-    W1_4 = C4*W1_3 - S4*QP7
-    W2_4 = -C4*QP7 - S4*W1_3
-    W3_4 = QP4 + W2_3
-    WP1_4 = C4*WP1_3 + QP4*W2_4 - S4*QDP7
-    WP2_4 = -C4*QDP7 - S4*WP1_3 - QP4*W1_4
-    WP3_4 = QDP4 + WP2_3
-    DV1_1_4 = W1_4**2
-    DV1_2_4 = W1_4*W2_4
-    DV1_3_4 = W1_4*W3_4
-    DV2_2_4 = W2_4**2
-    DV2_3_4 = W2_4*W3_4
-    DV3_3_4 = W3_4**2
-    DW2_3_4 = DV2_2_4 - DV3_3_4
-    DW3_1_4 = DV3_3_4 - DV1_1_4
-    DW1_2_4 = DV1_1_4 - DV2_2_4
-    U1_1_4 = -DV2_2_4 - DV3_3_4
-    U1_2_4 = DV1_2_4 - WP3_4
-    U1_3_4 = WP2_4 + DV1_3_4
-    U2_1_4 = WP3_4 + DV1_2_4
-    U2_2_4 = -DV1_1_4 - DV3_3_4
-    U2_3_4 = DV2_3_4 - WP1_4
-    U3_1_4 = DV1_3_4 - WP2_4
-    U3_2_4 = WP1_4 + DV2_3_4
-    VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*U1_2_3
-    VSP2_4 = VP2_3 + D4*U2_1_3 + RL4*U2_2_3
-    VSP3_4 = VSP3_3 + D4*U3_1_3 + RL4*U3_2_3
-    VP1_4 = C4*VSP1_4 - S4*VSP3_4
-    VP2_4 = -C4*VSP3_4 - S4*VSP1_4
-    # Link 5
-    W1_5 = C5*W1_4 + S5*W3_4
-    W2_5 = C5*W3_4 - S5*W1_4
-    W3_5 = QP5 - W2_4
-    WP1_5 = C5*WP1_4 + S5*WP3_4 + QP5*W2_5
-    WP2_5 = C5*WP3_4 - S5*WP1_4 - QP5*W1_5
-    WP3_5 = QDP5 - WP2_4
-    DV1_1_5 = W1_5**2
-    DV1_2_5 = W1_5*W2_5
-    DV1_3_5 = W1_5*W3_5
-    DV2_2_5 = W2_5**2
-    DV2_3_5 = W2_5*W3_5
-    DV3_3_5 = W3_5**2
-    DW2_3_5 = DV2_2_5 - DV3_3_5
-    DW3_1_5 = DV3_3_5 - DV1_1_5
-    DW1_2_5 = DV1_1_5 - DV2_2_5
-    U1_1_5 = -DV2_2_5 - DV3_3_5
-    U1_2_5 = DV1_2_5 - WP3_5
-    U1_3_5 = WP2_5 + DV1_3_5
-    U2_1_5 = WP3_5 + DV1_2_5
-    U2_2_5 = -DV1_1_5 - DV3_3_5
-    U2_3_5 = DV2_3_5 - WP1_5
-    U3_1_5 = DV1_3_5 - WP2_5
-    U3_2_5 = WP1_5 + DV2_3_5
-    VP1_5 = C5*VP1_4 + S5*VSP2_4
-    VP2_5 = C5*VSP2_4 - S5*VP1_4
-    # Link 6
-    W1_6 = C6*W1_5 - S6*W3_5
-    W2_6 = -C6*W3_5 - S6*W1_5
-    W3_6 = QP6 + W2_5
-    WP1_6 = C6*WP1_5 + QP6*W2_6 - S6*WP3_5
-    WP2_6 = -C6*WP3_5 - S6*WP1_5 - QP6*W1_6
-    WP3_6 = QDP6 + WP2_5
-    DV1_1_6 = W1_6**2
-    DV1_2_6 = W1_6*W2_6
-    DV1_3_6 = W1_6*W3_6
-    DV2_2_6 = W2_6**2
-    DV2_3_6 = W2_6*W3_6
-    DV3_3_6 = W3_6**2
-    DW2_3_6 = DV2_2_6 - DV3_3_6
-    DW3_1_6 = DV3_3_6 - DV1_1_6
-    DW1_2_6 = DV1_1_6 - DV2_2_6
-    U1_1_6 = -DV2_2_6 - DV3_3_6
-    U1_2_6 = DV1_2_6 - WP3_6
-    U1_3_6 = WP2_6 + DV1_3_6
-    U2_1_6 = WP3_6 + DV1_2_6
-    U2_2_6 = -DV1_1_6 - DV3_3_6
-    U2_3_6 = DV2_3_6 - WP1_6
-    U3_1_6 = DV1_3_6 - WP2_6
-    U3_2_6 = WP1_6 + DV2_3_6
-    VP1_6 = C6*VP1_5 + S6*VP2_4
-    VP2_6 = C6*VP2_4 - S6*VP1_5
-    # Link 7
-    VP1_7 = C7*VSP1_2 - g*S7
-    VP2_7 = -g*C7 - S7*VSP1_2
-    # Link 8
-    VSP1_8 = VP1_7 + D8*U2_2_3
-    VSP2_8 = VP2_7 - D8*U1_2_3
-    VSP3_8 = VSP2_2 - D8*U3_2_3
-    VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
+    # Motion of the links
+    (
+        C2, S2, C2m7, S2m7, C7, S7, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV2_3_2, WP1_2,
+        DV1_3_2, DV1_2_2, DW2_3_2, DW3_1_2, DW1_2_2, U1_2_2, U2_1_2, U2_2_2, U3_1_2, U3_2_2,
+        VSP2_2, VP1_2, VP2_2, C7QDP1, S7QDP1, DV2_3_3, WP1_3, DV1_3_3, DV1_2_3, DW2_3_3,
+        DW3_1_3, DW1_2_3, U1_1_3, U1_2_3, U2_1_3, U2_2_3, U3_1_3, U3_2_3, VSP3_3, VP1_3, VP2_3,
+        WP1_4, WP3_4, DV1_2_4, DV1_3_4, DV2_3_4, DW2_3_4, DW3_1_4, DW1_2_4, U1_1_4, U1_2_4,
+        U1_3_4, U2_1_4, U2_2_4, U2_3_4, U3_1_4, U3_2_4, VSP2_4, VP1_4, VP2_4, WP1_5, WP3_5,
+        DV1_2_5, DV1_3_5, DV2_3_5, DW2_3_5, DW3_1_5, DW1_2_5, U1_1_5, U1_2_5, U1_3_5, U2_1_5,
+        U2_2_5, U2_3_5, U3_1_5, U3_2_5, VP1_5, VP2_5, WP1_6, WP3_6, DV1_2_6, DV1_3_6, DV2_3_6,
+        DW2_3_6, DW3_1_6, DW1_2_6, U1_1_6, U1_2_6, U1_3_6, U2_1_6, U2_2_6, U2_3_6, U3_1_6,
+        U3_2_6, VP1_6, VP2_6, VP1_7, VP2_7, VSP3_8, VP1_8, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a,
+        GAM6a
+    ) = _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g)
     # Joint 8
     F1_8 = MY8*U1_2_2
     F2_8 = MY8*U2_2_2
@@ -1116,16 +1192,16 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, D3, D4, RL4, D8, g):
     N3_1 = ZZ1R*QDP1
     NE3_1 = D2*E3_7 + D2*E3_2 + N3_1 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
     # Torques
-    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*np.sign(QP2) + N3_8 - NE3_3
-    GAM[2] = OFFSET4 + NE3_4 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[3] = OFFSET5 + NE3_5 + Ia5*QDP5 + FV5*QP5 + FS5*np.sign(QP5)
-    GAM[4] = OFFSET6 + N3_6 + Ia6*QDP6 + FV6*QP6 + FS6*np.sign(QP6)
-    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
+    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*GAM1a
+    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*GAM2a + N3_8 - NE3_3
+    GAM[2] = OFFSET4 + NE3_4 + Ia4*QDP4 + FV4*QP4 + FS4*GAM3a
+    GAM[3] = OFFSET5 + NE3_5 + Ia5*QDP5 + FV5*QP5 + FS5*GAM4a
+    GAM[4] = OFFSET6 + N3_6 + Ia6*QDP6 + FV6*QP6 + FS6*GAM5a
+    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*GAM6a - N3_8
 
 
-def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
-    """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
+def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
+    """Fill A, shape (6, 6, N), from q (6, N)."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
     ZZ1R = X[0]
@@ -1171,19 +1247,19 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     MY7 = X[55]
     MY8 = X[59]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m7 = q2 - q7
-    C2m7 = np.cos(th2m7)
-    S2m7 = np.sin(th2m7)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C2m7 = xp.cos(th2m7)
+    S2m7 = xp.sin(th2m7)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Composite link 9
     C2m7S2m7 = C2m7*S2m7
     # Composite link 8
@@ -1324,298 +1400,8 @@ def _inertia_matrix_block(q, A, X, D2, D3, D4, RL4, D8):
     A[5, 5] = JP3_3_3
 
 
-def _bias_block(q, qd, GAM, X, D2, D3, D4, RL4, D8, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
-    # Inputs
-    q2, q4, q5, q6, q7 = q[1:]
-    QP1, QP2, QP4, QP5, QP6, QP7 = qd
-    FV1 = X[1]
-    FS1 = X[2]
-    OFFSET1 = X[3]
-    XX2R = X[4]
-    XY2R = X[5]
-    XZ2R = X[6]
-    YZ2R = X[7]
-    ZZ2R = X[8]
-    MX2R = X[9]
-    MY2 = X[10]
-    FV2 = X[11]
-    FS2 = X[12]
-    OFFSET2 = X[13]
-    XX3R = X[14]
-    XY3R = X[15]
-    XZ3R = X[16]
-    YZ3R = X[17]
-    ZZ3R = X[18]
-    MX3R = X[19]
-    MY3R = X[20]
-    XX4R = X[21]
-    XY4 = X[22]
-    XZ4 = X[23]
-    YZ4 = X[24]
-    ZZ4R = X[25]
-    MX4 = X[26]
-    MY4R = X[27]
-    FV4 = X[29]
-    FS4 = X[30]
-    OFFSET4 = X[31]
-    XX5R = X[32]
-    XY5 = X[33]
-    XZ5 = X[34]
-    YZ5 = X[35]
-    ZZ5R = X[36]
-    MX5 = X[37]
-    MY5R = X[38]
-    FV5 = X[40]
-    FS5 = X[41]
-    OFFSET5 = X[42]
-    XX6R = X[43]
-    XY6 = X[44]
-    XZ6 = X[45]
-    YZ6 = X[46]
-    ZZ6 = X[47]
-    MX6 = X[48]
-    MY6 = X[49]
-    FV6 = X[51]
-    FS6 = X[52]
-    OFFSET6 = X[53]
-    MX7R = X[54]
-    MY7 = X[55]
-    FV7 = X[56]
-    FS7 = X[57]
-    OFFSET7 = X[58]
-    MY8 = X[59]
-    # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    th2m7 = q2 - q7
-    C2m7 = np.cos(th2m7)
-    S2m7 = np.sin(th2m7)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    # Link 1
-    DV3_3_1 = QP1**2
-    # Link 2
-    W1_2 = -S2*QP1
-    W2_2 = -C2*QP1
-    DV2_3_2 = QP2*W2_2
-    DV1_3_2 = QP2*W1_2
-    DV1_1_2 = W1_2**2
-    DV1_2_2 = W1_2*W2_2
-    DV2_2_2 = W2_2**2
-    DV3_3_2 = QP2**2
-    DW2_3_2 = DV2_2_2 - DV3_3_2
-    DW3_1_2 = DV3_3_2 - DV1_1_2
-    DW1_2_2 = DV1_1_2 - DV2_2_2
-    U1_1_2 = -DV2_2_2 - DV3_3_2
-    U2_2_2 = -DV1_1_2 - DV3_3_2
-    U3_1_2 = 2*DV1_3_2
-    U3_2_2 = 2*DV2_3_2
-    VSP1_2 = -D2*DV3_3_1
-    VP1_2 = C2*VSP1_2 - g*S2
-    VP2_2 = -g*C2 - S2*VSP1_2
-    # Link 3
-    W1_3 = -C7*QP1
-    W2_3 = S7*QP1
-    DV2_3_3 = QP7*W2_3
-    DV1_3_3 = QP7*W1_3
-    DV1_1_3 = W1_3**2
-    DV1_2_3 = W1_3*W2_3
-    DV2_2_3 = W2_3**2
-    DV3_3_3 = QP7**2
-    DW2_3_3 = DV2_2_3 - DV3_3_3
-    DW3_1_3 = DV3_3_3 - DV1_1_3
-    DW1_2_3 = DV1_1_3 - DV2_2_3
-    U1_1_3 = -DV2_2_3 - DV3_3_3
-    U2_2_3 = -DV1_1_3 - DV3_3_3
-    U3_1_3 = 2*DV1_3_3
-    U3_2_3 = 2*DV2_3_3
-    D3U3_1_2 = D3*U3_1_2
-    VSP1_3 = VP1_2 + D3*U1_1_2
-    VSP2_3 = VP2_2 + D3*DV1_2_2
-    VP1_3 = S2m7*VSP1_3 + C2m7*VSP2_3
-    VP2_3 = S2m7*VSP2_3 - C2m7*VSP1_3
-    # Link 4
-    W1_4 = C4*W1_3 - S4*QP7
-    W2_4 = -C4*QP7 - S4*W1_3
-    W3_4 = QP4 + W2_3
-    WP1_4 = C4*DV2_3_3 + QP4*W2_4
-    WP2_4 = -S4*DV2_3_3 - QP4*W1_4
-    DV1_1_4 = W1_4**2
-    DV1_2_4 = W1_4*W2_4
-    DV1_3_4 = W1_4*W3_4
-    DV2_2_4 = W2_4**2
-    DV2_3_4 = W2_4*W3_4
-    DV3_3_4 = W3_4**2
-    DW2_3_4 = DV2_2_4 - DV3_3_4
-    DW3_1_4 = DV3_3_4 - DV1_1_4
-    DW1_2_4 = DV1_1_4 - DV2_2_4
-    U1_1_4 = -DV2_2_4 - DV3_3_4
-    U1_2_4 = DV1_3_3 + DV1_2_4
-    U1_3_4 = WP2_4 + DV1_3_4
-    U2_1_4 = DV1_2_4 - DV1_3_3
-    U2_2_4 = -DV1_1_4 - DV3_3_4
-    U2_3_4 = DV2_3_4 - WP1_4
-    U3_1_4 = DV1_3_4 - WP2_4
-    U3_2_4 = WP1_4 + DV2_3_4
-    VSP1_4 = VP1_3 + D4*U1_1_3 + RL4*DV1_2_3
-    VSP2_4 = VP2_3 + D4*DV1_2_3 + RL4*U2_2_3
-    VSP3_4 = D3U3_1_2 + D4*U3_1_3 + RL4*U3_2_3
-    VP1_4 = C4*VSP1_4 - S4*VSP3_4
-    VP2_4 = -C4*VSP3_4 - S4*VSP1_4
-    # Link 5
-    W1_5 = C5*W1_4 + S5*W3_4
-    W2_5 = C5*W3_4 - S5*W1_4
-    W3_5 = QP5 - W2_4
-    WP1_5 = C5*WP1_4 + QP5*W2_5 - S5*DV1_3_3
-    WP2_5 = -C5*DV1_3_3 - S5*WP1_4 - QP5*W1_5
-    DV1_1_5 = W1_5**2
-    DV1_2_5 = W1_5*W2_5
-    DV1_3_5 = W1_5*W3_5
-    DV2_2_5 = W2_5**2
-    DV2_3_5 = W2_5*W3_5
-    DV3_3_5 = W3_5**2
-    DW2_3_5 = DV2_2_5 - DV3_3_5
-    DW3_1_5 = DV3_3_5 - DV1_1_5
-    DW1_2_5 = DV1_1_5 - DV2_2_5
-    U1_1_5 = -DV2_2_5 - DV3_3_5
-    U1_2_5 = WP2_4 + DV1_2_5
-    U1_3_5 = WP2_5 + DV1_3_5
-    U2_1_5 = DV1_2_5 - WP2_4
-    U2_2_5 = -DV1_1_5 - DV3_3_5
-    U2_3_5 = DV2_3_5 - WP1_5
-    U3_1_5 = DV1_3_5 - WP2_5
-    U3_2_5 = WP1_5 + DV2_3_5
-    VP1_5 = C5*VP1_4 + S5*VSP2_4
-    VP2_5 = C5*VSP2_4 - S5*VP1_4
-    # Link 6
-    W1_6 = C6*W1_5 - S6*W3_5
-    W2_6 = -C6*W3_5 - S6*W1_5
-    W3_6 = QP6 + W2_5
-    WP1_6 = C6*WP1_5 + S6*WP2_4 + QP6*W2_6
-    WP2_6 = C6*WP2_4 - S6*WP1_5 - QP6*W1_6
-    DV1_1_6 = W1_6**2
-    DV1_2_6 = W1_6*W2_6
-    DV1_3_6 = W1_6*W3_6
-    DV2_2_6 = W2_6**2
-    DV2_3_6 = W2_6*W3_6
-    DV3_3_6 = W3_6**2
-    DW2_3_6 = DV2_2_6 - DV3_3_6
-    DW3_1_6 = DV3_3_6 - DV1_1_6
-    DW1_2_6 = DV1_1_6 - DV2_2_6
-    U1_1_6 = -DV2_2_6 - DV3_3_6
-    U1_2_6 = DV1_2_6 - WP2_5
-    U1_3_6 = WP2_6 + DV1_3_6
-    U2_1_6 = WP2_5 + DV1_2_6
-    U2_2_6 = -DV1_1_6 - DV3_3_6
-    U2_3_6 = DV2_3_6 - WP1_6
-    U3_1_6 = DV1_3_6 - WP2_6
-    U3_2_6 = WP1_6 + DV2_3_6
-    VP1_6 = C6*VP1_5 + S6*VP2_4
-    VP2_6 = C6*VP2_4 - S6*VP1_5
-    # Link 7
-    VP1_7 = C7*VSP1_2 - g*S7
-    VP2_7 = -g*C7 - S7*VSP1_2
-    # Link 8
-    VSP1_8 = VP1_7 + D8*U2_2_3
-    VSP2_8 = VP2_7 - D8*DV1_2_3
-    VP1_8 = C2m7*VSP1_8 + S2m7*VSP2_8
-    # Joint 8
-    F1_8 = MY8*DV1_2_2
-    F2_8 = MY8*U2_2_2
-    F3_8 = MY8*U3_2_2
-    N1_8 = -MY8*D8*U3_2_3
-    N3_8 = -MY8*VP1_8
-    FDI2_8 = S2m7*F1_8 + C2m7*F2_8
-    NE1_7 = C2m7*N1_8
-    NE2_7 = S2m7*N1_8 - D8*F3_8
-    # Joint 7
-    F3_7 = MY7*U3_1_3 - MX7R*U3_2_3
-    E3_7 = F3_8 + F3_7
-    N3_7 = MX7R*VP2_7 - MY7*VP1_7
-    NE3_7 = N3_8 + D8*FDI2_8 + N3_7
-    # Joint 6
-    F1_6 = MX6*U1_1_6 + MY6*U1_2_6
-    F2_6 = MX6*U2_1_6 + MY6*U2_2_6
-    F3_6 = MX6*U3_1_6 + MY6*U3_2_6
-    N1_6 = XX6R*WP1_6 + ZZ6*DV2_3_6 + YZ6*DW2_3_6 + XZ6*U2_1_6 + MY6*VP2_5 - XY6*U3_1_6
-    N2_6 = (XX6R - ZZ6)*DV1_3_6 + XZ6*DW3_1_6 + XY6*U3_2_6 - YZ6*U1_2_6 - MX6*VP2_5
-    N3_6 = ZZ6*WP2_5 + XY6*DW1_2_6 + YZ6*U1_3_6 + MX6*VP2_6 - XX6R*DV1_2_6 - XZ6*U2_3_6 - MY6*VP1_6
-    FDI1_6 = C6*F1_6 - S6*F2_6
-    FDI3_6 = -S6*F1_6 - C6*F2_6
-    # Joint 5
-    F1_5 = MX5*U1_1_5 + MY5R*U1_2_5
-    F2_5 = MX5*U2_1_5 + MY5R*U2_2_5
-    F3_5 = MX5*U3_1_5 + MY5R*U3_2_5
-    E1_5 = FDI1_6 + F1_5
-    E2_5 = F3_6 + F2_5
-    E3_5 = FDI3_6 + F3_5
-    N1_5 = XX5R*WP1_5 + ZZ5R*DV2_3_5 + YZ5*DW2_3_5 + XZ5*U2_1_5 - XY5*U3_1_5 - MY5R*VP2_4
-    N2_5 = (XX5R - ZZ5R)*DV1_3_5 + XZ5*DW3_1_5 + XY5*U3_2_5 + MX5*VP2_4 - YZ5*U1_2_5
-    N3_5 = (XY5*DW1_2_5 + YZ5*U1_3_5 + MX5*VP2_5 - ZZ5R*WP2_4 - XX5R*DV1_2_5 - XZ5*U2_3_5 -
-        MY5R*VP1_5)
-    NE1_5 = C6*N1_6 + N1_5 - S6*N2_6
-    NE2_5 = N3_6 + N2_5
-    NE3_5 = N3_5 - S6*N1_6 - C6*N2_6
-    FDI1_5 = C5*E1_5 - S5*E2_5
-    FDI3_5 = S5*E1_5 + C5*E2_5
-    # Joint 4
-    F1_4 = MX4*U1_1_4 + MY4R*U1_2_4
-    F2_4 = MX4*U2_1_4 + MY4R*U2_2_4
-    F3_4 = MX4*U3_1_4 + MY4R*U3_2_4
-    E1_4 = FDI1_5 + F1_4
-    E2_4 = F2_4 - E3_5
-    E3_4 = FDI3_5 + F3_4
-    N1_4 = XX4R*WP1_4 + ZZ4R*DV2_3_4 + YZ4*DW2_3_4 + XZ4*U2_1_4 + MY4R*VSP2_4 - XY4*U3_1_4
-    N2_4 = (XX4R - ZZ4R)*DV1_3_4 + XZ4*DW3_1_4 + XY4*U3_2_4 - YZ4*U1_2_4 - MX4*VSP2_4
-    N3_4 = (XY4*DW1_2_4 + YZ4*U1_3_4 + MX4*VP2_4 - ZZ4R*DV1_3_3 - XX4R*DV1_2_4 - XZ4*U2_3_4 -
-        MY4R*VP1_4)
-    NE1_4 = C5*NE1_5 + N1_4 - S5*NE2_5
-    NE2_4 = N2_4 - NE3_5
-    NE3_4 = S5*NE1_5 + C5*NE2_5 + N3_4
-    FDI1_4 = C4*E1_4 - S4*E2_4
-    FDI3_4 = -S4*E1_4 - C4*E2_4
-    # Joint 3
-    F1_3 = MX3R*U1_1_3 + MY3R*DV1_2_3
-    F2_3 = MX3R*DV1_2_3 + MY3R*U2_2_3
-    F3_3 = MX3R*U3_1_3 + MY3R*U3_2_3
-    E1_3 = FDI1_4 + F1_3
-    E2_3 = E3_4 + F2_3
-    E3_3 = FDI3_4 + F3_3
-    N1_3 = XX3R*DV2_3_3 + ZZ3R*DV2_3_3 + YZ3R*DW2_3_3 + XZ3R*DV1_2_3 + MY3R*D3U3_1_2 - XY3R*U3_1_3
-    N2_3 = (XX3R - ZZ3R)*DV1_3_3 + XZ3R*DW3_1_3 + XY3R*U3_2_3 - YZ3R*DV1_2_3 - MX3R*D3U3_1_2
-    N3_3 = XY3R*DW1_2_3 + MX3R*VP2_3 - XX3R*DV1_2_3 - MY3R*VP1_3
-    NE1_3 = C4*NE1_4 + RL4*FDI3_4 + N1_3 - S4*NE2_4
-    NE2_3 = NE3_4 + N2_3 - D4*FDI3_4
-    NE3_3 = D4*E3_4 + N3_3 - S4*NE1_4 - C4*NE2_4 - RL4*FDI1_4
-    FDI2_3 = C2m7*E1_3 + S2m7*E2_3
-    # Joint 2
-    F3_2 = MX2R*U3_1_2 + MY2*U3_2_2
-    E3_2 = E3_3 + F3_2
-    N1_2 = XX2R*DV2_3_2 + ZZ2R*DV2_3_2 + YZ2R*DW2_3_2 + XZ2R*DV1_2_2 - XY2R*U3_1_2
-    N2_2 = (XX2R - ZZ2R)*DV1_3_2 + XZ2R*DW3_1_2 + XY2R*U3_2_2 - YZ2R*DV1_2_2
-    N3_2 = XY2R*DW1_2_2 + MX2R*VP2_2 - XX2R*DV1_2_2 - MY2*VP1_2
-    NE1_2 = S2m7*NE1_3 + N1_2 - C2m7*NE2_3
-    NE2_2 = C2m7*NE1_3 + S2m7*NE2_3 + N2_2 - D3*E3_3
-    NE3_2 = NE3_3 + D3*FDI2_3 + N3_2
-    NE3_1 = D2*E3_7 + D2*E3_2 - S7*NE1_7 - C7*NE2_7 - S2*NE1_2 - C2*NE2_2
-    # Torques
-    GAM[0] = OFFSET1 + NE3_1 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE3_2 + FV2*QP2 + FS2*np.sign(QP2) + N3_8 - NE3_3
-    GAM[2] = OFFSET4 + NE3_4 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[3] = OFFSET5 + NE3_5 + FV5*QP5 + FS5*np.sign(QP5)
-    GAM[4] = OFFSET6 + N3_6 + FV6*QP6 + FS6*np.sign(QP6)
-    GAM[5] = NE3_3 + OFFSET7 + NE3_7 + FV7*QP7 + FS7*np.sign(QP7) - N3_8
-
-
-def _gravity_block(q, GAM, X, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
+def _gravity_block(xp, q, GAM, X, g):
+    """Fill GAM, shape (6, N), from q (6, N)."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
     OFFSET1 = X[3]
@@ -1638,17 +1424,17 @@ def _gravity_block(q, GAM, X, g):
     OFFSET7 = X[58]
     MY8 = X[59]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th2m7 = q2 - q7
-    C2m7 = np.cos(th2m7)
-    S2m7 = np.sin(th2m7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C2m7 = xp.cos(th2m7)
+    S2m7 = xp.sin(th2m7)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Link 2
     S2g = g*S2
     C2g = g*C2
@@ -1702,23 +1488,23 @@ def _gravity_block(q, GAM, X, g):
     GAM[5] = NE3_3 + OFFSET7 + NE3_7 - N3_8
 
 
-def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
-    """Fill T, shape (10, 4, 4, N), where it is not constant, from q (6, N)."""
+def _frame_poses_block(xp, q, T, D2, D3, D4, RL4, D8):
+    """Fill T, shape (10, 4, 4, N), from q (6, N)."""
     # Inputs
     q1, q2, q4, q5, q6, q7 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
     Z1_4_1 = -C7*C4
     Z2_4_1 = C7*S4
@@ -1876,6 +1662,9 @@ def _frame_poses_block(q, T, D2, D3, D4, RL4, D8):
     T[9, 2, 0] = S7
     T[9, 2, 1] = C7
     T[9, 2, 3] = P3_9
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
+    T[6, 3, 3] = T[7, 3, 3] = T[8, 3, 3] = T[9, 3, 3] = 1.0
 
 
 # Of the robot file: drives, limits and values, which no function above reads

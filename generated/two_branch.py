@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 5e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian at random states,
-# parameters and random constants agree with Lagrange's equations and products of frames to 1e-09;
-# SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
-# FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
-# robot file.
-# sha256 of what follows: b51e576eebc0f891e7364c0af542148ab026f1753054dbdcab3f8602a96fe592
 """Tree of two branches, 7 joints, one of them prismatic, and a fixed tool: base parameters,
     regressor, dynamics.
 
@@ -76,13 +68,24 @@ Cost per sample
     regressor          270 multiplications, 211 additions, 7 sin, 7 cos
     inverse_dynamics   300 multiplications, 281 additions, 7 sin, 7 cos
     inertia_matrix     114 multiplications, 102 additions, 5 sin, 5 cos
-    bias               275 multiplications, 234 additions, 7 sin, 7 cos
     gravity            75 multiplications, 54 additions, 6 sin, 6 cos
     frame_poses        55 multiplications, 28 additions, 6 sin, 6 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 7), or (7,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (67,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX, PyTorch, ...;
+            pip install array-api-compat), all float64 or all float32, with any axes before the
+            last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
+CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 5e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
+inverse_dynamics_derivatives at random states, parameters and random constants agree with
+Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+packages, by CasADi.
+sha256 of all but these lines: 8013a2427dacaded5d5c26cfafb0b847b3dbf7212fa0444ad48f7f49d3eb843d
 """
 
 import numpy as np
@@ -173,13 +176,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (67, 7, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((67, 7, N)).view(Store)
-    zeros[5, 0] = zeros[15, 1] = zeros[23, 2] = zeros[34, 3] = zeros[44, 4] = zeros[55, 5] = 1.0
-    zeros[66, 6] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((67, 7, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[5, 0] = D[15, 1] = D[23, 2] = D[34, 3] = D[44, 4] = D[55, 5] = D[66, 6] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape
     (N, 7), or all (7,).
@@ -192,28 +200,210 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (67,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (67,):
         raise ValueError(f"X of shape {X.shape}; expected (67,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    xp = _package(*states, *X)
+    if xp is not np:
+        return _gathered(xp, {}, block, shape, states, X, constants)
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
+
+
+def _gathered(xp, table, block, shape, states, X, constants):
+    """The result of `block` on a package whose arrays cannot be written to: it fills a `table`."""
+    block(xp, *map(xp.rows, states), table, *map(xp.parameters, X), *constants)
+    return xp.gathered(table, shape, states[0])
+
+
+_IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of another package
+
+
+def _package(*arrays):
+    """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
+    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
+        return np
+    if any(type(x).__module__.startswith("casadi") for x in arrays):
+        return _Symbols()
+    others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
+    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+        return np if _IN_PLACE else _Arrays(np, arrays)
+    try:
+        from array_api_compat import array_namespace
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"arrays of {type(others[0]).__module__} need array_api_compat: "
+            "pip install array-api-compat"
+        ) from error
+    return _Arrays(array_namespace(*arrays), arrays)
+
+
+class _Arrays:
+    """Functions of an array package under NumPy's names, those of plain numbers by NumPy; TypeError
+    unless all `arrays` are float64, or all float32.
+    """
+
+    pi = np.pi
+
+    def __init__(self, package, arrays):
+        self.package, kinds = package, [x.dtype for x in arrays if hasattr(x, "dtype")]
+        if not any(all(x == kind for x in kinds) for kind in (package.float64, package.float32)):
+            kinds = ", ".join(sorted({*map(str, kinds)}))
+            raise TypeError(f"arrays of {kinds}; expected all float64, or all float32")
+
+    def __getattr__(self, name):
+        function = getattr(self.package, "pow" if name == "power" else name)
+
+        def of(x, *more, **how):
+            if isinstance(x, int | float):
+                return float(getattr(np, name)(x, *more))
+            return function(x, *more, **how)
+
+        return of
+
+    def sign(self, x):
+        """NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+        where = self.package.where
+        return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0*x))
+
+    def maximum(self, x, zero):
+        return self.package.where(x < zero, zero*x, x)
+
+    def minimum(self, x, zero):
+        return self.package.where(x > zero, zero*x, x)
+
+    def rows(self, x):
+        """x[..., k], one by one."""
+        if x.shape[-1:] != (7,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 7)")
+        return [x[..., k] for k in range(7)]
+
+    def parameters(self, X):
+        _parameters(X)
+        return [X[k] for k in range(67)]
+
+    def gathered(self, table, shape, like):
+        """Entries by index as an array, samples first; zero where there is none."""
+        zero = self.package.zeros_like(like[..., 0])
+        entries = [table.get(k[0] if len(k) == 1 else k, 0.0) for k in np.ndindex(*shape)]
+        entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
+        return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
+
+    def solve(self, A, b):
+        return self.package.linalg.solve(A, b[..., None])[..., 0]
+
+
+class _Symbols:
+    """Functions of CasADi under NumPy's names, on columns."""
+
+    def __init__(self):
+        import casadi as ca
+
+        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
+        self.parameters = ca.vertsplit
+
+    def __getattr__(self, name):
+        return getattr(self.package, name)
+
+    def stack(self, entries):
+        return self.package.vertcat(*entries)
+
+    def zeros_like(self, x):
+        return self.package.SX(*x.shape)
+
+    def matrix_transpose(self, x):
+        return x.T
+
+    def gathered(self, table, shape, like):
+        """Entries by index as a matrix, or as matrices; those that are zero stay structural."""
+        if len(shape) == 3:
+            first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
+            return [self.gathered(entries, shape[1:], like) for entries in first]
+        matrix = self.package.SX(*(*shape, 1)[:2])
+        for place, x in table.items():
+            matrix[place] = x
+        return matrix
+
+    def solve(self, A, b):
+        """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+        n = len(JOINTS)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        for j in range(n):
+            for k in range(j):
+                d[j] -= L[j, k]**2*d[k]
+                x[j] -= L[j, k]*x[k]
+            for i in range(j + 1, n):
+                L[i, j] = (A[i, j] - sum(L[i, k]*L[j, k]*d[k] for k in range(j)))/d[j]
+        x = [x[j]/d[j] for j in range(n)]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                x[j] -= L[i, j]*x[i]
+        return self.stack(x)
+
+
+def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
+    """casadi.Function of a function of this module, or, as NAME_derivatives, of the Jacobians of
+    its results by each column that it reads, d<result>_d<column>; `frame` is that of a jacobian.
+
+    Inputs are columns q, qd, qdd, tau (7,), X (67,), standard (108,), then the constants. By name,
+    a constant that is not given has its value in CONSTANTS, another input is nan. Samples stand
+    side by side, q (7, N); the results then do so too. The derivative of sign(qd) is zero.
+    """
+    import casadi as ca
+
+    of = name.removesuffix("_derivatives")
+    if of not in _OUTPUTS:
+        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+    columns, names = [text.split() for text in _OUTPUTS[of]]
+    sizes = {"X": 67, "standard": 108}
+    columns = {x: ca.SX.sym(x, sizes.get(x, 7)) for x in columns}
+    inputs = columns | {x: ca.SX.sym(x) for x in CONSTANTS}
+    given = {} if frame is None else {"frame": frame}
+    value = globals()[of](**inputs, **given)
+    results = dict(zip(names, value if isinstance(value, list | tuple) else [value]))
+    if of != name:
+        results = {
+            f"d{y}_d{x}": ca.jacobian(results[y], columns[x]) for y in names for x in columns
+        }
+    default = {"default_in": [*[np.nan]*len(columns), *CONSTANTS.values()]}
+    return ca.Function(
+        name, [*inputs.values()], [*results.values()], [*inputs], [*results], default
+    )
+
+
+_OUTPUTS = {  # columns, results
+    'base_parameters': ('standard', 'X'),
+    'regressor': ('q qd qdd', 'D'),
+    'inverse_dynamics': ('q qd qdd X', 'GAM'),
+    'inertia_matrix': ('q X', 'A'),
+    'bias': ('q qd X', 'GAM'),
+    'gravity': ('q X', 'GAM'),
+    'forward_dynamics': ('q qd tau X', 'qdd'),
+    'frame_poses': ('q', 'T1 T2 T3 T4 T5 T6 T7 T8'),
+    'jacobian': ('q', 'J'),
+}
 
 
 def elements(
@@ -246,15 +436,19 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
+    standard: "Array", *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
     D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
     RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """X, shape (67,), from the 108 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+        xp = _package(*standard)
+    else:
+        xp = _package(standard)
+        standard = standard if xp is np else [standard[k] for k in range(108)]
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2,
         ZZ2, MX2, MY2, MZ2, M2, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3,
@@ -291,7 +485,7 @@ def base_parameters(
     ZZ7R = ZZ7 + YY8 + 2*RL8*MZ8 + RL8**2*M8
     MY7R = MY7 - MZ8 - RL8*M8
     XX8R = XX8 - YY8
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, MX1R, MY1R, FV1, FS1, OFFSET1, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, FV2, FS2,
         OFFSET2, MX3R, MY3R, MZ3, M3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4R, XZ4R, YZ4R, ZZ4R, MX4R,
         MY4R, Ia4, FV4, FS4, OFFSET4, XX6R, XY6, XZ6R, YZ6, ZZ6R, MX6R, MY6, FV6, FS6, OFFSET6,
@@ -301,209 +495,209 @@ def base_parameters(
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11,
-    B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D2: float = 0.21,
+    RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4,
+    D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
     GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """D of Gamma = D X. Shape (N, 7, 67).
 
     A view on one store of shape (67, 7, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (D2, RL2, D4, D6, D7, RL8, GX, GZ))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11,
-    B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D2: float = 0.21,
+    RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4,
+    D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
     GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """W of Y = W X + rho, shape (7*N, 67), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ).reshape(67, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (D2, RL2, D4, D6, D7, RL8, GX, GZ))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 67))
+    return filled.reshape(67, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 7, 67)."""
+    states = (q, qd, qdd)
+    xp = _package(*states)
+    if xp is not np:
+        if out is not None:
+            raise ValueError("out: a store holds NumPy's arrays alone")
+        constants = constants
+        D = _gathered(xp, _constant({}), _regressor_block, (67, 7), states, (), constants)
+        return xp, xp.matrix_transpose(D)
+    states = _states(*states)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (67, 7, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(67, 7, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """`out`, or a new store, filled."""
-    states = _states(q, qd, qdd)
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, D2, RL2, D4, D6, D7, RL8, GX, GZ)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D2: float = 0.21,
-    RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4,
-    D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
-    GZ: float = -8.496
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19,
+    D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 7).
     """
-    X = _parameters(X)
-    states = _states(q, qd, qdd)
-    result = np.zeros((7, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, D2, RL2, D4, D6, D7, RL8, GX, GZ)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (7,), (q, qd, qdd), (X,), (D2, RL2, D4, D6, D7, RL8,
+        GX, GZ))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
+    q: "Array", X: "Array", *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
     D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
     RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 7, 7).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((7, 7, len(states[0])))
-    _fill(_inertia_matrix_block, result, states, X, D2, RL2, D4, B6, D6, D7, RL8)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (7, 7), (q,), (X,), (D2, RL2, D4, B6, D6, D7, RL8))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13,
+    q: "Array", qd: "Array", X: "Array", *, D2: float = 0.21, RL2: float = 0.13,
     D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19,
     D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 7).
     """
-    X = _parameters(X)
-    states = _states(q, qd)
-    result = np.zeros((7, len(states[0])))
-    _fill(_bias_block, result, states, X, D2, RL2, D4, D6, D7, RL8, GX, GZ)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, D2=D2, RL2=RL2, D4=D4, D5=D5,
+        RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
+    q: "Array", X: "Array", *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17,
     D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23,
     RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 7).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((7, len(states[0])))
-    _fill(_gravity_block, result, states, X, D2, RL2, GX, GZ)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (7,), (q,), (X,), (D2, RL2, GX, GZ))
 
 
 def frame_poses(
-    q: np.ndarray, *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06,
+    q: "Array", *, D2: float = 0.21, RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06,
     RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29,
     GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 8, 4, 4).
     """
-    states = _states(q)
-    result = np.zeros((8, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
-    result[4, 3, 3] = result[5, 3, 3] = result[6, 3, 3] = result[7, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, states, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (8, 4, 4), (q,), (), (D2, RL2, D4, D5, RL5, B6, D6, D7,
+        RL8))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D2: float = 0.21,
-    RL2: float = 0.13, D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4,
-    D6: float = -0.19, D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905,
-    GZ: float = -8.496
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D6=D6, D7=D7,
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, D2: float = 0.21, RL2: float = 0.13,
+    D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19,
+    D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 7)."""
+    xp = _package(q, qd, tau, X)
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    elif tau.shape != q.shape:
+        raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
+    rest = tau - bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8,
+        GX=GX, GZ=GZ)
+    inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7,
         RL8=RL8, GX=GX, GZ=GZ)
-    inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, B6=B6, D6=D6, D7=D7, RL8=RL8)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D2: float = 0.21, RL2: float = 0.13,
+    q: "Array", *, frame: int | None = None, D2: float = 0.21, RL2: float = 0.13,
     D4: float = 0.17, D5: float = 0.06, RL5: float = 0.11, B6: float = 0.4, D6: float = -0.19,
     D7: float = 0.23, RL8: float = 0.29, GX: float = -4.905, GZ: float = -8.496
-) -> np.ndarray:
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 7).
     """
     frame = 8 if frame is None else frame
-    poses = frame_poses(q, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7,
-        RL8=RL8).reshape(-1, 8, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 9):
+        raise ValueError(f"frame {frame!r}; expected 1 to 8")
+    return _evaluated(_jacobian_block, (6, 7), (q,), (), (frame, (D2, RL2, D4, D5, RL5, B6, D6, D7,
+        RL8), ()))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 7), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 7)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, J, frame, posing, moving):
+    """Fill J, shape (6, 7, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(8, 4, 4), 0.0)
+    _frame_poses_block(xp, q, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for place, value in columns.items():
+        J[place] = value
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
-        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 1, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)),),
-        7: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)),),
-        8: ((1, 0, ((0, 1.0),)), (6, 0, ((4, 1.0),)), (7, 0, ((5, 1.0),)), (8, 0, ((6, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((1, 1.0),)), 3: (2, 1, ((2, 1.0),)),
+        4: (3, 0, ((3, 1.0),)), 5: (4, 2, ()), 6: (1, 0, ((4, 1.0),)), 7: (6, 0, ((5, 1.0),)),
+        8: (7, 0, ((6, 1.0),)),
     }
 
 
-def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Fill D, shape (67, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
+def _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
     QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
     th67 = q6 + q7
-    C67 = np.cos(th67)
-    S67 = np.sin(th67)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
+    C67 = xp.cos(th67)
+    S67 = xp.sin(th67)
+    C8 = xp.cos(q8)
+    S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Link 1
@@ -657,6 +851,44 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     VSP38 = VSP37 - RL8*U327
     VP18 = C8*VSP18 + S8*VSP38
     VP28 = C8*VSP38 - S8*VSP18
+    # Friction, actuators
+    GAM1a = xp.sign(QP1)
+    GAM2a = xp.sign(QP2)
+    GAM3a = xp.sign(QP3)
+    GAM4a = xp.sign(QP4)
+    GAM5a = xp.sign(QP6)
+    GAM6a = xp.sign(QP7)
+    GAM7a = xp.sign(QP8)
+    return (
+        C2, S2, r3, C4, S4, C6, S6, C7, S7, C67, S67, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
+        DV232, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322,
+        VSP22, VP12, VP22, DF2MZ3, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234,
+        DW314, DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
+        C6QDP1, DV236, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16,
+        VP16, VP26, WP37, S67QDP1, C67QDP1, DV237, WP17, DV137, DV127, DW237, DW317, DW127,
+        U117, U127, U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238,
+        DW238, DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28,
+        GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill D, shape (67, 7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
+    # Inputs
+    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
+    # Motion of the links
+    (
+        C2, S2, r3, C4, S4, C6, S6, C7, S7, C67, S67, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
+        _, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322, VSP22,
+        VP12, VP22, DF2MZ3, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234, DW314,
+        DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
+        C6QDP1, _, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16, VP16,
+        VP26, WP37, S67QDP1, C67QDP1, _, WP17, DV137, DV127, DW237, DW317, DW127, U117, U127,
+        U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238, DW238,
+        DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28, GAM1a,
+        GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
+    ) = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
     # Joint axes Z and velocities V seen from link 2
     V121 = -RL2*C2
     V221 = RL2*S2
@@ -707,7 +939,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[1, 0] = VP21                                                    # DG1MX1
     D[2, 0] = -VP11                                                   # DG1MY1
     D[3, 0] = QP1                                                     # DG1FV1
-    D[4, 0] = np.sign(QP1)                                            # DG1FS1
+    D[4, 0] = GAM1a                                                   # DG1FS1
     D[6, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
     D[7, 0] = S2*U312 - C2*U322                                       # DG1XY2
     D[8, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
@@ -753,7 +985,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[11, 1] = VP22                 # DG2MX2
     D[12, 1] = -VP12                # DG2MY2
     D[13, 1] = QP2                  # DG2FV2
-    D[14, 1] = np.sign(QP2)         # DG2FS2
+    D[14, 1] = GAM2a                # DG2FS2
     D[16, 1] = -r3*C2QDP1           # DG2MX3
     D[17, 1] = VP33 - r3*U112       # DG2MY3
     D[18, 1] = DF2MZ3 - VP23        # DG2MZ3
@@ -772,20 +1004,20 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[19, 2] = VP33              # DG3M3
     D[20, 2] = QDP3              # DG3Ia3
     D[21, 2] = QP3               # DG3FV3
-    D[22, 2] = np.sign(QP3)      # DG3FS3
+    D[22, 2] = GAM3a             # DG3FS3
     D[29, 2] = C4*U114 - S4U214  # DG3MX4
     D[30, 2] = C4U124 - S4*U224  # DG3MY4
     # Joint 4
-    D[24, 3] = -DV124        # DG4XX4
-    D[25, 3] = DW124         # DG4XY4
-    D[26, 3] = -U234         # DG4XZ4
-    D[27, 3] = U134          # DG4YZ4
-    D[28, 3] = WP34          # DG4ZZ4
-    D[29, 3] = VP24          # DG4MX4
-    D[30, 3] = -VP14         # DG4MY4
-    D[31, 3] = QDP4          # DG4Ia4
-    D[32, 3] = QP4           # DG4FV4
-    D[33, 3] = np.sign(QP4)  # DG4FS4
+    D[24, 3] = -DV124  # DG4XX4
+    D[25, 3] = DW124   # DG4XY4
+    D[26, 3] = -U234   # DG4XZ4
+    D[27, 3] = U134    # DG4YZ4
+    D[28, 3] = WP34    # DG4ZZ4
+    D[29, 3] = VP24    # DG4MX4
+    D[30, 3] = -VP14   # DG4MY4
+    D[31, 3] = QDP4    # DG4Ia4
+    D[32, 3] = QP4     # DG4FV4
+    D[33, 3] = GAM4a   # DG4FS4
     # Joint 6
     D[35, 4] = -DV126                                      # DG6XX6
     D[36, 4] = DW126                                       # DG6XY6
@@ -795,7 +1027,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[40, 4] = VP26                                        # DG6MX6
     D[41, 4] = -VP16                                       # DG6MY6
     D[42, 4] = QP6                                         # DG6FV6
-    D[43, 4] = np.sign(QP6)                                # DG6FS6
+    D[43, 4] = GAM5a                                       # DG6FS6
     D[45, 4] = -DV127                                      # DG6XX7
     D[46, 4] = DW127                                       # DG6XY7
     D[47, 4] = -S67QDP1                                    # DG6XZ7
@@ -820,7 +1052,7 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[51, 5] = -VP17                           # DG7MY7
     D[52, 5] = QDP7                            # DG7Ia7
     D[53, 5] = QP7                             # DG7FV7
-    D[54, 5] = np.sign(QP7)                    # DG7FS7
+    D[54, 5] = GAM6a                           # DG7FS7
     D[56, 5] = DN6XX8                          # DG7XX8
     D[57, 5] = DN6XY8                          # DG7XY8
     D[58, 5] = DN6XZ8                          # DG7XZ8
@@ -829,22 +1061,21 @@ def _regressor_block(q, qd, qdd, D, D2, RL2, D4, D6, D7, RL8, GX, GZ):
     D[61, 5] = DN6MX8 + U118*V187 + U218*V287  # DG7MX8
     D[62, 5] = DN6MY8 + U128*V187 + U228*V287  # DG7MY8
     # Joint 8
-    D[56, 6] = -DV128        # DG8XX8
-    D[57, 6] = DW128         # DG8XY8
-    D[58, 6] = -U238         # DG8XZ8
-    D[59, 6] = U138          # DG8YZ8
-    D[60, 6] = WP38          # DG8ZZ8
-    D[61, 6] = VP28          # DG8MX8
-    D[62, 6] = -VP18         # DG8MY8
-    D[63, 6] = QDP8          # DG8Ia8
-    D[64, 6] = QP8           # DG8FV8
-    D[65, 6] = np.sign(QP8)  # DG8FS8
+    D[56, 6] = -DV128  # DG8XX8
+    D[57, 6] = DW128   # DG8XY8
+    D[58, 6] = -U238   # DG8XZ8
+    D[59, 6] = U138    # DG8YZ8
+    D[60, 6] = WP38    # DG8ZZ8
+    D[61, 6] = VP28    # DG8MX8
+    D[62, 6] = -VP18   # DG8MY8
+    D[63, 6] = QDP8    # DG8Ia8
+    D[64, 6] = QP8     # DG8FV8
+    D[65, 6] = GAM7a   # DG8FS8
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N); qdd (7, N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
+    """Fill GAM, shape (7, N), from q (7, N); qd (7, N); qdd (7, N)."""
     # Inputs
-    q1, q2, q3, q4, q6, q7, q8 = q
     QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
     QDP1, QDP2, QDP3, QDP4, QDP6, QDP7, QDP8 = qdd
     (
@@ -854,174 +1085,18 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ
         OFFSET6, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, FV7, FS7, OFFSET7, XX8R, XY8, XZ8,
         YZ8, ZZ8, MX8, MY8, Ia8, FV8, FS8, OFFSET8
     ) = X
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    th67 = q6 + q7
-    C67 = np.cos(th67)
-    S67 = np.sin(th67)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
-    # Inputs
-    r3 = 0.1 + q3
-    # Link 1
-    DV331 = QP1**2
-    VP11 = -GX*C1
-    VP21 = GX*S1
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    S2QDP1 = S2*QDP1
-    C2QDP1 = C2*QDP1
-    DV232 = QP2*W22
-    WP12 = DV232 - S2QDP1
-    DV132 = QP2*W12
-    WP22 = -C2QDP1 - DV132
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U122 = DV122 - QDP2
-    U212 = QDP2 + DV122
-    U222 = -DV112 - DV332
-    U312 = DV132 - WP22
-    U322 = DV232 + WP12
-    VSP12 = VP11 - D2*DV331 - RL2*QDP1
-    VSP22 = VP21 + D2*QDP1 - RL2*DV331
-    VP12 = C2*VSP12 + GZ*S2
-    VP22 = GZ*C2 - S2*VSP12
-    # Link 3
-    VSP13 = VP12 - r3*U122
-    VSP23 = VP22 - r3*U222
-    VSP33 = VSP22 - r3*U322
-    QP3x2 = 2*QP3
-    VP13 = VSP33 - W12*QP3x2
-    VP23 = -VSP13 - QP2*QP3x2
-    VP33 = QDP3 - VSP23
-    # Link 4
-    W14 = S4*QP2 - C4*W22
-    W24 = S4*W22 + C4*QP2
-    W34 = QP4 - W12
-    WP14 = S4*QDP2 + QP4*W24 - C4*WP22
-    WP24 = S4*WP22 + C4*QDP2 - QP4*W14
-    WP34 = QDP4 - WP12
-    DV114 = W14**2
-    DV124 = W14*W24
-    DV134 = W14*W34
-    DV224 = W24**2
-    DV234 = W24*W34
-    DV334 = W34**2
-    DW234 = DV224 - DV334
-    DW314 = DV334 - DV114
-    DW124 = DV114 - DV224
-    U114 = -DV224 - DV334
-    U124 = DV124 - WP34
-    U134 = WP24 + DV134
-    U214 = WP34 + DV124
-    U224 = -DV114 - DV334
-    U234 = DV234 - WP14
-    U314 = DV134 - WP24
-    U324 = WP14 + DV234
-    VSP14 = VP13 - D4*DV331
-    VSP24 = VP23 + D4*C2QDP1
-    VSP34 = VP33 - D4*S2QDP1
-    VP14 = S4*VSP14 + C4*VSP34
-    VP24 = C4*VSP14 - S4*VSP34
-    # Link 6
-    W16 = -S6*QP1
-    W26 = -C6*QP1
-    S6QDP1 = S6*QDP1
-    C6QDP1 = C6*QDP1
-    DV236 = QP6*W26
-    WP16 = DV236 - S6QDP1
-    DV136 = QP6*W16
-    WP26 = -C6QDP1 - DV136
-    DV116 = W16**2
-    DV126 = W16*W26
-    DV226 = W26**2
-    DV336 = QP6**2
-    DW236 = DV226 - DV336
-    DW316 = DV336 - DV116
-    DW126 = DV116 - DV226
-    U116 = -DV226 - DV336
-    U126 = DV126 - QDP6
-    U216 = QDP6 + DV126
-    U316 = DV136 - WP26
-    U326 = DV236 + WP16
-    VSP16 = VP11 - D6*QDP1
-    VSP26 = VP21 - D6*DV331
-    VP16 = C6*VSP26 + GZ*S6
-    VP26 = GZ*C6 - S6*VSP26
-    # Link 7
-    W37 = QP6 + QP7
-    WP37 = QDP6 + QDP7
-    W17 = -S67*QP1
-    W27 = -C67*QP1
-    S67QDP1 = S67*QDP1
-    C67QDP1 = C67*QDP1
-    DV237 = W37*W27
-    WP17 = DV237 - S67QDP1
-    DV137 = W37*W17
-    WP27 = -C67QDP1 - DV137
-    DV117 = W17**2
-    DV127 = W17*W27
-    DV227 = W27**2
-    DV337 = W37**2
-    DW237 = DV227 - DV337
-    DW317 = DV337 - DV117
-    DW127 = DV117 - DV227
-    U117 = -DV227 - DV337
-    U127 = DV127 - WP37
-    U217 = WP37 + DV127
-    U227 = -DV117 - DV337
-    U317 = DV137 - WP27
-    U327 = DV237 + WP17
-    VSP17 = VP16 + D7*U116
-    VSP27 = VP26 + D7*U216
-    VSP37 = D7*U316 - VSP16
-    VP17 = C7*VSP17 + S7*VSP27
-    VP27 = C7*VSP27 - S7*VSP17
-    # Link 8
-    W18 = C8*W17 + S8*W37
-    W28 = C8*W37 - S8*W17
-    W38 = QP8 - W27
-    WP18 = C8*WP17 + S8*WP37 + QP8*W28
-    WP28 = C8*WP37 - S8*WP17 - QP8*W18
-    WP38 = QDP8 - WP27
-    DV118 = W18**2
-    DV128 = W18*W28
-    DV138 = W18*W38
-    DV228 = W28**2
-    DV238 = W28*W38
-    DV338 = W38**2
-    DW238 = DV228 - DV338
-    DW318 = DV338 - DV118
-    DW128 = DV118 - DV228
-    U118 = -DV228 - DV338
-    U128 = DV128 - WP38
-    U138 = WP28 + DV138
-    U218 = WP38 + DV128
-    U228 = -DV118 - DV338
-    U238 = DV238 - WP18
-    U318 = DV138 - WP28
-    U328 = WP18 + DV238
-    VSP18 = VP17 - RL8*U127
-    VSP28 = VP27 - RL8*U227
-    VSP38 = VSP37 - RL8*U327
-    VP18 = C8*VSP18 + S8*VSP38
-    VP28 = C8*VSP38 - S8*VSP18
+    # Motion of the links
+    (
+        C2, S2, r3, C4, S4, C6, S6, C7, S7, _, _, C8, S8, DV331, VP11, VP21, S2QDP1, C2QDP1,
+        DV232, WP12, DV132, DV122, DW232, DW312, DW122, U112, U122, U212, U222, U312, U322,
+        VSP22, VP12, VP22, _, VP13, VP23, VP33, WP14, WP34, DV124, DV134, DV234, DW234, DW314,
+        DW124, U114, U124, U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, S6QDP1,
+        C6QDP1, DV236, WP16, DV136, DV126, DW236, DW316, DW126, U126, U216, U316, U326, VSP16,
+        VP16, VP26, WP37, S67QDP1, C67QDP1, DV237, WP17, DV137, DV127, DW237, DW317, DW127,
+        U117, U127, U217, U227, U317, U327, VSP37, VP17, VP27, WP18, WP38, DV128, DV138, DV238,
+        DW238, DW318, DW128, U118, U128, U138, U218, U228, U238, U318, U328, VSP28, VP18, VP28,
+        GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6a, GAM7a
+    ) = _motion(xp, q, qd, qdd, D2, RL2, D4, D6, D7, RL8, GX, GZ)
     # Joint 8
     F18 = MX8*U118 + MY8*U128
     F28 = MX8*U218 + MY8*U228
@@ -1094,17 +1169,17 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ
     N31 = ZZ1R*QDP1 + MX1R*VP21 - MY1R*VP11
     NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
-    GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
-    GAM[3] = OFFSET4 + N34 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*np.sign(QP6)
-    GAM[5] = OFFSET7 + NE37 + Ia7*QDP7 + FV7*QP7 + FS7*np.sign(QP7)
-    GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*np.sign(QP8)
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*GAM2a
+    GAM[2] = OFFSET3 + E33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
+    GAM[3] = OFFSET4 + N34 + Ia4*QDP4 + FV4*QP4 + FS4*GAM4a
+    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*GAM5a
+    GAM[5] = OFFSET7 + NE37 + Ia7*QDP7 + FV7*QP7 + FS7*GAM6a
+    GAM[6] = OFFSET8 + N38 + Ia8*QDP8 + FV8*QP8 + FS8*GAM7a
 
 
-def _inertia_matrix_block(q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
-    """Fill A, shape (7, 7, N), where it is not constant, from q (7, N)."""
+def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
+    """Fill A, shape (7, 7, N), from q (7, N)."""
     # Inputs
     q2, q3, q4, q6, q7, q8 = q[1:]
     ZZ1R = X[0]
@@ -1154,16 +1229,16 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     # Constants
     MSP12 = MX2 - MY3R
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
+    C8 = xp.cos(q8)
+    S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Composite link 8
@@ -1274,299 +1349,8 @@ def _inertia_matrix_block(q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     A[6, 6] = ZZ8 + Ia8
 
 
-def _bias_block(q, qd, GAM, X, D2, RL2, D4, D6, D7, RL8, GX, GZ):
-    """Fill GAM, shape (7, N), where it is not constant, from q (7, N); qd (7, N)."""
-    # Inputs
-    q1, q2, q3, q4, q6, q7, q8 = q
-    QP1, QP2, QP3, QP4, QP6, QP7, QP8 = qd
-    MX1R = X[1]
-    MY1R = X[2]
-    FV1 = X[3]
-    FS1 = X[4]
-    OFFSET1 = X[5]
-    XX2R = X[6]
-    XY2R = X[7]
-    XZ2R = X[8]
-    YZ2R = X[9]
-    ZZ2R = X[10]
-    MX2 = X[11]
-    MY2 = X[12]
-    FV2 = X[13]
-    FS2 = X[14]
-    OFFSET2 = X[15]
-    MX3R = X[16]
-    MY3R = X[17]
-    MZ3 = X[18]
-    M3R = X[19]
-    FV3 = X[21]
-    FS3 = X[22]
-    OFFSET3 = X[23]
-    XX4R = X[24]
-    XY4R = X[25]
-    XZ4R = X[26]
-    YZ4R = X[27]
-    ZZ4R = X[28]
-    MX4R = X[29]
-    MY4R = X[30]
-    FV4 = X[32]
-    FS4 = X[33]
-    OFFSET4 = X[34]
-    XX6R = X[35]
-    XY6 = X[36]
-    XZ6R = X[37]
-    YZ6 = X[38]
-    ZZ6R = X[39]
-    MX6R = X[40]
-    MY6 = X[41]
-    FV6 = X[42]
-    FS6 = X[43]
-    OFFSET6 = X[44]
-    XX7R = X[45]
-    XY7 = X[46]
-    XZ7 = X[47]
-    YZ7 = X[48]
-    ZZ7R = X[49]
-    MX7 = X[50]
-    MY7R = X[51]
-    FV7 = X[53]
-    FS7 = X[54]
-    OFFSET7 = X[55]
-    XX8R = X[56]
-    XY8 = X[57]
-    XZ8 = X[58]
-    YZ8 = X[59]
-    ZZ8 = X[60]
-    MX8 = X[61]
-    MY8 = X[62]
-    FV8 = X[64]
-    FS8 = X[65]
-    OFFSET8 = X[66]
-    # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    th67 = q6 + q7
-    C67 = np.cos(th67)
-    S67 = np.sin(th67)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
-    # Inputs
-    r3 = 0.1 + q3
-    # Link 1
-    DV331 = QP1**2
-    VP11 = -GX*C1
-    VP21 = GX*S1
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    DV232 = QP2*W22
-    DV132 = QP2*W12
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U222 = -DV112 - DV332
-    U312 = 2*DV132
-    U322 = 2*DV232
-    VSP12 = VP11 - D2*DV331
-    VSP22 = VP21 - RL2*DV331
-    VP12 = C2*VSP12 + GZ*S2
-    VP22 = GZ*C2 - S2*VSP12
-    # Link 3
-    VSP13 = VP12 - r3*DV122
-    VSP23 = VP22 - r3*U222
-    VSP33 = VSP22 - r3*U322
-    QP3x2 = 2*QP3
-    VP13 = VSP33 - W12*QP3x2
-    VP23 = -VSP13 - QP2*QP3x2
-    # Link 4
-    W14 = S4*QP2 - C4*W22
-    W24 = S4*W22 + C4*QP2
-    W34 = QP4 - W12
-    WP14 = C4*DV132 + QP4*W24
-    WP24 = -S4*DV132 - QP4*W14
-    DV114 = W14**2
-    DV124 = W14*W24
-    DV134 = W14*W34
-    DV224 = W24**2
-    DV234 = W24*W34
-    DV334 = W34**2
-    DW234 = DV224 - DV334
-    DW314 = DV334 - DV114
-    DW124 = DV114 - DV224
-    U114 = -DV224 - DV334
-    U124 = DV232 + DV124
-    U134 = WP24 + DV134
-    U214 = DV124 - DV232
-    U224 = -DV114 - DV334
-    U234 = DV234 - WP14
-    U314 = DV134 - WP24
-    U324 = WP14 + DV234
-    VSP14 = VP13 - D4*DV331
-    VP14 = S4*VSP14 - C4*VSP23
-    VP24 = S4*VSP23 + C4*VSP14
-    # Link 6
-    W16 = -S6*QP1
-    W26 = -C6*QP1
-    DV236 = QP6*W26
-    DV136 = QP6*W16
-    DV116 = W16**2
-    DV126 = W16*W26
-    DV226 = W26**2
-    DV336 = QP6**2
-    DW236 = DV226 - DV336
-    DW316 = DV336 - DV116
-    DW126 = DV116 - DV226
-    U116 = -DV226 - DV336
-    U316 = 2*DV136
-    U326 = 2*DV236
-    VSP26 = VP21 - D6*DV331
-    VP16 = C6*VSP26 + GZ*S6
-    VP26 = GZ*C6 - S6*VSP26
-    # Link 7
-    W37 = QP6 + QP7
-    W17 = -S67*QP1
-    W27 = -C67*QP1
-    DV237 = W37*W27
-    DV137 = W37*W17
-    DV117 = W17**2
-    DV127 = W17*W27
-    DV227 = W27**2
-    DV337 = W37**2
-    DW237 = DV227 - DV337
-    DW317 = DV337 - DV117
-    DW127 = DV117 - DV227
-    U117 = -DV227 - DV337
-    U227 = -DV117 - DV337
-    U317 = 2*DV137
-    U327 = 2*DV237
-    VSP17 = VP16 + D7*U116
-    VSP27 = VP26 + D7*DV126
-    VSP37 = D7*U316 - VP11
-    VP17 = C7*VSP17 + S7*VSP27
-    VP27 = C7*VSP27 - S7*VSP17
-    # Link 8
-    W18 = C8*W17 + S8*W37
-    W28 = C8*W37 - S8*W17
-    W38 = QP8 - W27
-    WP18 = C8*DV237 + QP8*W28
-    WP28 = -S8*DV237 - QP8*W18
-    DV118 = W18**2
-    DV128 = W18*W28
-    DV138 = W18*W38
-    DV228 = W28**2
-    DV238 = W28*W38
-    DV338 = W38**2
-    DW238 = DV228 - DV338
-    DW318 = DV338 - DV118
-    DW128 = DV118 - DV228
-    U118 = -DV228 - DV338
-    U128 = DV128 - DV137
-    U138 = WP28 + DV138
-    U218 = DV137 + DV128
-    U228 = -DV118 - DV338
-    U238 = DV238 - WP18
-    U318 = DV138 - WP28
-    U328 = WP18 + DV238
-    VSP18 = VP17 - RL8*DV127
-    VSP28 = VP27 - RL8*U227
-    VSP38 = VSP37 - RL8*U327
-    VP18 = C8*VSP18 + S8*VSP38
-    VP28 = C8*VSP38 - S8*VSP18
-    # Joint 8
-    F18 = MX8*U118 + MY8*U128
-    F28 = MX8*U218 + MY8*U228
-    F38 = MX8*U318 + MY8*U328
-    N18 = XX8R*WP18 + ZZ8*DV238 + YZ8*DW238 + XZ8*U218 - XY8*U318 - MY8*VSP28
-    N28 = (XX8R - ZZ8)*DV138 + XZ8*DW318 + XY8*U328 + MX8*VSP28 - YZ8*U128
-    N38 = ZZ8*DV137 + XY8*DW128 + YZ8*U138 + MX8*VP28 - XX8R*DV128 - XZ8*U238 - MY8*VP18
-    FDI18 = C8*F18 - S8*F28
-    FDI38 = S8*F18 + C8*F28
-    # Joint 7
-    F17 = MX7*U117 + MY7R*DV127
-    F27 = MX7*DV127 + MY7R*U227
-    F37 = MX7*U317 + MY7R*U327
-    E17 = FDI18 + F17
-    E27 = F27 - F38
-    E37 = FDI38 + F37
-    N17 = XX7R*DV237 + ZZ7R*DV237 + YZ7*DW237 + XZ7*DV127 + MY7R*VSP37 - XY7*U317
-    N27 = (XX7R - ZZ7R)*DV137 + XZ7*DW317 + XY7*U327 - YZ7*DV127 - MX7*VSP37
-    N37 = XY7*DW127 + MX7*VP27 - XX7R*DV127 - MY7R*VP17
-    NE17 = C8*N18 + N17 - S8*N28 - RL8*FDI38
-    NE27 = N27 - N38
-    NE37 = S8*N18 + C8*N28 + RL8*FDI18 + N37
-    FDI27 = S7*E17 + C7*E27
-    # Joint 6
-    F36 = MX6R*U316 + MY6*U326
-    E36 = E37 + F36
-    N16 = XX6R*DV236 + ZZ6R*DV236 + YZ6*DW236 + XZ6R*DV126 - XY6*U316 - MY6*VP11
-    N26 = (XX6R - ZZ6R)*DV136 + XZ6R*DW316 + XY6*U326 + MX6R*VP11 - YZ6*DV126
-    N36 = XY6*DW126 + MX6R*VP26 - XX6R*DV126 - MY6*VP16
-    NE16 = C7*NE17 + N16 - S7*NE27
-    NE26 = S7*NE17 + C7*NE27 + N26 - D7*E37
-    NE36 = NE37 + D7*FDI27 + N36
-    # Joint 4
-    F14 = MX4R*U114 + MY4R*U124
-    F24 = MX4R*U214 + MY4R*U224
-    F34 = MX4R*U314 + MY4R*U324
-    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4R*DW234 + XZ4R*U214 + MY4R*VP23 - XY4R*U314
-    N24 = (XX4R - ZZ4R)*DV134 + XZ4R*DW314 + XY4R*U324 - YZ4R*U124 - MX4R*VP23
-    N34 = XY4R*DW124 + YZ4R*U134 + MX4R*VP24 - ZZ4R*DV232 - XX4R*DV124 - XZ4R*U234 - MY4R*VP14
-    FDI14 = S4*F14 + C4*F24
-    FDI34 = C4*F14 - S4*F24
-    # Joint 3
-    F13 = M3R*VP13 - MX3R*DV331 - MY3R*U312 - MZ3*U322
-    F23 = M3R*VP23 + MY3R*U112 + MZ3*DV122
-    F33 = MY3R*DV122 + MZ3*U222 - M3R*VSP23
-    E13 = FDI14 + F13
-    E23 = F34 + F23
-    E33 = FDI34 + F33
-    N13 = -MY3R*VSP23 - MZ3*VP23
-    N23 = MZ3*VP13 + MX3R*VSP23
-    N33 = MX3R*VP23 - MY3R*VP13
-    NE13 = S4*N14 + C4*N24 + N13
-    NE23 = N34 + N23 - D4*FDI34
-    NE33 = C4*N14 + D4*F34 + N33 - S4*N24
-    # Joint 2
-    F12 = MX2*U112 + MY2*DV122
-    F22 = MX2*DV122 + MY2*U222
-    F32 = MX2*U312 + MY2*U322
-    E12 = F12 - E23
-    E22 = F22 - E33
-    E32 = E13 + F32
-    N12 = XX2R*DV232 + ZZ2R*DV232 + YZ2R*DW232 + XZ2R*DV122 + MY2*VSP22 - XY2R*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2R*U322 - YZ2R*DV122 - MX2*VSP22
-    N32 = XY2R*DW122 + MX2*VP22 - XX2R*DV122 - MY2*VP12
-    NE12 = N12 - NE23 - r3*E13
-    NE22 = N22 - NE33
-    NE32 = NE13 + N32 - r3*E23
-    FDI12 = C2*E12 - S2*E22
-    # Joint 1
-    N31 = MX1R*VP21 - MY1R*VP11
-    NE31 = D6*E36 + D2*E32 + N31 - S6*NE16 - C6*NE26 - S2*NE12 - C2*NE22 - RL2*FDI12
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
-    GAM[2] = OFFSET3 + E33 + FV3*QP3 + FS3*np.sign(QP3)
-    GAM[3] = OFFSET4 + N34 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[4] = OFFSET6 + NE36 + FV6*QP6 + FS6*np.sign(QP6)
-    GAM[5] = OFFSET7 + NE37 + FV7*QP7 + FS7*np.sign(QP7)
-    GAM[6] = OFFSET8 + N38 + FV8*QP8 + FS8*np.sign(QP8)
-
-
-def _gravity_block(q, GAM, X, D2, RL2, GX, GZ):
-    """Fill GAM, shape (7, N), where it is not constant, from q (7, N)."""
+def _gravity_block(xp, q, GAM, X, D2, RL2, GX, GZ):
+    """Fill GAM, shape (7, N), from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     MX1R = X[1]
@@ -1593,18 +1377,18 @@ def _gravity_block(q, GAM, X, D2, RL2, GX, GZ):
     MY8 = X[62]
     OFFSET8 = X[66]
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    C7 = np.cos(q7)
-    S7 = np.sin(q7)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
+    C7 = xp.cos(q7)
+    S7 = xp.sin(q7)
+    C8 = xp.cos(q8)
+    S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Link 1
@@ -1678,24 +1462,24 @@ def _gravity_block(q, GAM, X, D2, RL2, GX, GZ):
     GAM[6] = OFFSET8 + N38
 
 
-def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
-    """Fill T, shape (8, 4, 4, N), where it is not constant, from q (7, N)."""
+def _frame_poses_block(xp, q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
+    """Fill T, shape (8, 4, 4, N), from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     th67 = q6 + q7
-    C67 = np.cos(th67)
-    S67 = np.sin(th67)
-    C8 = np.cos(q8)
-    S8 = np.sin(q8)
+    C67 = xp.cos(th67)
+    S67 = xp.sin(th67)
+    C8 = xp.cos(q8)
+    S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Joint axes Z and velocities V seen from link 4
@@ -1833,6 +1617,9 @@ def _frame_poses_block(q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
     T[7, 2, 1] = Z281
     T[7, 2, 2] = C67
     T[7, 2, 3] = P38
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
+    T[6, 3, 3] = T[7, 3, 3] = 1.0
 
 
 # Of the robot file: drives, limits and values, which no function above reads

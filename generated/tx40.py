@@ -1,11 +1,3 @@
-# Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
-# with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-# inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian at random states,
-# parameters and random constants agree with Lagrange's equations and products of frames to 1e-09;
-# SCHEMA, NAME, SOURCE_SHA256, JOINTS, CONSTANTS, BASE_PARAMETERS, STANDARD_PARAMETERS, NO_EFFECT,
-# FORMULAS, UNITS, STRUCTURE, ELEMENTS, LINKS, DRIVES, LIMITS, VALUES, HEADER, DEFAULTS with the
-# robot file.
-# sha256 of what follows: 92a4792d51f12e1c5ecc1d7185b027434530ca42d7fb8122e455c7247fcad46c
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics.
 
 GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.2.0.
@@ -73,13 +65,24 @@ Cost per sample
     regressor          355 multiplications, 263 additions, 6 sin, 6 cos
     inverse_dynamics   261 multiplications, 250 additions, 6 sin, 6 cos
     inertia_matrix     134 multiplications, 111 additions, 5 sin, 5 cos
-    bias               247 multiplications, 219 additions, 6 sin, 6 cos
     gravity            42 multiplications, 29 additions, 5 sin, 5 cos
     frame_poses        48 multiplications, 20 additions, 6 sin, 6 cos
 
 Arguments   q, qd, qdd, tau of shape (N, 6), or (6,) for one state: results then have no axis
             of samples; rad or m and seconds
             X of shape (60,) in the order of BASE_PARAMETERS; constants of the robot by keyword
+Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX, PyTorch, ...;
+            pip install array-api-compat), all float64 or all float32, with any axes before the
+            last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
+CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
+
+Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
+inverse_dynamics_derivatives at random states, parameters and random constants agree with
+Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+packages, by CasADi.
+sha256 of all but these lines: 551b767825307d97eac833ae39617303e40fa4016c9fef7fa6299914a16fae2a
 """
 
 import numpy as np
@@ -150,12 +153,18 @@ def store(N: int) -> Store:
     """Room for N samples, shape (60, 6, N): zeros and constants are written here, once.
     Reuse it: a fresh one costs page faults.
     """
-    zeros = np.zeros((60, 6, N)).view(Store)
-    zeros[3, 0] = zeros[13, 1] = zeros[24, 2] = zeros[35, 3] = zeros[46, 4] = zeros[57, 5] = 1.0
-    zeros.ready = True
-    return zeros
+    room = _constant(np.zeros((60, 6, N))).view(Store)
+    room.ready = True
+    return room
 
 
+def _constant(D):
+    """D with its constant entries."""
+    D[3, 0] = D[13, 1] = D[24, 2] = D[35, 3] = D[46, 4] = D[57, 5] = 1.0
+    return D
+
+
+# Arrays and their packages
 def _states(*arrays):
     """The states as rows of samples, shape (N, 6) each; ValueError unless all have shape
     (N, 6), or all (6,).
@@ -168,28 +177,210 @@ def _states(*arrays):
 
 
 def _parameters(X):
-    """X as an array; ValueError unless it has a value for each base parameter."""
-    X = np.asarray(X, dtype=float)
-    if X.shape != (60,):
+    """X; ValueError unless it has a value for each base parameter."""
+    if tuple(X.shape) != (60,):
         raise ValueError(f"X of shape {X.shape}; expected (60,) in the order of BASE_PARAMETERS")
     return X
 
 
-def _fill(block, result, states, *arguments):
-    """Run `block` over 4096 samples at a time; states (N, ...) enter as contiguous rows
+def _filled(block, result, states, arguments):
+    """`result` from `block`, 4096 samples at a time; states (N, ...) enter as contiguous rows
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
     B = max(N, 1) if N <= 8192 else 4096
     for t in range(0, N, B):
         rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(*rows, result[..., t:t + B], *arguments)
+        block(np, *rows, result[..., t:t + B], *arguments)
+    return result
 
 
-def _by_sample(result, q):
-    """Samples first; for a single state (n,) without them."""
-    result = np.moveaxis(result, -1, 0)
-    return result[0] if np.ndim(q) == 1 else result
+def _evaluated(block, shape, states, X, constants):
+    """The result of `block`, samples first: NumPy's is filled in place, that of another package
+    gathered from a table. X is empty where no parameter is read.
+    """
+    xp = _package(*states, *X)
+    if xp is not np:
+        return _gathered(xp, {}, block, shape, states, X, constants)
+    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    result = np.zeros((*shape, len(rows[0])))
+    _filled(block, result, rows, (*X, *constants))
+    result = result.transpose(-1, *range(len(shape)))
+    return result[0] if np.ndim(states[0]) == 1 else result
+
+
+def _gathered(xp, table, block, shape, states, X, constants):
+    """The result of `block` on a package whose arrays cannot be written to: it fills a `table`."""
+    block(xp, *map(xp.rows, states), table, *map(xp.parameters, X), *constants)
+    return xp.gathered(table, shape, states[0])
+
+
+_IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of another package
+
+
+def _package(*arrays):
+    """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
+    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
+        return np
+    if any(type(x).__module__.startswith("casadi") for x in arrays):
+        return _Symbols()
+    others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
+    if all(isinstance(x, np.ndarray | np.generic) for x in others):
+        return np if _IN_PLACE else _Arrays(np, arrays)
+    try:
+        from array_api_compat import array_namespace
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"arrays of {type(others[0]).__module__} need array_api_compat: "
+            "pip install array-api-compat"
+        ) from error
+    return _Arrays(array_namespace(*arrays), arrays)
+
+
+class _Arrays:
+    """Functions of an array package under NumPy's names, those of plain numbers by NumPy; TypeError
+    unless all `arrays` are float64, or all float32.
+    """
+
+    pi = np.pi
+
+    def __init__(self, package, arrays):
+        self.package, kinds = package, [x.dtype for x in arrays if hasattr(x, "dtype")]
+        if not any(all(x == kind for x in kinds) for kind in (package.float64, package.float32)):
+            kinds = ", ".join(sorted({*map(str, kinds)}))
+            raise TypeError(f"arrays of {kinds}; expected all float64, or all float32")
+
+    def __getattr__(self, name):
+        function = getattr(self.package, "pow" if name == "power" else name)
+
+        def of(x, *more, **how):
+            if isinstance(x, int | float):
+                return float(getattr(np, name)(x, *more))
+            return function(x, *more, **how)
+
+        return of
+
+    def sign(self, x):
+        """NaN where x is; unlike that of some packages it maps (torch.func.vmap)."""
+        where = self.package.where
+        return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0*x))
+
+    def maximum(self, x, zero):
+        return self.package.where(x < zero, zero*x, x)
+
+    def minimum(self, x, zero):
+        return self.package.where(x > zero, zero*x, x)
+
+    def rows(self, x):
+        """x[..., k], one by one."""
+        if x.shape[-1:] != (6,):
+            raise ValueError(f"state of shape {x.shape}; expected (..., 6)")
+        return [x[..., k] for k in range(6)]
+
+    def parameters(self, X):
+        _parameters(X)
+        return [X[k] for k in range(60)]
+
+    def gathered(self, table, shape, like):
+        """Entries by index as an array, samples first; zero where there is none."""
+        zero = self.package.zeros_like(like[..., 0])
+        entries = [table.get(k[0] if len(k) == 1 else k, 0.0) for k in np.ndindex(*shape)]
+        entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
+        return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
+
+    def solve(self, A, b):
+        return self.package.linalg.solve(A, b[..., None])[..., 0]
+
+
+class _Symbols:
+    """Functions of CasADi under NumPy's names, on columns."""
+
+    def __init__(self):
+        import casadi as ca
+
+        self.package, self.maximum, self.minimum, self.rows = ca, ca.fmax, ca.fmin, ca.vertsplit
+        self.parameters = ca.vertsplit
+
+    def __getattr__(self, name):
+        return getattr(self.package, name)
+
+    def stack(self, entries):
+        return self.package.vertcat(*entries)
+
+    def zeros_like(self, x):
+        return self.package.SX(*x.shape)
+
+    def matrix_transpose(self, x):
+        return x.T
+
+    def gathered(self, table, shape, like):
+        """Entries by index as a matrix, or as matrices; those that are zero stay structural."""
+        if len(shape) == 3:
+            first = [{k[1:]: x for k, x in table.items() if k[0] == i} for i in range(shape[0])]
+            return [self.gathered(entries, shape[1:], like) for entries in first]
+        matrix = self.package.SX(*(*shape, 1)[:2])
+        for place, x in table.items():
+            matrix[place] = x
+        return matrix
+
+    def solve(self, A, b):
+        """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
+        n = len(JOINTS)
+        L, d, x = self.package.SX.eye(n), [A[j, j] for j in range(n)], self.rows(b)
+        for j in range(n):
+            for k in range(j):
+                d[j] -= L[j, k]**2*d[k]
+                x[j] -= L[j, k]*x[k]
+            for i in range(j + 1, n):
+                L[i, j] = (A[i, j] - sum(L[i, k]*L[j, k]*d[k] for k in range(j)))/d[j]
+        x = [x[j]/d[j] for j in range(n)]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                x[j] -= L[i, j]*x[i]
+        return self.stack(x)
+
+
+def casadi(name: str, *, frame: int | None = None) -> "casadi.Function":
+    """casadi.Function of a function of this module, or, as NAME_derivatives, of the Jacobians of
+    its results by each column that it reads, d<result>_d<column>; `frame` is that of a jacobian.
+
+    Inputs are columns q, qd, qdd, tau (6,), X (60,), standard (86,), then the constants. By name,
+    a constant that is not given has its value in CONSTANTS, another input is nan. Samples stand
+    side by side, q (6, N); the results then do so too. The derivative of sign(qd) is zero.
+    """
+    import casadi as ca
+
+    of = name.removesuffix("_derivatives")
+    if of not in _OUTPUTS:
+        raise ValueError(f"casadi({name!r}); there is {', '.join(_OUTPUTS)}, and NAME_derivatives")
+    columns, names = [text.split() for text in _OUTPUTS[of]]
+    sizes = {"X": 60, "standard": 86}
+    columns = {x: ca.SX.sym(x, sizes.get(x, 6)) for x in columns}
+    inputs = columns | {x: ca.SX.sym(x) for x in CONSTANTS}
+    given = {} if frame is None else {"frame": frame}
+    value = globals()[of](**inputs, **given)
+    results = dict(zip(names, value if isinstance(value, list | tuple) else [value]))
+    if of != name:
+        results = {
+            f"d{y}_d{x}": ca.jacobian(results[y], columns[x]) for y in names for x in columns
+        }
+    default = {"default_in": [*[np.nan]*len(columns), *CONSTANTS.values()]}
+    return ca.Function(
+        name, [*inputs.values()], [*results.values()], [*inputs], [*results], default
+    )
+
+
+_OUTPUTS = {  # columns, results
+    'base_parameters': ('standard', 'X'),
+    'regressor': ('q qd qdd', 'D'),
+    'inverse_dynamics': ('q qd qdd X', 'GAM'),
+    'inertia_matrix': ('q X', 'A'),
+    'bias': ('q qd X', 'GAM'),
+    'gravity': ('q X', 'GAM'),
+    'forward_dynamics': ('q qd tau X', 'qdd'),
+    'frame_poses': ('q', 'T1 T2 T3 T4 T5 T6'),
+    'jacobian': ('q', 'J'),
+}
 
 
 def elements(*, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> dict:
@@ -218,13 +409,17 @@ ELEMENTS = elements()
 
 
 def base_parameters(
-    standard: np.ndarray, *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    standard: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """X, shape (60,), from the 86 standard parameters: a mapping by name, or a vector in the
     order of STANDARD_PARAMETERS.
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
+        xp = _package(*standard)
+    else:
+        xp = _package(standard)
+        standard = standard if xp is np else [standard[k] for k in range(86)]
     (
         _, _, _, _, _, ZZ1, _, _, _, _, Ia1, FV1, FS1, OFFSET1, XX2, XY2, XZ2, YY2, YZ2, ZZ2,
         MX2, MY2, _, _, Ia2, FV2, FS2, OFFSET2, XX3, XY3, XZ3, YY3, YZ3, ZZ3, MX3, MY3, MZ3, M3,
@@ -247,7 +442,7 @@ def base_parameters(
     ZZ5R = ZZ5 + YY6
     MY5R = MY5 - MZ6
     XX6R = XX6 - YY6
-    return np.array([
+    return (np.array if xp is np else xp.stack)([
         ZZ1R, FV1, FS1, OFFSET1, XX2R, XY2, XZ2R, YZ2, ZZ2R, MX2R, MY2, FV2, FS2, OFFSET2, XX3R,
         XY3, XZ3, YZ3, ZZ3R, MX3, MY3R, Ia3, FV3, FS3, OFFSET3, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4,
         MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5, OFFSET5,
@@ -256,189 +451,184 @@ def base_parameters(
 
 
 def regressor(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D3: float = 0.225,
+    RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """D of Gamma = D X. Shape (N, 6, 60).
 
     A view on one store of shape (60, 6, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    filled = _filled_store(q, qd, qdd, out, D3, RL4, g).transpose(2, 1, 0)
-    return filled[0] if np.ndim(q) == 1 else filled
+    xp, filled = _stored(q, qd, qdd, out, (D3, RL4, g))
+    if xp is not np:
+        return filled
+    return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
 def observation_matrix(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, *, out: Store | None = None,
-    D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", *, out: Store | None = None, D3: float = 0.225,
+    RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """W of Y = W X + rho, shape (6*N, 60), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    return _filled_store(q, qd, qdd, out, D3, RL4, g).reshape(60, -1).T
+    xp, filled = _stored(q, qd, qdd, out, (D3, RL4, g))
+    if xp is not np:
+        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 60))
+    return filled.reshape(60, -1).T
 
 
-def _ready(out, N):
-    """`out`, or a new store of N samples, as an array; ValueError unless `store(N)` made it."""
+def _stored(q, qd, qdd, out, constants):
+    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 6, 60)."""
+    states = (q, qd, qdd)
+    xp = _package(*states)
+    if xp is not np:
+        if out is not None:
+            raise ValueError("out: a store holds NumPy's arrays alone")
+        constants = constants
+        D = _gathered(xp, _constant({}), _regressor_block, (60, 6), states, (), constants)
+        return xp, xp.matrix_transpose(D)
+    states = _states(*states)
+    N = len(states[0])
     out = store(N) if out is None else out
     if not (isinstance(out, Store) and out.ready and out.shape == (60, 6, N)):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(60, 6, N)}, found {kind}")
-    return out.view(np.ndarray)
-
-
-def _filled_store(q, qd, qdd, out, D3, RL4, g):
-    """`out`, or a new store, filled."""
-    states = _states(q, qd, qdd)
-    result = _ready(out, len(states[0]))
-    _fill(_regressor_block, result, states, D3, RL4, g)
-    return result
+    D = out.view(np.ndarray)
+    return xp, _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
-    q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, X: np.ndarray, *, D3: float = 0.225,
-    RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", qd: "Array", qdd: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225,
+    g: float = 9.81
+) -> "Array":
     """Joint torques Gamma = A qdd + C qd + Q + friction.
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q, qd, qdd)
-    result = np.zeros((6, len(states[0])))
-    _fill(_inverse_dynamics_block, result, states, X, D3, RL4, g)
-    return _by_sample(result, q)
+    return _evaluated(_inverse_dynamics_block, (6,), (q, qd, qdd), (X,), (D3, RL4, g))
 
 
 def inertia_matrix(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """A(q), actuators included: column i is Gamma for a unit acceleration of joint i from rest.
 
     Shape (N, 6, 6).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((6, 6, len(states[0])))
-    _fill(_inertia_matrix_block, result, states, X, D3, RL4)
-    return _by_sample(result, q)
+    return _evaluated(_inertia_matrix_block, (6, 6), (q,), (X,), (D3, RL4))
 
 
 def bias(
-    q: np.ndarray, qd: np.ndarray, X: np.ndarray, *, D3: float = 0.225, RL4: float = 0.225,
+    q: "Array", qd: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225,
     g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset.
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q, qd)
-    result = np.zeros((6, len(states[0])))
-    _fill(_bias_block, result, states, X, D3, RL4, g)
-    return _by_sample(result, q)
+    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, D3=D3, RL4=RL4, g=g)
 
 
 def gravity(
-    q: np.ndarray, X: np.ndarray, *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+    q: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
+) -> "Array":
     """Gamma at rest without friction: gravity, offset and springs (a base parameter may mix them).
 
     Shape (N, 6).
     """
-    X = _parameters(X)
-    states = _states(q)
-    result = np.zeros((6, len(states[0])))
-    _fill(_gravity_block, result, states, X, g)
-    return _by_sample(result, q)
+    return _evaluated(_gravity_block, (6,), (q,), (X,), (g,))
 
 
-def frame_poses(
-    q: np.ndarray, *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
+def frame_poses(q: "Array", *, D3: float = 0.225, RL4: float = 0.225, g: float = 9.81) -> "Array":
     """Homogeneous transform of every frame j in frame 0, at index j - 1.
 
     Shape (N, 6, 4, 4).
     """
-    states = _states(q)
-    result = np.zeros((6, 4, 4, len(states[0])))
-    result[0, 2, 2] = result[0, 3, 3] = result[1, 3, 3] = result[2, 3, 3] = result[3, 3, 3] = 1.0
-    result[4, 3, 3] = result[5, 3, 3] = 1.0
-    _fill(_frame_poses_block, result, states, D3, RL4)
-    return _by_sample(result, q)
+    return _evaluated(_frame_poses_block, (6, 4, 4), (q,), (), (D3, RL4))
 
 
 def forward_dynamics(
-    q: np.ndarray, qd: np.ndarray, tau: np.ndarray, X: np.ndarray, *, D3: float = 0.225,
-    RL4: float = 0.225, g: float = 9.81
-) -> np.ndarray:
-    """Qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
-    _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - bias(q, qd, X, D3=D3, RL4=RL4, g=g)
-    inertia = inertia_matrix(q, X, D3=D3, RL4=RL4)
-    return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    q: "Array", qd: "Array", tau: "Array", X: "Array", *, D3: float = 0.225, RL4: float = 0.225,
+    g: float = 9.81
+) -> "Array":
+    """qdd = A(q)**-1 (tau - bias). Shape (N, 6)."""
+    xp = _package(q, qd, tau, X)
+    if xp is np:
+        _states(q, qd, tau)
+        tau = np.asarray(tau, dtype=float)
+    elif tau.shape != q.shape:
+        raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
+    rest = tau - bias(q, qd, X, D3=D3, RL4=RL4, g=g)
+    inertia = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g)
+    if xp is np:
+        return np.linalg.solve(inertia, rest[..., None])[..., 0]
+    return xp.solve(inertia, rest)
 
 
 def jacobian(
-    q: np.ndarray, *, frame: int | None = None, D3: float = 0.225, RL4: float = 0.225,
+    q: "Array", *, frame: int | None = None, D3: float = 0.225, RL4: float = 0.225,
     g: float = 9.81
-) -> np.ndarray:
+) -> "Array":
     """J: velocity of the origin of `frame` (default: the last), then its angular velocity, in
     frame 0, per joint rate. Shape (N, 6, 6).
     """
     frame = 6 if frame is None else frame
-    poses = frame_poses(q, D3=D3, RL4=RL4).reshape(-1, 6, 4, 4)
-    result = _jacobian(_paths()[frame], poses, frame)
-    return result[0] if np.ndim(q) == 1 else result
+    if frame not in range(1, 7):
+        raise ValueError(f"frame {frame!r}; expected 1 to 6")
+    return _evaluated(_jacobian_block, (6, 6), (q,), (), (frame, (D3, RL4), ()))
 
 
-def _jacobian(path, T, frame):
-    """Columns of the joints on `path`, shape (N, 6, 6), from the poses T of all frames."""
-    J, P = np.zeros((len(T), 6, 6)), T[:, frame - 1, :3, 3]
-    for j, sigma, rates in path:
-        z = T[:, j - 1, :3, 2]
-        v, w = (z, np.zeros_like(z)) if sigma else (np.cross(z, P - T[:, j - 1, :3, 3]), z)
-        for k, rate in rates:
-            J[:, :3, k] += rate * v
-            J[:, 3:, k] += rate * w
-    return J
+def _jacobian_block(xp, q, J, frame, posing, moving):
+    """Fill J, shape (6, 6, N): z x (P_frame - P_j) and z of the joints below the frame."""
+    T = dict.fromkeys(np.ndindex(6, 4, 4), 0.0)
+    _frame_poses_block(xp, q, T, *posing)
+    joints, columns, j = _moving(xp, *moving), {}, frame
+    while j:
+        antecedent, sigma, rates = joints[j]
+        z = [T[j - 1, k, 2] for k in range(3)]
+        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        if sigma:
+            twist = [*z, 0.0, 0.0, 0.0]
+        for column, rate in rates:
+            for k in range(6):
+                columns[k, column] = columns.get((k, column), 0.0) + rate*twist[k]
+        j = antecedent
+    for place, value in columns.items():
+        J[place] = value
 
 
-def _paths():
-    """{frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each frame and
-    how the joints in the columns move them.
+def _moving(xp):
+    """{frame: (antecedent, sigma, ((column, rate), ...))}: how the joints in the columns move the
+    joint of each frame.
     """
     return {
-        1: ((1, 0, ((0, 1.0),)),), 2: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)),),
-        3: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)),),
-        4: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)),),
-        5: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5,
-            0, ((4, 1.0),)),),
-        6: ((1, 0, ((0, 1.0),)), (2, 0, ((1, 1.0),)), (3, 0, ((2, 1.0),)), (4, 0, ((3, 1.0),)), (5,
-            0, ((4, 1.0),)), (6, 0, ((5, 1.0),)),),
+        1: (0, 0, ((0, 1.0),)), 2: (1, 0, ((1, 1.0),)), 3: (2, 0, ((2, 1.0),)),
+        4: (3, 0, ((3, 1.0),)), 5: (4, 0, ((4, 1.0),)), 6: (5, 0, ((5, 1.0),)),
     }
 
 
-def _regressor_block(q, qd, qdd, D, D3, RL4, g):
-    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+def _motion(xp, q, qd, qdd, D3, RL4, g):
+    """Velocities and accelerations of the links, which regressor and inverse_dynamics share."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
     th23 = q2 + q3
-    C23 = np.cos(th23)
-    S23 = np.sin(th23)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Link 2
     W12 = -S2*QP1
     W22 = -C2*QP1
@@ -573,8 +763,43 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     VP16 = C6*VP15 + S6*VP24
     VP26 = C6*VP24 - S6*VP15
     # Friction, actuators
+    GAM6a = QDP5 + QDP6
+    GAM1a = xp.sign(QP1)
+    GAM2a = xp.sign(QP2)
+    GAM3a = xp.sign(QP3)
+    GAM4a = xp.sign(QP4)
+    GAM5a = xp.sign(QP5)
+    GAM6b = xp.sign(QP6)
     QPFSM6 = QP5 + QP6
-    DG5FSM6a = np.sign(QPFSM6)
+    GAM5b = xp.sign(QPFSM6)
+    return (
+        C2, S2, C3, S3, C23, S23, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV232, WP12, DV132,
+        DV122, DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1,
+        DV233, WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323,
+        VSP33, VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124,
+        U134, U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235,
+        DW235, DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16,
+        WP36, DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236,
+        U316, U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
+    )
+
+
+def _regressor_block(xp, q, qd, qdd, D, D3, RL4, g):
+    """Fill D, shape (60, 6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+    # Inputs
+    QP1, QP2, QP3, QP4, QP5, QP6 = qd
+    QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
+    # Motion of the links
+    (
+        C2, S2, C3, S3, C23, S23, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, _, WP12, DV132, DV122,
+        DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1, _,
+        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
+        VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124, U134,
+        U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235, DW235,
+        DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16, WP36,
+        DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236, U316,
+        U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
+    ) = _motion(xp, q, qd, qdd, D3, RL4, g)
     # Joint axes Z and velocities V seen from link 3
     V331 = D3*C2
     V132 = D3*S3
@@ -648,7 +873,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     # Joint 1
     D[0, 0] = QDP1                                                    # DG1ZZ1
     D[1, 0] = QP1                                                     # DG1FV1
-    D[2, 0] = np.sign(QP1)                                            # DG1FS1
+    D[2, 0] = GAM1a                                                   # DG1FS1
     D[4, 0] = -S2*WP12 - C2*DV132                                     # DG1XX2
     D[5, 0] = S2*U312 - C2*U322                                       # DG1XY2
     D[6, 0] = -S2*U212 - C2*DW312                                     # DG1XZ2
@@ -689,7 +914,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     D[9, 1] = VP22                                         # DG2MX2
     D[10, 1] = -VP12                                       # DG2MY2
     D[11, 1] = QP2                                         # DG2FV2
-    D[12, 1] = np.sign(QP2)                                # DG2FS2
+    D[12, 1] = GAM2a                                       # DG2FS2
     D[14, 1] = -DV123                                      # DG2XX3
     D[15, 1] = DW123                                       # DG2XY3
     D[16, 1] = -S23QDP1                                    # DG2XZ3
@@ -728,7 +953,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     D[20, 2] = -VP13                                       # DG3MY3
     D[21, 2] = QDP3                                        # DG3Ia3
     D[22, 2] = QP3                                         # DG3FV3
-    D[23, 2] = np.sign(QP3)                                # DG3FS3
+    D[23, 2] = GAM3a                                       # DG3FS3
     D[25, 2] = DN2XX4                                      # DG3XX4
     D[26, 2] = DN2XY4                                      # DG3XY4
     D[27, 2] = DN2XZ4                                      # DG3XZ4
@@ -760,7 +985,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     D[31, 3] = -VP14                             # DG4MY4
     D[32, 3] = QDP4                              # DG4Ia4
     D[33, 3] = QP4                               # DG4FV4
-    D[34, 3] = np.sign(QP4)                      # DG4FS4
+    D[34, 3] = GAM4a                             # DG4FS4
     D[36, 3] = -S5*WP15 - C5DV135                # DG4XX5
     D[37, 3] = S5*U315 - C5*U325                 # DG4XY5
     D[38, 3] = -S5*U215 - C5*DW315               # DG4XZ5
@@ -785,7 +1010,7 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     D[42, 4] = -VP15               # DG5MY5
     D[43, 4] = QDP5                # DG5Ia5
     D[44, 4] = QP5                 # DG5FV5
-    D[45, 4] = np.sign(QP5)        # DG5FS5
+    D[45, 4] = GAM5a               # DG5FS5
     D[47, 4] = S6*WP16 + C6DV136   # DG5XX6
     D[48, 4] = C6*U326 - S6*U316   # DG5XY6
     D[49, 4] = S6*U216 + C6*DW316  # DG5XZ6
@@ -795,26 +1020,25 @@ def _regressor_block(q, qd, qdd, D, D3, RL4, g):
     D[53, 4] = -S6*VP25            # DG5MY6
     D[54, 4] = QDP6                # DG5Ia6
     D[58, 4] = QP6                 # DG5FVM6
-    D[59, 4] = DG5FSM6a            # DG5FSM6
+    D[59, 4] = GAM5b               # DG5FSM6
     # Joint 6
-    D[47, 5] = -DV126        # DG6XX6
-    D[48, 5] = DW126         # DG6XY6
-    D[49, 5] = -U236         # DG6XZ6
-    D[50, 5] = U136          # DG6YZ6
-    D[51, 5] = WP36          # DG6ZZ6
-    D[52, 5] = VP26          # DG6MX6
-    D[53, 5] = -VP16         # DG6MY6
-    D[54, 5] = QDP5 + QDP6   # DG6Ia6
-    D[55, 5] = QP6           # DG6FV6
-    D[56, 5] = np.sign(QP6)  # DG6FS6
-    D[58, 5] = QP5           # DG6FVM6
-    D[59, 5] = DG5FSM6a      # DG6FSM6
+    D[47, 5] = -DV126  # DG6XX6
+    D[48, 5] = DW126   # DG6XY6
+    D[49, 5] = -U236   # DG6XZ6
+    D[50, 5] = U136    # DG6YZ6
+    D[51, 5] = WP36    # DG6ZZ6
+    D[52, 5] = VP26    # DG6MX6
+    D[53, 5] = -VP16   # DG6MY6
+    D[54, 5] = GAM6a   # DG6Ia6
+    D[55, 5] = QP6     # DG6FV6
+    D[56, 5] = GAM6b   # DG6FS6
+    D[58, 5] = QP5     # DG6FVM6
+    D[59, 5] = GAM5b   # DG6FSM6
 
 
-def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, RL4, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N); qdd (6, N)."""
+def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X, D3, RL4, g):
+    """Fill GAM, shape (6, N), from q (6, N); qd (6, N); qdd (6, N)."""
     # Inputs
-    q2, q3, q4, q5, q6 = q[1:]
     QP1, QP2, QP3, QP4, QP5, QP6 = qd
     QDP1, QDP2, QDP3, QDP4, QDP5, QDP6 = qdd
     (
@@ -823,153 +1047,17 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, RL4, g):
         MY4R, Ia4, FV4, FS4, OFFSET4, XX5R, XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, FV5, FS5,
         OFFSET5, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, FV6, FS6, OFFSET6, FVM6, FSM6
     ) = X
-    # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    th23 = q2 + q3
-    C23 = np.cos(th23)
-    S23 = np.sin(th23)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    S2QDP1 = S2*QDP1
-    C2QDP1 = C2*QDP1
-    DV232 = QP2*W22
-    WP12 = DV232 - S2QDP1
-    DV132 = QP2*W12
-    WP22 = -C2QDP1 - DV132
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U122 = DV122 - QDP2
-    U212 = QDP2 + DV122
-    U312 = DV132 - WP22
-    U322 = DV232 + WP12
-    VP12 = -g*S2
-    VP22 = -g*C2
-    # Link 3
-    W33 = QP2 + QP3
-    WP33 = QDP2 + QDP3
-    W13 = -S23*QP1
-    W23 = -C23*QP1
-    S23QDP1 = S23*QDP1
-    C23QDP1 = C23*QDP1
-    DV233 = W33*W23
-    WP13 = DV233 - S23QDP1
-    DV133 = W33*W13
-    WP23 = -C23QDP1 - DV133
-    DV113 = W13**2
-    DV123 = W13*W23
-    DV223 = W23**2
-    DV333 = W33**2
-    DW233 = DV223 - DV333
-    DW313 = DV333 - DV113
-    DW123 = DV113 - DV223
-    U113 = -DV223 - DV333
-    U123 = DV123 - WP33
-    U213 = WP33 + DV123
-    U223 = -DV113 - DV333
-    U313 = DV133 - WP23
-    U323 = DV233 + WP13
-    VSP33 = D3*U312
-    VSP13 = VP12 + D3*U112
-    VSP23 = VP22 + D3*U212
-    VP13 = C3*VSP13 + S3*VSP23
-    VP23 = C3*VSP23 - S3*VSP13
-    # Link 4
-    W14 = C4*W13 + S4*W33
-    W24 = C4*W33 - S4*W13
-    W34 = QP4 - W23
-    WP14 = C4*WP13 + S4*WP33 + QP4*W24
-    WP24 = C4*WP33 - S4*WP13 - QP4*W14
-    WP34 = QDP4 - WP23
-    DV114 = W14**2
-    DV124 = W14*W24
-    DV134 = W14*W34
-    DV224 = W24**2
-    DV234 = W24*W34
-    DV334 = W34**2
-    DW234 = DV224 - DV334
-    DW314 = DV334 - DV114
-    DW124 = DV114 - DV224
-    U114 = -DV224 - DV334
-    U124 = DV124 - WP34
-    U134 = WP24 + DV134
-    U214 = WP34 + DV124
-    U224 = -DV114 - DV334
-    U234 = DV234 - WP14
-    U314 = DV134 - WP24
-    U324 = WP14 + DV234
-    VSP14 = VP13 - RL4*U123
-    VSP24 = VP23 - RL4*U223
-    VSP34 = VSP33 - RL4*U323
-    VP14 = C4*VSP14 + S4*VSP34
-    VP24 = C4*VSP34 - S4*VSP14
-    # Link 5
-    W15 = C5*W14 - S5*W34
-    W25 = -C5*W34 - S5*W14
-    W35 = QP5 + W24
-    WP15 = C5*WP14 + QP5*W25 - S5*WP34
-    WP25 = -C5*WP34 - S5*WP14 - QP5*W15
-    WP35 = QDP5 + WP24
-    DV115 = W15**2
-    DV125 = W15*W25
-    DV135 = W15*W35
-    DV225 = W25**2
-    DV235 = W25*W35
-    DV335 = W35**2
-    DW235 = DV225 - DV335
-    DW315 = DV335 - DV115
-    DW125 = DV115 - DV225
-    U115 = -DV225 - DV335
-    U125 = DV125 - WP35
-    U135 = WP25 + DV135
-    U215 = WP35 + DV125
-    U225 = -DV115 - DV335
-    U235 = DV235 - WP15
-    U315 = DV135 - WP25
-    U325 = WP15 + DV235
-    VP15 = C5*VP14 + S5*VSP24
-    VP25 = C5*VSP24 - S5*VP14
-    # Link 6
-    W16 = C6*W15 + S6*W35
-    W26 = C6*W35 - S6*W15
-    W36 = QP6 - W25
-    WP16 = C6*WP15 + S6*WP35 + QP6*W26
-    WP26 = C6*WP35 - S6*WP15 - QP6*W16
-    WP36 = QDP6 - WP25
-    DV116 = W16**2
-    DV126 = W16*W26
-    DV136 = W16*W36
-    DV226 = W26**2
-    DV236 = W26*W36
-    DV336 = W36**2
-    DW236 = DV226 - DV336
-    DW316 = DV336 - DV116
-    DW126 = DV116 - DV226
-    U116 = -DV226 - DV336
-    U126 = DV126 - WP36
-    U136 = WP26 + DV136
-    U216 = WP36 + DV126
-    U226 = -DV116 - DV336
-    U236 = DV236 - WP16
-    U316 = DV136 - WP26
-    U326 = WP16 + DV236
-    VP16 = C6*VP15 + S6*VP24
-    VP26 = C6*VP24 - S6*VP15
+    # Motion of the links
+    (
+        C2, S2, C3, S3, _, _, C4, S4, C5, S5, C6, S6, S2QDP1, C2QDP1, DV232, WP12, DV132, DV122,
+        DW232, DW312, DW122, U122, U212, U312, U322, VP12, VP22, WP33, S23QDP1, C23QDP1, DV233,
+        WP13, DV133, DV123, DW233, DW313, DW123, U113, U123, U213, U223, U313, U323, VSP33,
+        VP13, VP23, WP14, WP34, DV124, DV134, DV234, DW234, DW314, DW124, U114, U124, U134,
+        U214, U224, U234, U314, U324, VSP24, VP14, VP24, WP15, WP35, DV125, DV135, DV235, DW235,
+        DW315, DW125, U115, U125, U135, U215, U225, U235, U315, U325, VP15, VP25, WP16, WP36,
+        DV126, DV136, DV236, DW236, DW316, DW126, U116, U126, U136, U216, U226, U236, U316,
+        U326, VP16, VP26, GAM6a, GAM1a, GAM2a, GAM3a, GAM4a, GAM5a, GAM6b, GAM5b
+    ) = _motion(xp, q, qd, qdd, D3, RL4, g)
     # Joint 6
     F16 = MX6*U116 + MY6*U126
     F26 = MX6*U216 + MY6*U226
@@ -1034,19 +1122,18 @@ def _inverse_dynamics_block(q, qd, qdd, GAM, X, D3, RL4, g):
     N31 = ZZ1R*QDP1
     NE31 = N31 - S2*NE12 - C2*NE22
     # Friction, actuators
-    QPFSM6 = QP5 + QP6
-    GAM5a = FSM6*np.sign(QPFSM6)
+    GAM5bFSM6 = FSM6*GAM5b
     # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
-    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*np.sign(QP3)
-    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*np.sign(QP5) + FVM6*QP6 + GAM5a
-    GAM[5] = OFFSET6 + N36 + Ia6*(QDP5 + QDP6) + FV6*QP6 + FS6*np.sign(QP6) + FVM6*QP5 + GAM5a
+    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*GAM1a
+    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*GAM2a
+    GAM[2] = OFFSET3 + NE33 + Ia3*QDP3 + FV3*QP3 + FS3*GAM3a
+    GAM[3] = OFFSET4 + NE34 + Ia4*QDP4 + FV4*QP4 + FS4*GAM4a
+    GAM[4] = OFFSET5 + NE35 + Ia5*QDP5 + Ia6*QDP6 + FV5*QP5 + FS5*GAM5a + FVM6*QP6 + GAM5bFSM6
+    GAM[5] = OFFSET6 + N36 + Ia6*GAM6a + FV6*QP6 + FS6*GAM6b + FVM6*QP5 + GAM5bFSM6
 
 
-def _inertia_matrix_block(q, A, X, D3, RL4):
-    """Fill A, shape (6, 6, N), where it is not constant, from q (6, N)."""
+def _inertia_matrix_block(xp, q, A, X, D3, RL4):
+    """Fill A, shape (6, 6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
     ZZ1R = X[0]
@@ -1088,16 +1175,16 @@ def _inertia_matrix_block(q, A, X, D3, RL4):
     MY6 = X[53]
     Ia6 = X[54]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Composite link 6
     AS16 = MX6*C6 - MY6*S6
     AS36 = MX6*S6 + MY6*C6
@@ -1222,272 +1309,8 @@ def _inertia_matrix_block(q, A, X, D3, RL4):
     A[5, 5] = ZZ6 + Ia6
 
 
-def _bias_block(q, qd, GAM, X, D3, RL4, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N); qd (6, N)."""
-    # Inputs
-    q2, q3, q4, q5, q6 = q[1:]
-    QP1, QP2, QP3, QP4, QP5, QP6 = qd
-    FV1 = X[1]
-    FS1 = X[2]
-    OFFSET1 = X[3]
-    XX2R = X[4]
-    XY2 = X[5]
-    XZ2R = X[6]
-    YZ2 = X[7]
-    ZZ2R = X[8]
-    MX2R = X[9]
-    MY2 = X[10]
-    FV2 = X[11]
-    FS2 = X[12]
-    OFFSET2 = X[13]
-    XX3R = X[14]
-    XY3 = X[15]
-    XZ3 = X[16]
-    YZ3 = X[17]
-    ZZ3R = X[18]
-    MX3 = X[19]
-    MY3R = X[20]
-    FV3 = X[22]
-    FS3 = X[23]
-    OFFSET3 = X[24]
-    XX4R = X[25]
-    XY4 = X[26]
-    XZ4 = X[27]
-    YZ4 = X[28]
-    ZZ4R = X[29]
-    MX4 = X[30]
-    MY4R = X[31]
-    FV4 = X[33]
-    FS4 = X[34]
-    OFFSET4 = X[35]
-    XX5R = X[36]
-    XY5 = X[37]
-    XZ5 = X[38]
-    YZ5 = X[39]
-    ZZ5R = X[40]
-    MX5 = X[41]
-    MY5R = X[42]
-    FV5 = X[44]
-    FS5 = X[45]
-    OFFSET5 = X[46]
-    XX6R = X[47]
-    XY6 = X[48]
-    XZ6 = X[49]
-    YZ6 = X[50]
-    ZZ6 = X[51]
-    MX6 = X[52]
-    MY6 = X[53]
-    FV6 = X[55]
-    FS6 = X[56]
-    OFFSET6 = X[57]
-    FVM6 = X[58]
-    FSM6 = X[59]
-    # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    th23 = q2 + q3
-    C23 = np.cos(th23)
-    S23 = np.sin(th23)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
-    # Link 2
-    W12 = -S2*QP1
-    W22 = -C2*QP1
-    DV232 = QP2*W22
-    DV132 = QP2*W12
-    DV112 = W12**2
-    DV122 = W12*W22
-    DV222 = W22**2
-    DV332 = QP2**2
-    DW232 = DV222 - DV332
-    DW312 = DV332 - DV112
-    DW122 = DV112 - DV222
-    U112 = -DV222 - DV332
-    U312 = 2*DV132
-    U322 = 2*DV232
-    VP12 = -g*S2
-    VP22 = -g*C2
-    # Link 3
-    W33 = QP2 + QP3
-    W13 = -S23*QP1
-    W23 = -C23*QP1
-    DV233 = W33*W23
-    DV133 = W33*W13
-    DV113 = W13**2
-    DV123 = W13*W23
-    DV223 = W23**2
-    DV333 = W33**2
-    DW233 = DV223 - DV333
-    DW313 = DV333 - DV113
-    DW123 = DV113 - DV223
-    U113 = -DV223 - DV333
-    U223 = -DV113 - DV333
-    U313 = 2*DV133
-    U323 = 2*DV233
-    VSP33 = D3*U312
-    VSP13 = VP12 + D3*U112
-    VSP23 = VP22 + D3*DV122
-    VP13 = C3*VSP13 + S3*VSP23
-    VP23 = C3*VSP23 - S3*VSP13
-    # Link 4
-    W14 = C4*W13 + S4*W33
-    W24 = C4*W33 - S4*W13
-    W34 = QP4 - W23
-    WP14 = C4*DV233 + QP4*W24
-    WP24 = -S4*DV233 - QP4*W14
-    DV114 = W14**2
-    DV124 = W14*W24
-    DV134 = W14*W34
-    DV224 = W24**2
-    DV234 = W24*W34
-    DV334 = W34**2
-    DW234 = DV224 - DV334
-    DW314 = DV334 - DV114
-    DW124 = DV114 - DV224
-    U114 = -DV224 - DV334
-    U124 = DV124 - DV133
-    U134 = WP24 + DV134
-    U214 = DV133 + DV124
-    U224 = -DV114 - DV334
-    U234 = DV234 - WP14
-    U314 = DV134 - WP24
-    U324 = WP14 + DV234
-    VSP14 = VP13 - RL4*DV123
-    VSP24 = VP23 - RL4*U223
-    VSP34 = VSP33 - RL4*U323
-    VP14 = C4*VSP14 + S4*VSP34
-    VP24 = C4*VSP34 - S4*VSP14
-    # Link 5
-    W15 = C5*W14 - S5*W34
-    W25 = -C5*W34 - S5*W14
-    W35 = QP5 + W24
-    WP15 = C5*WP14 + QP5*W25 - S5*DV133
-    WP25 = -C5*DV133 - S5*WP14 - QP5*W15
-    DV115 = W15**2
-    DV125 = W15*W25
-    DV135 = W15*W35
-    DV225 = W25**2
-    DV235 = W25*W35
-    DV335 = W35**2
-    DW235 = DV225 - DV335
-    DW315 = DV335 - DV115
-    DW125 = DV115 - DV225
-    U115 = -DV225 - DV335
-    U125 = DV125 - WP24
-    U135 = WP25 + DV135
-    U215 = WP24 + DV125
-    U225 = -DV115 - DV335
-    U235 = DV235 - WP15
-    U315 = DV135 - WP25
-    U325 = WP15 + DV235
-    VP15 = C5*VP14 + S5*VSP24
-    VP25 = C5*VSP24 - S5*VP14
-    # Link 6
-    W16 = C6*W15 + S6*W35
-    W26 = C6*W35 - S6*W15
-    W36 = QP6 - W25
-    WP16 = C6*WP15 + S6*WP24 + QP6*W26
-    WP26 = C6*WP24 - S6*WP15 - QP6*W16
-    DV116 = W16**2
-    DV126 = W16*W26
-    DV136 = W16*W36
-    DV226 = W26**2
-    DV236 = W26*W36
-    DV336 = W36**2
-    DW236 = DV226 - DV336
-    DW316 = DV336 - DV116
-    DW126 = DV116 - DV226
-    U116 = -DV226 - DV336
-    U126 = WP25 + DV126
-    U136 = WP26 + DV136
-    U216 = DV126 - WP25
-    U226 = -DV116 - DV336
-    U236 = DV236 - WP16
-    U316 = DV136 - WP26
-    U326 = WP16 + DV236
-    VP16 = C6*VP15 + S6*VP24
-    VP26 = C6*VP24 - S6*VP15
-    # Joint 6
-    F16 = MX6*U116 + MY6*U126
-    F26 = MX6*U216 + MY6*U226
-    F36 = MX6*U316 + MY6*U326
-    N16 = XX6R*WP16 + ZZ6*DV236 + YZ6*DW236 + XZ6*U216 - XY6*U316 - MY6*VP25
-    N26 = (XX6R - ZZ6)*DV136 + XZ6*DW316 + XY6*U326 + MX6*VP25 - YZ6*U126
-    N36 = XY6*DW126 + YZ6*U136 + MX6*VP26 - ZZ6*WP25 - XX6R*DV126 - XZ6*U236 - MY6*VP16
-    FDI16 = C6*F16 - S6*F26
-    FDI36 = S6*F16 + C6*F26
-    # Joint 5
-    F15 = MX5*U115 + MY5R*U125
-    F25 = MX5*U215 + MY5R*U225
-    F35 = MX5*U315 + MY5R*U325
-    E15 = FDI16 + F15
-    E25 = F25 - F36
-    E35 = FDI36 + F35
-    N15 = XX5R*WP15 + ZZ5R*DV235 + YZ5*DW235 + XZ5*U215 + MY5R*VP24 - XY5*U315
-    N25 = (XX5R - ZZ5R)*DV135 + XZ5*DW315 + XY5*U325 - YZ5*U125 - MX5*VP24
-    N35 = ZZ5R*WP24 + XY5*DW125 + YZ5*U135 + MX5*VP25 - XX5R*DV125 - XZ5*U235 - MY5R*VP15
-    NE15 = C6*N16 + N15 - S6*N26
-    NE25 = N25 - N36
-    NE35 = S6*N16 + C6*N26 + N35
-    FDI15 = C5*E15 - S5*E25
-    FDI35 = -S5*E15 - C5*E25
-    # Joint 4
-    F14 = MX4*U114 + MY4R*U124
-    F24 = MX4*U214 + MY4R*U224
-    F34 = MX4*U314 + MY4R*U324
-    E14 = FDI15 + F14
-    E24 = E35 + F24
-    E34 = FDI35 + F34
-    N14 = XX4R*WP14 + ZZ4R*DV234 + YZ4*DW234 + XZ4*U214 - XY4*U314 - MY4R*VSP24
-    N24 = (XX4R - ZZ4R)*DV134 + XZ4*DW314 + XY4*U324 + MX4*VSP24 - YZ4*U124
-    N34 = ZZ4R*DV133 + XY4*DW124 + YZ4*U134 + MX4*VP24 - XX4R*DV124 - XZ4*U234 - MY4R*VP14
-    NE14 = C5*NE15 + N14 - S5*NE25
-    NE24 = NE35 + N24
-    NE34 = N34 - S5*NE15 - C5*NE25
-    FDI14 = C4*E14 - S4*E24
-    FDI34 = S4*E14 + C4*E24
-    # Joint 3
-    F13 = MX3*U113 + MY3R*DV123
-    F23 = MX3*DV123 + MY3R*U223
-    F33 = MX3*U313 + MY3R*U323
-    E13 = FDI14 + F13
-    E23 = F23 - E34
-    E33 = FDI34 + F33
-    N13 = XX3R*DV233 + ZZ3R*DV233 + YZ3*DW233 + XZ3*DV123 + MY3R*VSP33 - XY3*U313
-    N23 = (XX3R - ZZ3R)*DV133 + XZ3*DW313 + XY3*U323 - YZ3*DV123 - MX3*VSP33
-    N33 = XY3*DW123 + MX3*VP23 - XX3R*DV123 - MY3R*VP13
-    NE13 = C4*NE14 + N13 - S4*NE24 - RL4*FDI34
-    NE23 = N23 - NE34
-    NE33 = S4*NE14 + C4*NE24 + RL4*FDI14 + N33
-    FDI23 = S3*E13 + C3*E23
-    # Joint 2
-    N12 = XX2R*DV232 + ZZ2R*DV232 + YZ2*DW232 + XZ2R*DV122 - XY2*U312
-    N22 = (XX2R - ZZ2R)*DV132 + XZ2R*DW312 + XY2*U322 - YZ2*DV122
-    N32 = XY2*DW122 + MX2R*VP22 - XX2R*DV122 - MY2*VP12
-    NE12 = C3*NE13 + N12 - S3*NE23
-    NE22 = S3*NE13 + C3*NE23 + N22 - D3*E33
-    NE32 = NE33 + D3*FDI23 + N32
-    NE31 = -S2*NE12 - C2*NE22
-    # Friction, actuators
-    QPFSM6 = QP5 + QP6
-    GAM5a = FSM6*np.sign(QPFSM6)
-    # Torques
-    GAM[0] = OFFSET1 + NE31 + FV1*QP1 + FS1*np.sign(QP1)
-    GAM[1] = OFFSET2 + NE32 + FV2*QP2 + FS2*np.sign(QP2)
-    GAM[2] = OFFSET3 + NE33 + FV3*QP3 + FS3*np.sign(QP3)
-    GAM[3] = OFFSET4 + NE34 + FV4*QP4 + FS4*np.sign(QP4)
-    GAM[4] = OFFSET5 + NE35 + FV5*QP5 + FS5*np.sign(QP5) + FVM6*QP6 + GAM5a
-    GAM[5] = OFFSET6 + N36 + FV6*QP6 + FS6*np.sign(QP6) + FVM6*QP5 + GAM5a
-
-
-def _gravity_block(q, GAM, X, g):
-    """Fill GAM, shape (6, N), where it is not constant, from q (6, N)."""
+def _gravity_block(xp, q, GAM, X, g):
+    """Fill GAM, shape (6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
     OFFSET1 = X[3]
@@ -1507,16 +1330,16 @@ def _gravity_block(q, GAM, X, g):
     MY6 = X[53]
     OFFSET6 = X[57]
     # Trigonometry
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
-    C3 = np.cos(q3)
-    S3 = np.sin(q3)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
+    C3 = xp.cos(q3)
+    S3 = xp.sin(q3)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Link 2
     VP12 = -g*S2
     VP22 = -g*C2
@@ -1565,24 +1388,24 @@ def _gravity_block(q, GAM, X, g):
     GAM[5] = OFFSET6 + N36
 
 
-def _frame_poses_block(q, T, D3, RL4):
-    """Fill T, shape (6, 4, 4, N), where it is not constant, from q (6, N)."""
+def _frame_poses_block(xp, q, T, D3, RL4):
+    """Fill T, shape (6, 4, 4, N), from q (6, N)."""
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
-    C1 = np.cos(q1)
-    S1 = np.sin(q1)
-    C2 = np.cos(q2)
-    S2 = np.sin(q2)
+    C1 = xp.cos(q1)
+    S1 = xp.sin(q1)
+    C2 = xp.cos(q2)
+    S2 = xp.sin(q2)
     th23 = q2 + q3
-    C23 = np.cos(th23)
-    S23 = np.sin(th23)
-    C4 = np.cos(q4)
-    S4 = np.sin(q4)
-    C5 = np.cos(q5)
-    S5 = np.sin(q5)
-    C6 = np.cos(q6)
-    S6 = np.sin(q6)
+    C23 = xp.cos(th23)
+    S23 = xp.sin(th23)
+    C4 = xp.cos(q4)
+    S4 = xp.sin(q4)
+    C5 = xp.cos(q5)
+    S5 = xp.sin(q5)
+    C6 = xp.cos(q6)
+    S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
     Z141 = -S23*C4
     Z241 = S23*S4
@@ -1683,6 +1506,8 @@ def _frame_poses_block(q, T, D3, RL4):
     T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
     T[5, 2, 3] = P34
+    # Constants
+    T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
 
 
 # Of the robot file: drives, limits and values, which no function above reads

@@ -61,7 +61,7 @@ FAULTS = (
     Fault("symgen/regroup/regrouping.py", 'FIRST_CHOICE = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY")', 'FIRST_CHOICE = ("XX", "ZZ", "XY", "XZ", "YZ", "MY", "MX")', "another order of preference: other base parameters", REGROUPED),
     Fault("symgen/certify/certificate.py", "not self.failures and self.numeric_valid and all(", "True or all(", "the certificate says yes to everything", REGROUPED),
     # emit
-    Fault("symgen/emit/templates/functions.py.jinja", ".reshape({{ b }}, -1).T", ".transpose(0, 2, 1).reshape({{ b }}, -1).T", "rows of W sample by sample instead of joint by joint", EMITTED),
+    Fault("symgen/emit/templates/module.py.jinja", "filled.reshape({{ b }}, -1).T", "filled.transpose(0, 2, 1).reshape({{ b }}, -1).T", "rows of W sample by sample instead of joint by joint", EMITTED),
     Fault("symgen/emit/printers.py", '("-" if s.sign * self._name_sign(s.node) < 0 else "") + self.called', '("-" if s.sign < 0 else "") + self.called', "the sign of a name is forgotten where the name is used", EMITTED),
     Fault("symgen/derive/columns.py", "if place[0] <= place[1]}", "if place[0] < place[1]}", "diagonal of an element's form left out of the table of elements", ("emit/test_physical_tables.py", "cli/test_generate.py")),
     Fault("symgen/emit/c_printer.py", '"above({})",\n    "below({})",', '"below({})",\n    "above({})",', "one-sided friction of C in the other direction", ("emit/test_c_target.py",)),

@@ -185,12 +185,9 @@ def test_only_what_needs_records_imports_both_halves() -> None:
             assert not tops & {"runtime", "generated"}, name
 
 
-def test_emitted_modules_import_one_array_package() -> None:
+def test_emitted_modules_import_numpy_and_others_where_they_are_used() -> None:
     for name in (n for n in MODULES if n.startswith("generated.")):
-        package = {"casadi": "casadi", "xp": "array_api_compat"}.get(
-            name.rpartition("_")[2], "numpy"
-        )
-        assert imports(name) == {package}, name
+        assert {"numpy"} <= imports(name) <= {"numpy", "casadi", "array_api_compat"}, name
 
 
 @pytest.mark.parametrize("library", ONLY_IN)

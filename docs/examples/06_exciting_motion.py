@@ -5,10 +5,10 @@ file stand for those not yet identified.
 import runtime
 import symgen
 
-model, casadi = symgen.model("planar_2r"), symgen.model("planar_2r", target="casadi")
+model = symgen.model("planar_2r")
 parts = [{"family": "fourier", "period": 5, "harmonics": 3}]
 study = runtime.Study(excitation={"parts": parts, "starts": 2, "iterations": 50, "rate": 200})
-result = runtime.excite(model, study=study, symbolic=casadi)
+result = runtime.excite(model, study=study)
 print(result)
 t, q, qd, qdd, tau = result.sampled()
 print(f"{len(t)} samples, largest torques {abs(tau).max(axis=0).round(1)} N m")

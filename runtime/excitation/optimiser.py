@@ -25,7 +25,7 @@ from runtime.errors import InputError
 from runtime.excitation.criteria import MotionLimits, Weights
 from runtime.excitation.result import Start
 from runtime.limits import LIMIT
-from runtime.model.casadi import SymbolicModel, load_symbolic
+from runtime.model.generated import GeneratedModel
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.families import Fourier
 from runtime.settings.trajectories import Motion, Part
@@ -39,8 +39,7 @@ class Problem:
 
     Attributes
     ----------
-    path : str
-        File of the CasADi model.
+    model : GeneratedModel
     settings : ExcitationSettings
     weights : Weights
     limits : MotionLimits
@@ -48,17 +47,14 @@ class Problem:
         All base parameters, for torques.
     smooth : ndarray, shape (b,), 0 or 1
         0 for the parameters of dry friction.
-    trust : bool
-        Run the file though it was not emitted here.
     """
 
-    path: str
+    model: GeneratedModel
     settings: ExcitationSettings
     weights: Weights
     limits: MotionLimits
     X: Array
     smooth: Array
-    trust: bool = False
 
 
 def one_start(problem: Problem, number: int) -> Start:
@@ -73,11 +69,11 @@ def one_start(problem: Problem, number: int) -> Start:
 def improved(problem: Problem, number: int, guess: Motion) -> Start:
     """The motion that IPOPT reaches from `guess`."""
     settings, n = problem.settings, len(problem.weights.s)
-    symbolic = load_symbolic(problem.path, trust=problem.trust)
+    model = problem.model
     p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.parts)]
     q, qd, qdd = _states(settings, p)
-    A = _information(symbolic, settings, problem.weights, q, qd, qdd)
-    g, lower, upper = _constraints(symbolic, problem, p, q, qd, qdd)
+    A = _information(model, settings, problem.weights, q, qd, qdd)
+    g, lower, upper = _constraints(model, problem, p, q, qd, qdd)
     least, most = (
         np.concatenate([np.tile(family.bounds()[k], n) for family in settings.parts])
         for k in (0, 1)
@@ -108,7 +104,7 @@ def _states(settings: ExcitationSettings, p: Sequence[Any]) -> tuple[Any, Any, A
 
 
 def _information(
-    symbolic: SymbolicModel,
+    model: GeneratedModel,
     settings: ExcitationSettings,
     weights: Weights,
     q: Any,
@@ -118,8 +114,8 @@ def _information(
     """A = sum_j W_wj'W_wj over the grid, shape (c, c)."""
     n, M = len(weights.s), q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
-    D = smoothed(symbolic.regressor, settings.smooth)(*inputs, *symbolic.CONSTANTS.values())
-    numbers = [list(symbolic.BASE_PARAMETERS).index(name) for name in weights.names]
+    D = smoothed(model.casadi("regressor"), settings.smooth)(*inputs, *model.CONSTANTS.values())
+    numbers = [list(model.BASE_PARAMETERS).index(name) for name in weights.names]
     weighted = ca.mtimes(ca.mtimes(ca.diag(1 / weights.s), D[:, numbers]), ca.diag(weights.size))
     rows = [
         ca.Function("row", inputs, [weighted[j, :].T]).map(M)(q.T, qd.T, qdd.T) for j in range(n)
@@ -144,7 +140,7 @@ def _spread(A: Any, criterion: str) -> Any:
 
 
 def _constraints(
-    symbolic: SymbolicModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any
+    model: GeneratedModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any
 ) -> tuple[Any, Array, Array]:
     """g(p) with its bounds, each divided by its scale."""
     settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
@@ -154,8 +150,8 @@ def _constraints(
         ((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0),
         (qd / _rows(limits.qd, M), -1.0, 1.0),
         (qdd / _rows(limits.qdd, M), -1.0, 1.0),
-        *_torques(symbolic, problem, limits, q, qd, qdd),
-        *_distances(symbolic, settings, q),
+        *_torques(model, problem, limits, q, qd, qdd),
+        *_distances(model, settings, q),
     ]
     ends = []
     for k, (family, coefficients) in enumerate(zip(settings.parts, p, strict=True)):
@@ -185,7 +181,7 @@ def _constraints(
 
 
 def _torques(
-    symbolic: SymbolicModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any
+    model: GeneratedModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any
 ) -> list[tuple[Any, float, float]]:
     """Torques, their root mean squares and rates of change, where they are limited."""
     settings = problem.settings
@@ -194,12 +190,10 @@ def _torques(
         return []
     n, M = q.shape[1], q.shape[0]
     inputs = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
-    dynamics = smoothed(symbolic.inverse_dynamics, settings.smooth)
+    dynamics = smoothed(model.casadi("inverse_dynamics"), settings.smooth)
 
     def torque(X: Array) -> Any:
-        function = ca.Function(
-            "torque", inputs, [dynamics(*inputs, X, *symbolic.CONSTANTS.values())]
-        )
+        function = ca.Function("torque", inputs, [dynamics(*inputs, X, *model.CONSTANTS.values())])
         return function.map(M)(q.T, qd.T, qdd.T).T
 
     tau, share = torque(problem.X), 1 - settings.margin
@@ -225,7 +219,7 @@ def _torques(
 
 
 def _distances(
-    symbolic: SymbolicModel, settings: ExcitationSettings, q: Any
+    model: GeneratedModel, settings: ExcitationSettings, q: Any
 ) -> list[tuple[Any, float, float]]:
     """Squared distances of the spheres that stay apart, of the square of the smallest they may
     have.
@@ -234,13 +228,9 @@ def _distances(
         return []
     n, M = q.shape[1], q.shape[0]
     at = ca.SX.sym("q", n)
-    frame_poses: Any = getattr(symbolic, "frame_poses", None)
-    if frame_poses is None:
-        raise InputError(
-            "this casadi module has no frame_poses, which distances need; emit it again"
-        )
+    frame_poses = model.casadi("frame_poses")
     poses = dict(
-        zip(frame_poses.name_out(), frame_poses(at, *symbolic.CONSTANTS.values()), strict=True)
+        zip(frame_poses.name_out(), frame_poses(at, *model.CONSTANTS.values()), strict=True)
     )
     unknown = [
         sphere.frame

@@ -14,8 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -38,9 +36,7 @@ from runtime.limits import LIMIT
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.methods import estimate_of
-from runtime.model.casadi import casadi_path
 from runtime.model.generated import GeneratedModel, require, require_no_channels
-from runtime.model.loading import is_trusted
 from runtime.records.record import Record
 from runtime.rows.observe import observe
 from runtime.rows.prepared import resolved
@@ -58,7 +54,6 @@ def excite(
     records: Record | Sequence[Record] = (),
     study: Study | None = None,
     *,
-    symbolic: str | Path | ModuleType | None = None,
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
 ) -> Excitation:
@@ -73,8 +68,6 @@ def excite(
         of the robot file serve.
     study : Study, optional
         Families, limits, criterion, filters and rows; default: Study().
-    symbolic : str, Path or module, optional
-        CasADi model of the same robot; default: the file beside that of `model`.
     map : callable, optional
         As the built-in one, such as `runtime.parallel.processes`; results do not depend on it.
     progress : callable, optional
@@ -105,11 +98,9 @@ def excite(
         weights = replace(
             weights, size=weights.size * np.maximum(before, 1e-3 * before.max()) / 100
         )
-    require(model, "inverse_dynamics")
-    path = str(getattr(symbolic, "__file__", symbolic) or casadi_path(model))
-    trust = is_trusted(model) or isinstance(symbolic, ModuleType)
+    require(model, "inverse_dynamics", "casadi")
     smooth = dry_friction(model).smooth
-    problem = Problem(path, settings, weights, limits, known.X, smooth, trust)
+    problem = Problem(model, settings, weights, limits, known.X, smooth)
     starts = []
     for start in map(partial(one_start, problem), range(settings.starts)):
         starts.append(start)

@@ -34,7 +34,7 @@ from runtime.limits import LIMIT
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction
 from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
-from runtime.model.casadi import SymbolicModel
+from runtime.model.generated import GeneratedModel
 from runtime.model.loading import cache_folder
 
 Array = np.ndarray
@@ -96,7 +96,7 @@ def blocks(rows: Array, size: int) -> Iterator[tuple[Array, int]]:
 
 
 def tick_function(
-    model: SymbolicModel,
+    model: GeneratedModel,
     friction: DryFriction,
     constants: Mapping[str, float],
     substeps: int,
@@ -174,7 +174,7 @@ def _steps(x: MX, step: MX) -> MX:
 
 
 def plant_function(
-    model: SymbolicModel, friction: DryFriction, constants: dict[str, float], integrator: str
+    model: GeneratedModel, friction: DryFriction, constants: dict[str, float], integrator: str
 ) -> Any:
     """(q, qd, tau, Xs, plus, minus, h) -> q, qd after h, and qdd at its start.
 
@@ -214,13 +214,13 @@ def keeps_sliding(friction: DryFriction, direction: MX, qd: MX, end: MX) -> MX:
     return ca.mmin(ca.vertcat(ca.fabs(G @ qd), direction * (G @ end))) > LIMIT.SLIP_REST
 
 
-def flow_function(model: SymbolicModel, constants: dict[str, float], integrator: str) -> Any:
+def flow_function(model: GeneratedModel, constants: dict[str, float], integrator: str) -> Any:
     """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start."""
     return (_cvodes if integrator == "cvodes" else _runge_kutta)(model, constants)
 
 
 def _rounds(
-    model: SymbolicModel, friction: DryFriction, constants: dict[str, float], flow: Any
+    model: GeneratedModel, friction: DryFriction, constants: dict[str, float], flow: Any
 ) -> Any:
     """The plant where slips stop or rest: each round lasts until the next slip stops."""
     inputs = plant_inputs(model, friction)
@@ -245,7 +245,7 @@ def _rounds(
 
 
 def round_function(
-    model: SymbolicModel,
+    model: GeneratedModel,
     friction: DryFriction,
     constants: dict[str, float],
     flow: Any,
@@ -274,7 +274,7 @@ def round_function(
     return ca.Function(f"round_{whole}", inputs, results)
 
 
-def plant_inputs(model: SymbolicModel, friction: DryFriction | None = None) -> list[MX]:
+def plant_inputs(model: GeneratedModel, friction: DryFriction | None = None) -> list[MX]:
     """q, qd, tau, Xs, plus, minus, h; without dry friction, plus and minus are empty."""
     n, m = len(model.JOINTS), 0 if friction is None else len(friction.G)
     names = ("q", "qd", "tau", "X", "plus", "minus", "h")
@@ -300,28 +300,28 @@ def runge_kutta(
     return moved(h / 6, [a + 2 * b + 2 * c + d for a, b, c, d in slopes]), k1
 
 
-def _runge_kutta(model: SymbolicModel, constants: dict[str, float]) -> Any:
+def _runge_kutta(model: GeneratedModel, constants: dict[str, float]) -> Any:
     """(q, qd, tau, Xs, h) -> q, qd after h at constant torque, and qdd at the start; order 4."""
     q, qd, tau, X, _, _, h = plant_inputs(model)
 
     def rates(q: MX, qd: MX) -> tuple[MX, MX]:
-        return qd, model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+        return qd, model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
 
     end, start = runge_kutta(rates, [q, qd], h)
     return ca.Function("runge_kutta", [q, qd, tau, X, h], [*end, start[1]])
 
 
-def _cvodes(model: SymbolicModel, constants: dict[str, float]) -> Any:
+def _cvodes(model: GeneratedModel, constants: dict[str, float]) -> Any:
     """The same by CVODES, variable order and step."""
     q, qd, tau, X, _, _, h = plant_inputs(model)
     n = len(model.JOINTS)
     x = ca.MX.sym("x", 2 * n)
-    a = model.forward_dynamics(q=x[:n], qd=x[n:], tau=tau, X=X, **constants)["qdd"]
+    a = model.casadi("forward_dynamics")(q=x[:n], qd=x[n:], tau=tau, X=X, **constants)["qdd"]
     problem = {"x": x, "p": ca.vertcat(tau, X, h), "ode": h * ca.vertcat(x[n:], a)}
     end = ca.integrator("cvodes", "cvodes", problem, 0, 1, CVODES)(
         x0=ca.vertcat(q, qd), p=ca.vertcat(tau, X, h)
     )["xf"]
-    start = model.forward_dynamics(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
+    start = model.casadi("forward_dynamics")(q=q, qd=qd, tau=tau, X=X, **constants)["qdd"]
     return ca.Function("flow", [q, qd, tau, X, h], [end[:n], end[n:], start])
 
 

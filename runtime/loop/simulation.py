@@ -36,8 +36,7 @@ from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_func
 from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
-from runtime.model.casadi import SymbolicModel, casadi_path, load_symbolic
-from runtime.model.generated import GeneratedModel, constants_of, require_no_channels
+from runtime.model.generated import GeneratedModel, constants_of, require, require_no_channels
 from runtime.reading.records import read_records
 from runtime.settings.controller import Controller
 from runtime.settings.study import Study
@@ -54,8 +53,6 @@ class Simulator:
     ----------
     model : GeneratedModel
     controller : Controller
-    symbolic : SymbolicModel, optional
-        CasADi model of the same robot; default: the file beside that of `model`.
     constants : mapping, optional
         Geometry and gravity that replace those of the robot file.
     in_c : bool
@@ -67,7 +64,6 @@ class Simulator:
         model: GeneratedModel,
         controller: Controller,
         *,
-        symbolic: SymbolicModel | None = None,
         constants: Mapping[str, float] | None = None,
         in_c: bool = True,
     ) -> None:
@@ -75,11 +71,11 @@ class Simulator:
         constants_of(model, constants or {})
         self.model, self.controller, self.constants = model, controller, dict(constants or {})
         self.law: ControlLaw = control_law(controller, model)
-        self.symbolic = symbolic or load_symbolic(casadi_path(model), of=model)
+        require(model, "casadi")
         self.friction: DryFriction = dry_friction(model)
         self._in_c = in_c and controller.integrator == "rk4"  # CVODES has no C of its own
         self._compiled: dict[int, Any] = {}
-        self._bias = _rest_functions(self.symbolic, self.constants)
+        self._bias = _rest_functions(self.model, self.constants)
 
     def run(
         self,
@@ -247,7 +243,7 @@ class Simulator:
         """The CasADi function of BLOCK ticks; made once."""
         if substeps not in self._compiled:
             tick = tick_function(
-                self.symbolic, self.friction, self.constants, substeps, self.controller.integrator
+                self.model, self.friction, self.constants, substeps, self.controller.integrator
             )
             self._compiled[substeps] = (compiled(tick) if self._in_c else tick).mapaccum(BLOCK)
         return self._compiled[substeps]
@@ -348,13 +344,15 @@ def simulate(
     )
 
 
-def _rest_functions(model: SymbolicModel, constants: Mapping[str, float]) -> Any:
+def _rest_functions(model: GeneratedModel, constants: Mapping[str, float]) -> Any:
     """(q, Xs) -> A and the viscous friction B = dGamma/dqd at rest."""
     n = len(model.JOINTS)
     q, qd, X = ca.SX.sym("q", n), ca.SX.sym("qd", n), ca.SX.sym("X", len(model.BASE_PARAMETERS))
-    A = model.inertia_matrix(q=q, X=X, **constants)["A"]
+    A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
     B = ca.substitute(
-        ca.jacobian(model.bias(q=q, qd=qd, X=X, **constants)["GAM"], qd), qd, ca.DM.zeros(n)
+        ca.jacobian(model.casadi("bias")(q=q, qd=qd, X=X, **constants)["GAM"], qd),
+        qd,
+        ca.DM.zeros(n),
     )
     return ca.Function("at_rest", [q, X], [ca.densify(A), ca.densify(B)])
 

@@ -22,13 +22,13 @@ import casadi as ca
 
 from runtime.limits import LIMIT
 from runtime.loop.dry_friction import DryFriction
-from runtime.model.casadi import SymbolicModel
+from runtime.model.generated import GeneratedModel
 
 SX = Any  # casadi.SX
 
 
 def friction_function(
-    model: SymbolicModel, friction: DryFriction, constants: dict[str, float]
+    model: GeneratedModel, friction: DryFriction, constants: dict[str, float]
 ) -> Any:
     """(q, qd, tau, Xs, c_plus, c_minus) -> f, direction of every element (-1, 0 stuck, 1), qdd, and
     Y = A^-1 G'. Xs : X without dry friction.
@@ -42,8 +42,8 @@ def friction_function(
     )
     plus, minus = ca.SX.sym("plus", m), ca.SX.sym("minus", m)
     G = ca.DM(friction.G)
-    A = model.inertia_matrix(q=q, X=X, **constants)["A"]
-    h = model.bias(q=q, qd=qd, X=X, **constants)["GAM"]
+    A = model.casadi("inertia_matrix")(q=q, X=X, **constants)["A"]
+    h = model.casadi("bias")(q=q, qd=qd, X=X, **constants)["GAM"]
     solved = solve(A, ca.horzcat(tau - h, G.T))
     Y = solved[:, 1:]
     slip = G @ qd

@@ -65,6 +65,7 @@ class GeneratedModel(Protocol):
     inertia_matrix: Callable[..., Array]  # A (N, n, n) of q, X
     bias: Callable[..., Array]  # GAM (N, n) of q, qd, X
     gravity: Callable[..., Array]  # GAM (N, n) of q, X
+    casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
 
     def store(self, N: int) -> Array:
         """Workspace of shape (b, n, N) for `out`, structural zeros written."""
@@ -92,8 +93,8 @@ def load_model(
     folder : str or Path, optional
         Where names are looked up; default: ./generated.
     trust : bool
-        Run a file that this installation has not emitted and certified, and the C and CasADi files
-        beside it: a module is code (`runtime.model.loading`).
+        Run a file that this installation has not emitted and certified, and the C file beside it:
+        a module is code (`runtime.model.loading`).
 
     Raises
     ------
@@ -102,7 +103,9 @@ def load_model(
     """
     if isinstance(model, ModuleType):
         return checked_model(model)
-    path = file_of(model, "", folder)
+    path = Path(model)
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = Path(folder or FOLDER) / f"{model}.py"
     if not path.is_file():
         present = (
             sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__")
@@ -114,13 +117,6 @@ def load_model(
             f"with `symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
-
-
-def file_of(model: str | Path, ending: str, folder: str | Path | None) -> Path:
-    """The file of a path, or of a name: FOLDER/NAME.py, NAME with the ending of its target."""
-    if isinstance(model, str) and re.fullmatch(r"\w+", model):
-        return Path(folder or FOLDER) / f"{model.removesuffix(ending)}{ending}.py"
-    return Path(model)
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
@@ -187,6 +183,12 @@ def require(model: GeneratedModel, *functions: str) -> None:
     if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
         raise ModelError(
             "no forward_dynamics: laws read tau_model, the torque that it would change",
+            file=model.NAME,
+        )
+    if missing == ["casadi"]:
+        raise ModelError(
+            "no casadi(): its loops are closed by iteration, which no expression says, or another "
+            "version emitted the module; emit it again",
             file=model.NAME,
         )
     if missing:

@@ -1,6 +1,6 @@
 """Emitted files as modules: a module is code, and runs with every right of who runs it.
 
-    generated/tx40.py, tx40_casadi.py, tx40.c
+    generated/tx40.py, tx40.c
             run where this installation has emitted and certified them, or where their reader trusts
             them
 
@@ -99,8 +99,7 @@ def run(text: str, path: Path) -> ModuleType:
     try:
         loader.exec_module(module)
     except ModuleNotFoundError as e:
-        extra = ": pip install symgen[gpu]" if e.name == "array_api_compat" else ""
-        raise ModelError(f"needs {e.name}, which is not installed{extra}", file=str(path)) from e
+        raise ModelError(f"needs {e.name}, which is not installed", file=str(path)) from e
     except Exception as e:  # whatever a broken file raises becomes one kind of error
         raise ModelError(
             f"fails on import with {type(e).__name__}: {e}; emit it again", file=str(path)

@@ -35,7 +35,6 @@ from runtime.loop.closed_loop import ClosedLoop, closed_loop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.methods import CLOSED_LOOP
 from runtime.loop.reference import Reference, reference_of
-from runtime.model.casadi import SymbolicModel
 from runtime.model.generated import GeneratedModel
 from runtime.records.record import Record
 from runtime.resolution.rounding import stream
@@ -73,7 +72,7 @@ class Loop:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what makes the simulator, which is not pickled."""
-        return _loop, (self.model, self.study, self.simulator.symbolic, self.records)
+        return _loop, (self.model, self.study, self.records)
 
     @property
     def options(self) -> Mapping[str, Any]:
@@ -155,14 +154,12 @@ class Loop:
         )
 
 
-def _loop(
-    model: GeneratedModel, study: Study, symbolic: SymbolicModel | None, records: tuple[Record, ...]
-) -> Loop:
+def _loop(model: GeneratedModel, study: Study, records: tuple[Record, ...]) -> Loop:
     """The loop with a simulator of study.controller."""
     from runtime.loop.simulation import Simulator
 
     assert study.controller is not None
-    return Loop(model, study, Simulator(model, study.controller, symbolic=symbolic), records)
+    return Loop(model, study, Simulator(model, study.controller), records)
 
 
 def loop_of(
@@ -189,8 +186,7 @@ def loop_of(
         quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
     if simulator is not None and simulator.controller == quiet.controller:
         return Loop(model, quiet, simulator, tuple(records))
-    symbolic = None if simulator is None else simulator.symbolic
-    return _loop(model, quiet, symbolic, tuple(records))
+    return _loop(model, quiet, tuple(records))
 
 
 def without_loop_options(settings: EstimateSettings) -> EstimateSettings:

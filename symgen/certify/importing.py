@@ -1,7 +1,7 @@
 """Certified texts as files of a cache, and as Python modules.
 
-A file lies in a cache by content: its folder is called after the SHA-256 of the text below the
-header of its certificate, so that an entry never gets old; one whose text is another is written
+A file lies in a cache by content: its folder is called after the SHA-256 of the text without the
+lines of its certificate, so that an entry never gets old; one whose text is another is written
 anew, whole, under another name first. A folder called after the whole text says that it is
 certified. Where the cache cannot be written, a folder that lives as long as this process serves.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 import atexit
 import importlib.util
 import os
+import re
 import shutil
 import sys
 from functools import lru_cache
@@ -22,8 +23,13 @@ from types import ModuleType
 
 from symgen.errors import SymgenError
 
-HEAD = "Certificate"
-END = "sha256 of what follows: "
+HEAD = "Certificate by symgen "
+END = "sha256 of all but these lines: "
+CERTIFICATE = re.compile(
+    rf"\A(?P<mark>\S{{1,2}} ){HEAD}.*\n((?P=mark).*\n)*?(?P=mark){END}[0-9a-f]{{64}}\n"
+    rf'|\n\n{HEAD}[^"\\]*\n{END}[0-9a-f]{{64}}(?=\n"""\n)'
+)
+"""Its lines: comments at the head of a text, or the end of a docstring."""
 
 
 def cache_folder() -> Path:
@@ -49,18 +55,22 @@ def cached_path(file: str, text: str) -> Path | None:
     """
     path = _entry(text)
     try:
-        return path / file if path and below((path / file).read_text("utf-8")) == text else None
+        return (
+            path / file
+            if path and without_certificate((path / file).read_text("utf-8")) == text
+            else None
+        )
     except (OSError, UnicodeError):
         return None
 
 
 def stored_path(file: str, text: str) -> Path:
-    """Path of a file that holds `text`, in the cache, by what stands below its header and by the
-    whole, or, where that cannot be written, in a folder of this process.
+    """Path of a file that holds `text`, in the cache, by what its certificate vouches
+    for and by the whole, or, where that cannot be written, in a folder of this process.
 
     Raises SymgenError where no file can be written at all.
     """
-    folder, whole = _entry(below(text)), _entry(text)
+    folder, whole = _entry(without_certificate(text)), _entry(text)
     if folder is not None and whole is not None:
         try:
             whole.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -76,10 +86,9 @@ def stored_path(file: str, text: str) -> Path:
         ) from e
 
 
-def below(text: str) -> str:
-    """A text without the header of its certificate."""
-    head, end, rest = text.partition(END)
-    return rest.partition("\n")[2] if end and head.startswith((f"# {HEAD}", f"// {HEAD}")) else text
+def without_certificate(text: str) -> str:
+    """What the certificate of a text vouches for: all but the lines that it consists of."""
+    return CERTIFICATE.sub("", text, count=1)
 
 
 def imported(path: Path) -> ModuleType:

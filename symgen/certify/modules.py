@@ -18,10 +18,8 @@ from symgen.description.files import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files
 from symgen.emit.targets import TARGETS
-from symgen.errors import CertificateError, SymgenError
+from symgen.errors import CertificateError
 from symgen.regroup.regrouping import Regrouping, regroup
-
-PYTHON = tuple(name for name, target in TARGETS.items() if target.file.endswith(".py"))
 
 
 def certify(
@@ -47,7 +45,7 @@ def certify(
         The loops close in too few random states.
     """
     robot = regrouping.robot
-    target = {t.file.format(robot.name): name for name, t in TARGETS.items()}
+    target = {t.file.format(robot.name): name for name, t in reversed(TARGETS.items())}
     with limited(f"the certificate of {robot.name}"):
         certificate = certify_formulas(regrouping)
     files = generate_files(robot, regrouping=regrouping) if files is None else files
@@ -105,9 +103,7 @@ def require_valid(certificate: Certificate) -> None:
         )
 
 
-def model(
-    robot: str | Path | Robot, *, target: str = "numpy", options: Sequence[str] = ()
-) -> ModuleType:
+def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleType:
     """The module of a robot: derived, regrouped, emitted, certified, imported from a cache by
     content.
 
@@ -115,8 +111,6 @@ def model(
     ----------
     robot : str, Path or Robot
         Name of a packaged robot, path of a robot file (.yaml, .par, .urdf, MJCF), or a Robot.
-    target : str
-        numpy, casadi or xp (arrays of any package).
     options : sequence of str
         Functions on request, as of `symgen generate --with`.
 
@@ -132,25 +126,11 @@ def model(
         The file cannot be read or describes no robot.
     CertificateError
         The certificate does not hold.
-    SymgenError
-        The robot has no module of this target.
     """
     robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    if target not in PYTHON:
-        raise SymgenError(
-            f"target {target!r}; Python imports {', '.join(PYTHON)}; `symgen generate --target c` "
-            "writes C"
-        )
-    path = _certified_path(robot, target, options)
-    if path is None:
-        raise SymgenError(
-            f"{robot.name}: no {target} module, since its loops are closed by iteration; the NumPy "
-            "module serves"
-        )
-    module = imported(path)
-    if target == "numpy":  # runtime asks for it where it simulates
-        vars(module)["casadi_file"] = lambda: str(model(robot, target="casadi").__file__)
-    return module
+    path = _certified_path(robot, "numpy", options)
+    assert path is not None  # it serves every robot
+    return imported(path)
 
 
 def c_file(robot: str | Path | Robot) -> Path:

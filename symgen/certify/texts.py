@@ -1,12 +1,12 @@
 """Texts that leave, run and compared with the witness, function by function.
 
-NumPy, xp (with NumPy arrays) and CasADi are imported; C is compiled, and called in a process of its
-own. What cannot be run here, for want of a library or a compiler, is said to be not run.
+A Python module is imported and used in three ways: on NumPy's arrays, on arrays that it may not
+write to (NumPy's again), and by CasADi. C is compiled, and called in a process of its own. What
+cannot be run here, for want of a compiler, is said to be not run.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
@@ -15,30 +15,34 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import wrap
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from symgen.certify import call_c
-from symgen.certify.importing import END, HEAD, below, imported
-from symgen.certify.tables import table_errors
+from symgen.certify.importing import END, HEAD, imported, without_certificate
 from symgen.certify.witness import STATES, Check, Witness
 from symgen.derive.exact import Array
 from symgen.derive.models import MODELS
+from symgen.emit.generate import EMITTERS
+from symgen.emit.targets import TARGETS
 from symgen.version import VERSION
 
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
-LIBRARIES = {"numpy": "numpy", "xp": "array_api_compat", "casadi": "casadi"}
 C_FLAGS = ("-std=c11", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
 WITHOUT_AVX512 = "-D__builtin_cpu_supports(x)=0"  # another way past the caches
 LONGEST_RUN = 300  # s, of the compiler and of the functions
-HELPERS = {"store", "signals", "jacobian_of", "elements", "array_namespace"}
-"""Public names that are no models: those of other checks, or of the functions that use them."""
+HELPERS = {"store", "elements", "casadi"}
+"""Public names that are no models."""
+NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
+DERIVATIVES = "inverse_dynamics_derivatives"
+Use = Callable[[ModuleType, str, Check, Mapping[str, float]], Array]
 TILES = 70  # samples of the functions in C: some tiles, the last one not full
 
 
@@ -53,12 +57,15 @@ class TextCheck:
     sha256 : str
         Hash of the text below its header.
     errors : mapping
-        Largest difference of each function and each table from the witness, of the largest entry;
-        infinite where it does not run or has another shape, zero where a table is right.
+        Largest difference of each function from the witness, of the largest entry; infinite where
+        it does not run, has another shape, or other values than the file's where no constants are
+        given.
     constants : str
         Which constants the functions were called with.
     left_out : tuple of str
         Functions that this robot gives no sense to.
+    uses : tuple of str
+        The ways in which a module ran.
     not_run : str
         Why nothing ran; empty where it did.
     raised : mapping
@@ -70,6 +77,7 @@ class TextCheck:
     errors: Mapping[str, float] = field(default_factory=dict)
     constants: str = ""
     left_out: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
     not_run: str = ""
     raised: Mapping[str, str] = field(default_factory=dict)
 
@@ -83,12 +91,9 @@ class TextCheck:
         return not self.wrong and bool(self.errors or self.not_run)
 
     def checks(self, file: str) -> list[tuple[bool, str]]:
-        """Whether each function agrees with the witness, and whether the tables are right."""
+        """Whether each function agrees with the witness."""
         if self.not_run:
             return [(True, f"{file} {self.sentence}")]
-        tables = [name for name in self.errors if name.isupper()]
-        wrong = [name for name in tables if name in self.wrong]
-        told = f"tables of {file} against the robot file: {', '.join(wrong or tables)}"
         return [
             (
                 error < TOLERANCE,
@@ -100,101 +105,133 @@ class TextCheck:
                 ),
             )
             for name, error in self.errors.items()
-            if name not in tables
-        ] + [(not wrong, told)] * bool(tables)
+        ]
 
     @property
     def sentence(self) -> str:
         """What ran."""
         if self.not_run:
             return f"not run: {self.not_run}"
-        functions = [name for name in self.errors if not name.isupper()]
-        tables = [name for name in self.errors if name.isupper()]
+        uses = ", ".join(self.uses)
         return (
-            f"{', '.join(functions)} at random states, parameters and {self.constants} agree with "
+            f"{', '.join(self.errors)} at random states, parameters and {self.constants} agree with "
             f"Lagrange's equations and products of frames to {TOLERANCE:g}"
-            + f"; {', '.join(tables)} with the robot file"
-            * bool(tables)
+            + f", {uses}"
+            * bool(uses)
         )
 
 
 def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck:
     """Run every function of a text, below its header, and compare it with the witness."""
-    text = below(text)
+    text = without_certificate(text)
     key = sha256(text.encode("utf-8")).hexdigest()
-    library = LIBRARIES.get(target)
-    if library and importlib.util.find_spec(library) is None:
-        return TextCheck(target, key, not_run=f"{library} is not installed")
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
-    if target == "c" and compiler is None:
+    if not file.endswith((".py", ".c")):
+        return TextCheck(target, key, not_run=f"nothing here runs {TARGETS[target].language}")
+    if file.endswith(".c") and compiler is None:
         return TextCheck(target, key, not_run="there is no C compiler")
+    left_out = tuple(sorted(witness.left_out))
     with TemporaryDirectory(prefix="symgen-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / file
         path.write_text(text, encoding="utf-8", newline="\n")
-        errors, raised = (
-            (c_errors(path, text, str(compiler), witness), {})
-            if target == "c"
-            else module_errors(path, target, witness)
-        )
-    left_out = tuple(sorted(witness.left_out))
-    return TextCheck(target, key, errors, witness.drawn, left_out, raised=raised)
+        if file.endswith(".c"):
+            errors = c_errors(path, text, str(compiler), witness)
+            return TextCheck(target, key, errors, witness.drawn, left_out)
+        errors, raised, uses = module_errors(path, witness)
+    return TextCheck(target, key, errors, witness.drawn, left_out, uses, raised=raised)
 
 
-# --- headers ---
+# --- what the certificate says ---
 
 
 def headed(text: str, check: TextCheck, formulas: str) -> str:
-    """The text below what its certificate says."""
-    mark = "//" if check.target == "c" else "#"
-    lines = wrap(
-        f"{HEAD} by symgen {VERSION}: formulas {formulas}; {check.sentence}.", 97 - len(mark)
-    )
-    return "\n".join([*(f"{mark} {line}" for line in lines), f"{mark} {END}{check.sha256}", text])
+    """The text with what its certificate says: at the end of the docstring of a module, else in
+    comments before it.
+    """
+    said = f"{HEAD}{VERSION}: formulas {formulas}; {check.sentence}."
+    if not text.startswith('"""'):
+        mark = f"{EMITTERS[check.target].language.comment} "
+        lines = [*wrap(said, 98 - len(mark)), f"{END}{check.sha256}"]
+        return "".join(f"{mark}{line}\n" for line in lines) + text
+    docstring, end, rest = text.partition('\n"""\n')
+    lines = ["", "", *wrap(said, 98), f"{END}{check.sha256}"]
+    return docstring + "\n".join(lines) + end + rest
 
 
 # --- modules ---
 
 
 def module_errors(
-    path: Path, target: str, witness: Witness
-) -> tuple[dict[str, float], dict[str, str]]:
-    """Errors of the functions and tables of a Python module, and what they raised."""
+    path: Path, witness: Witness
+) -> tuple[dict[str, float], dict[str, str], tuple[str, ...]]:
+    """Errors of the functions of a Python module, what they raised, and how they were used."""
     try:
-        module = imported(path)
+        module, stacked = imported(path), imported(path)
     except Exception as error:  # a text may fail in any way
-        return {"import": float("inf")}, {"import": repr(error)}
-    checks, call = dict(witness.checks), _casadi if target == "casadi" else _called
-    if target == "casadi":  # all three, by position
-        del checks["observation_matrix"]
-        checks |= {
-            n: c[:2] for n, c in checks.items() if n == "passive_joints"
-        } | witness.derivatives
-    ran = {name: largest(module, name, checks[name], call, witness) for name in checks}
-    errors = {name: error for name, (error, _) in ran.items()}
-    own = [
-        n for n, value in vars(module).items() if callable(value) and not isinstance(value, type)
-    ]
-    unchecked = {n for n in own if not n.startswith("_")} - {*errors, *HELPERS, *witness.left_out}
-    errors |= dict.fromkeys(unchecked, float("inf")) | table_errors(module, witness)
-    return errors, {name: text for name, (_, text) in ran.items() if text}
+        return {"import": float("inf")}, {"import": repr(error)}, ()
+    uses: dict[str, tuple[ModuleType, Use]] = {NUMPY: (module, _called)}
+    if not witness.tied:
+        vars(stacked)["_IN_PLACE"] = False
+        uses |= {STACKED: (stacked, _called), CASADI: (module, _by_casadi)}
+    errors: dict[str, float] = {}
+    raised = {}
+    for how, (used, call) in uses.items():
+        for name, checks in witness.checks.items():
+            if how == CASADI and name == "observation_matrix":
+                continue  # a column of matrices is none of one state
+            found, text = largest(used, name, checks, call, witness)
+            errors[name] = max(errors.get(name, 0.0), found, key=_worse)
+            if text:
+                raised[name] = f"{text} ({how})"
+    if not witness.tied:
+        try:
+            errors[DERIVATIVES] = _derivative_error(module, witness)
+        except Exception as error:  # a text may fail in any way
+            errors[DERIVATIVES], raised[DERIVATIVES] = float("inf"), repr(error)
+    public = {n for n, value in vars(module).items() if isinstance(value, FunctionType)}
+    known = {*errors, *HELPERS, *witness.left_out}
+    for name in public - known:
+        if not name.startswith("_"):
+            errors[name] = float("inf")
+    return errors, raised, tuple(uses)
+
+
+def _worse(error: float) -> float:
+    """An order of errors in which NaN is the largest."""
+    return float("inf") if error != error else error
 
 
 def largest(
     module: ModuleType,
     name: str,
     checks: list[Check],
-    call: Callable[..., Array],
+    call: Use,
     witness: Witness,
 ) -> tuple[float, str]:
-    """Largest error of a function in all its checks, and what it raised."""
+    """Largest error of a function in all its checks, and what it raised; infinite where it has other
+    constants than the file by itself.
+    """
     try:
         errors = [
             difference(c.compared(call(module, name, c, witness.keywords)), c.expected, c.scale)
             for c in checks
         ]
+        given, own = (outcome(call, module, name, checks[0], k) for k in (witness.defaults, {}))
+        if given != own:
+            return float("inf"), "other values without constants than with those of the file"
     except Exception as error:  # a text may fail in any way
         return float("inf"), str(error) or repr(error)
     return max(errors), ""
+
+
+def outcome(
+    call: Use, module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
+) -> bytes | str:
+    """What a function gives, as bytes, or what it raises, as text."""
+    try:
+        return call(module, name, check, constants).tobytes()
+    except Exception as error:  # a text may fail in any way
+        return str(error)
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
@@ -212,20 +249,39 @@ def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str,
     return np.stack(value, axis=-2) if isinstance(value, tuple) else np.asarray(value)
 
 
-def _casadi(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
-    """Results side by side, by sample, as the NumPy module has them."""
-    arguments, keywords, ndim = check.arguments, check.keywords, check.expected.ndim
-    function = module.jacobian_of(keywords["frame"]) if keywords else getattr(module, name)
-    alone = arguments[0].ndim == 1
+def _by_casadi(
+    module: ModuleType, name: str, check: Check, constants: Mapping[str, float]
+) -> Array:
+    """Results side by side, by sample, as on NumPy's arrays."""
+    function, arguments = _function(module, name, *check.keywords.values()), check.arguments
+    alone, ndim = arguments[0].ndim == 1, check.expected.ndim
     N = 1 if alone else len(arguments[0])
-    results = function.call([np.asarray(a).T for a in (*arguments, *constants.values())])
-    arrays = [np.asarray(r).reshape(r.size1(), N, -1).transpose(1, 0, 2) for r in results]
-    if name.endswith("derivatives"):
-        value = np.concatenate(arrays, axis=2)
-    else:
-        value = np.stack(arrays, axis=1) if len(arrays) > 1 or ndim + alone > 3 else arrays[0]
+    given = dict(zip(function.name_in(), map(np.transpose, arguments), strict=False))
+    results = function(**given, **constants)
+    labels = function.name_out()
+    if name == "passive_joints":  # positions, rates, accelerations, of what is given
+        labels = labels[: len(arguments)]
+    arrays = [np.asarray(results[label]) for label in labels]
+    arrays = [r.reshape(len(r), N, -1).transpose(1, 0, 2) for r in arrays]
+    value = np.stack(arrays, axis=1) if len(arrays) > 1 or ndim + alone > 3 else arrays[0]
     value = value[0] if alone else value
     return value[..., 0] if value.ndim == ndim + 1 and value.shape[-1] == 1 else value
+
+
+@lru_cache(maxsize=64)
+def _function(module: ModuleType, name: str, *frame: int) -> Any:
+    return module.casadi(name, frame=frame[0]) if frame else module.casadi(name)
+
+
+def _derivative_error(module: ModuleType, witness: Witness) -> float:
+    """Error of the derivatives of torques by q, qd, qdd, X that are known: the last two, A and D."""
+    function = module.casadi(DERIVATIVES)
+    states = (witness.q[0], witness.qd[0], witness.qdd[0], witness.X)
+    *_, A, D = map(np.asarray, function(*states, *witness.keywords.values()))
+    return max(
+        difference(A, witness.A[0], np.abs(witness.A).max()),
+        difference(D, witness.own[0], np.abs(witness.own).max()),
+    )
 
 
 # --- C ---
@@ -287,7 +343,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             value = np.moveaxis(np.reshape(numbers, (*shape, N)), -1, 0)
         worst = float("inf") if status else difference(value, check.expected, check.scale)
         errors[f] = max(errors.get(f, 0.0), worst)
-    return errors | {"SOURCE_SHA256": 0.0 if f'"{witness.robot.sha256}"' in text else float("inf")}
+    return errors
 
 
 def _flat(a: Array) -> list[float]:

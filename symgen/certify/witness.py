@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symgen.certify.on_request import ANGLE_STEP, SIX_POINTS, of_elements, requested_values
+from symgen.certify.on_request import of_elements, requested_values
 from symgen.derive.exact import Array
 from symgen.derive.loop_residual import inertia_of
 from symgen.derive.loops import close
@@ -35,13 +35,10 @@ if TYPE_CHECKING:
 
 STATES = 20  # of every function: more than a tile of C, the last one at rest
 BLOCKS = 8200
-FEW = 4  # states of the derivatives
 MOVED = 1e-9  # rows of a Jacobian below are zero
 SMALL = 1e-6  # of the largest entry: columns of the regressor below are compared with that
 SPREADS = ((0.25, 0.3), (0.25, 0.0), (0.03, 0.03), (0.03, 0.0))  # of constants, of those that are 0
 RANDOM, OF_THE_FILE = "random constants", "the constants of the file"
-SPEED_STEP = 1e-4  # rad/s or m/s
-ANGLE_STEP_OF_LAWS, SPEED_STEP_OF_LAWS = 1e-4, 1e-5  # the same, where laws bend and jump
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ class Witness:
         no_direct = np.linalg.matrix_rank(self.A).min() < self.q.shape[1] or self.robot.loaded
         self.left_out = {
             *["gravity"] * absorbing,
-            *["forward_dynamics", "forward_dynamics_derivatives"] * bool(no_direct),
+            *["forward_dynamics"] * bool(no_direct),
         }
 
     def torque(self, q: Array, qd: Array, qdd: Array, chi: Array | None = None) -> Array:
@@ -131,6 +128,16 @@ class Witness:
     def keywords(self) -> dict[str, float]:
         """Constants that the functions take by keyword."""
         return {name: self.constants[name] for name in self.regrouping.constants}
+
+    @property
+    def defaults(self) -> dict[str, float]:
+        """What these constants are in the file."""
+        return {name: self.robot.constants[name] for name in self.regrouping.constants}
+
+    @property
+    def tied(self) -> bool:
+        """Whether closure equations alone tie some joints."""
+        return bool(close(self.robot).tied)
 
     @cached_property
     def own(self) -> Array:
@@ -218,7 +225,7 @@ class Witness:
                 *of_states((q, qd, qdd), motion, size),
                 *of_states((q,), motion[:, 0], size),
             ]
-        if not close(self.robot).tied:  # more samples than a block of the NumPy module has
+        if not self.tied:  # more samples than a block of the NumPy module has
             rows = np.arange(BLOCKS) % N
             checks["gravity"].append(Check((q[rows], X), self.rest[rows], largest))
         return self._kept(checks)
@@ -290,40 +297,6 @@ class Witness:
         qddr = self.tau / np.abs(self.tau).max()
         values |= requested_values(self.model, self.regrouping, chi, states, tree, qddr)
         return np.asarray(values[name]())
-
-    @cached_property
-    def derivatives(self) -> dict[str, list[Check]]:
-        """Derivatives of both dynamics by their arguments, side by side; those of sign(qd) are
-        zero.
-        """
-        q, qd, qdd, n = self.q[:FEW], self.qd[:FEW], self.qdd[:FEW], self.q.shape[1]
-        smooth = self.chi * ~of_elements(self.robot, lambda e: e.kind == "coulomb")
-        laws = any(e.is_own for e in self.robot.elements)
-        h, hd = (ANGLE_STEP_OF_LAWS, SPEED_STEP_OF_LAWS) if laws else (ANGLE_STEP, SPEED_STEP)
-        by_q, by_qd = np.zeros((2, FEW, n, n))
-        for k, e in enumerate(np.eye(n)):
-            for m, c in SIX_POINTS.items():
-                ahead, behind = (self.torque(q + s * m * h * e, qd, qdd, smooth) for s in (1, -1))
-                by_q[:, :, k] += c * (ahead - behind) / h
-                ahead, behind = (self.torque(q, qd + s * m * hd * e, qdd, smooth) for s in (1, -1))
-                by_qd[:, :, k] += c * (ahead - behind) / hd
-        A, D = self.A[:FEW], self.own[:FEW]
-        by_motion = np.concatenate([by_q, by_qd], axis=2)
-        inverse = np.concatenate([by_motion, A, D], axis=2)
-        forward = np.concatenate([-by_motion, np.broadcast_to(np.eye(n), A.shape), -D], axis=2)
-        scale = np.abs(inverse).max()
-        checks = {
-            "inverse_dynamics_derivatives": [Check((q, qd, qdd, self.X), inverse, scale)],
-            "forward_dynamics_derivatives": [
-                Check(
-                    (q, qd, self.tau[:FEW], self.X),
-                    forward,
-                    scale,
-                    compared=lambda d: np.asarray(A @ d),
-                )
-            ],
-        }
-        return self._kept(checks)
 
 
 def ungrouped(robot: Robot) -> Regrouping:

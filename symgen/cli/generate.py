@@ -34,9 +34,11 @@ def generate(
     target: Annotated[
         str,
         typer.Option(
-            help=(
-                "What to emit: numpy, casadi, c, xp (arrays of any package), or several as numpy,c."
+            help="What to emit, one or several as numpy,c: "
+            + ", ".join(
+                f"{name} ({t.language}, {t.file.format('NAME')})" for name, t in TARGETS.items()
             )
+            + "."
         ),
     ] = "numpy",
     with_: Annotated[
@@ -58,9 +60,7 @@ def generate(
         ),
     ] = False,
 ) -> None:
-    """Derive the models of each ROBOT and write them as OUTPUT/<name>.py, _casadi.py, .c or _xp.py.
-    All are written, or none.
-    """
+    """Derive the models of each ROBOT and write them as files of OUTPUT. All are written, or none."""
     with reported_errors():
         targets = _among(TARGETS, "target", target)
         requested = _among(OPTIONS, "--with", with_) if with_ else ()
@@ -89,6 +89,7 @@ def emitted(
 ) -> dict[str, str]:
     """{file name: text} of every robot and target. Raises SymgenError before any is written."""
     from symgen.certify.modules import certified_files
+    from symgen.derive.loops import close
     from symgen.description import packaged_robots
 
     modules: dict[str, str] = {}
@@ -100,12 +101,17 @@ def emitted(
         files = certified_files(robot, targets=targets, command=command, options=requested)
         if modules.keys() & files.keys():
             fail(f"two robots are called {robot.name}; their modules would overwrite each other")
-        for left_out in (t for t in targets if TARGETS[t].file.format(robot.name) not in files):
-            typer.echo(
-                f"{robot.name}: no {left_out} target, its loops are closed by iteration; the NumPy "
-                "module serves",
-                err=True,
-            )
+        tied = bool(close(robot).tied)
+        for name in targets:
+            target = TARGETS[name]
+            if tied and not target.iterates:
+                said = (
+                    f"no {name} target, its loops are closed by iteration; the NumPy module serves"
+                )
+                typer.echo(f"{robot.name}: {said}", err=True)
+            elif target.use:
+                file = target.file.format(robot.name)
+                typer.echo(f"{file}: {target.use.format(robot.name)}", err=True)
         if robot.loaded:
             typer.echo(
                 f"{robot.name}: no forward_dynamics: laws of {', '.join(robot.loaded)} read "
@@ -117,15 +123,15 @@ def emitted(
 
 
 def report_differences(output: Path, modules: dict[str, str]) -> None:
-    """Print a unified diff of every module that is not, below its certificate, what would be
+    """Print a unified diff of every module that is not, without_certificate its certificate, what would be
     written; exit code 1 if there is one.
     """
-    from symgen.certify.importing import below
+    from symgen.certify.importing import without_certificate
 
     stale = []
     for path, text in ((output / name, text) for name, text in modules.items()):
         present = path.read_text(encoding="utf-8") if path.is_file() else None
-        if present is not None and below(present) == below(text):
+        if present is not None and without_certificate(present) == without_certificate(text):
             continue
         stale.append(path)
         if present is None:

@@ -115,6 +115,8 @@ class Model:
         Whether a constant may be added to it.
     page : int
         Its place on the page of a robot, from 1; 0 where it is not shown there.
+    case_of : str
+        The model that it is where the arguments that it has not are zero: Python modules call that.
     option : str
         What asks targets for it (`symgen generate --with`); empty where they always have it.
     latex : str
@@ -140,13 +142,18 @@ class Model:
     denominator: str = ""
     up_to_a_constant: bool = False
     page: int = 0
+    case_of: str = ""
     option: str = ""
     latex: str = ""
 
     @property
     def summary(self) -> str:
-        """What it is, as a sentence."""
-        return f"{self.meaning[0].upper()}{self.meaning[1:]}."
+        """What it is, as a sentence; a symbol at its start stays as it is."""
+        word = self.meaning.partition(" ")[0]
+        first = (
+            self.meaning[0] if word in self.arguments + (self.result,) else self.meaning[0].upper()
+        )
+        return f"{first}{self.meaning[1:]}."
 
     @property
     def printed(self) -> bool:

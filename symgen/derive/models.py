@@ -281,7 +281,7 @@ MODELS = {
         Model(
             "bias", "H", ("q", "qd", "X"), ("joints",), TORQUE,
             "Gamma at qdd = 0: Coriolis, centrifugal, gravity, friction and offset", _bias,
-            result="GAM", page=6,
+            result="GAM", page=6, case_of="inverse_dynamics",
         ),
         Model(
             "gravity", "Q", ("q", "X"), ("joints",), TORQUE,

@@ -10,7 +10,7 @@ no sample stands before the loops.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from symgen.derive.graph import CONST, COS, OPAQUE, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
 from symgen.description.namespace import Namespace
@@ -26,6 +26,13 @@ U T S N size_t int32_t int64_t memcpy memset"""
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
 HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")
 """Macros of math.h and stdint.h."""
+
+
+def is_word(name: str) -> bool:
+    """Whether C, its headers or the frame of a kernel use the name."""
+    return name in RESERVED or bool(HEADERS.fullmatch(name))
+
+
 C = Language(
     {op: op for op in (COS, SIN, SIGN, SQRT)} | OPAQUE,
     "above({})",
@@ -34,12 +41,11 @@ C = Language(
     one="1.0",
     square="{0}*{0}",
     number=lambda c: repr(float(c)),
+    comment="//",
+    step="const double {} = {};",
+    entry="{} = {};",
+    is_word=is_word,
 )
-
-
-def is_word(name: str) -> bool:
-    """Whether C, its headers or the frame of a kernel use the name."""
-    return name in RESERVED or bool(HEADERS.fullmatch(name))
 
 
 class CText(Text):
@@ -73,14 +79,13 @@ class CText(Text):
     def _has_line(self, node: Node) -> bool:
         return super()._has_line(node) or (node.op in (COS, SIN) and not node.fixed)
 
-    def _line(self, node: Node) -> str:
-        return f"const double {super()._line(node)};"
-
-    def _sections(self) -> tuple[Section, ...]:
+    def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
         lines = [
             n
             for n in self.nodes
-            if n.index in self.named & self._main and not n.fixed and n.op not in (COS, SIN)
+            if n.index in self.named & self._main & {*nodes}
+            and not n.fixed
+            and n.op not in (COS, SIN)
         ]
         return under_titles(
             ("Angles" if n.index in self._under else self._title(n), self._line(n)) for n in lines

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from symgen.description.robot import Robot
-from symgen.emit import c_target, casadi_target, numpy_target, xp_target
+from symgen.emit import c_target, python_target
+from symgen.emit.c_printer import C
+from symgen.emit.printers import PYTHON, Language
 from symgen.emit.spec import ModuleSpec, module_spec, spec_of
 from symgen.emit.targets import TARGETS
 from symgen.regroup.regrouping import Regrouping
 
-RENDER: dict[str, Callable[..., str]] = {
-    "numpy": numpy_target.render,
-    "casadi": casadi_target.render,
-    "c": c_target.render,
-    "xp": xp_target.render,
+
+@dataclass(frozen=True)
+class Emitter:
+    """How a target is written: its language, and `render(spec, command=...)`."""
+
+    language: Language
+    render: Callable[..., str]
+
+
+_PYTHON = Emitter(PYTHON, python_target.render)
+EMITTERS = {
+    "numpy": _PYTHON,
+    "casadi": _PYTHON,
+    "xp": _PYTHON,
+    "c": Emitter(C, c_target.render),
 }
 
 
@@ -55,7 +68,5 @@ def generate_files(
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
     )
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
-    return {
-        TARGETS[name].file.format(robot.name): RENDER[name](spec, command=command)
-        for name in served
-    }
+    file = {TARGETS[name].file.format(robot.name): name for name in served}
+    return {path: EMITTERS[name].render(spec, command=command) for path, name in file.items()}

@@ -90,7 +90,7 @@ def header(spec: ModuleSpec, texts: Mapping[str, Text], formulas: bool) -> list[
         *lines,
         "",
         "Cost per sample",
-        *(f"    {name:<18} {f.cost}" for name, f in spec.functions.items()),
+        *(f"    {name:<18} {f.cost}" for name, f in spec.functions.items() if not f.model.case_of),
     ]
 
 
@@ -220,10 +220,8 @@ def _form_text(form: Mapping[tuple[int, int], Any]) -> str:
     return " + ".join(parts)
 
 
-def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
-    """The constants of the module, as Python source; STRUCTURE as an array where the module has
-    `numpy`, else as a tuple of rows.
-    """
+def tables(spec: ModuleSpec) -> list[str]:
+    """The constants of the module, as Python source."""
     robot, regrouping = spec.robot, spec.regrouping
     units = names("UNITS", [unit(robot, b.own) for b in regrouping.base])
     units[0] = units[0].replace("= ", "= dict(zip(BASE_PARAMETERS, ", 1)
@@ -242,7 +240,7 @@ def tables(spec: ModuleSpec, *, numpy: bool = True) -> list[str]:
         *names("NO_EFFECT", regrouping.no_effect),
         *by_line("FORMULAS", grouped(regrouping)),
         *units,
-        *_structure(spec, numpy),
+        *_structure(spec),
     ]
 
 
@@ -298,19 +296,13 @@ def _drives(robot: Robot) -> list[str]:
     ]
 
 
-def _structure(spec: ModuleSpec, numpy: bool) -> list[str]:
-    marks = 'mark == "x" for mark in row'
-    first, last = (
-        (f"np.array([[{marks}] for row in (", ")])")
-        if numpy
-        else (f"tuple(tuple({marks}) for row in (", "))")
-    )
+def _structure(spec: ModuleSpec) -> list[str]:
     rows = ['"' + "".join("x" if mark else "." for mark in row) + '",' for row in spec.structure]
     return [
         "# STRUCTURE[k, j]: whether base parameter k acts on joint j",
-        f"STRUCTURE = {first}",
+        'STRUCTURE = np.array([[mark == "x" for mark in row] for row in (',
         *(f"    {line}" for line in wrap(" ".join(rows), WIDTH - 4, break_long_words=False)),
-        last,
+        ")])",
     ]
 
 

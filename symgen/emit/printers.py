@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -47,7 +47,7 @@ def number(c: Fraction) -> str:
 
 @dataclass(frozen=True)
 class Language:
-    """How operations are written.
+    """How operations, steps and entries are written.
 
     Attributes
     ----------
@@ -59,8 +59,14 @@ class Language:
         pi, the 1 of 1/x, and the square of {}.
     number : callable
         A rational as text.
-    lift : str
-        Before the argument of a function of constants, which an array package refuses.
+    comment : str
+        What starts a comment that ends with its line.
+    step, entry : str
+        A line that names a value, and one that fills an entry of a result: name, value.
+    chained : bool
+        Whether one line may fill several entries, `A[0, 1] = A[1, 0] = x`.
+    is_word : callable
+        Whether the language, or the frame of its functions, has a word of its own of that name.
     """
 
     calls: Mapping[str, str]
@@ -70,14 +76,21 @@ class Language:
     one: str = "1"
     square: str = "{0}**2"
     number: Callable[[Fraction], str] = number
-    lift: str = ""
+    comment: str = "#"
+    step: str = "{} = {}"
+    entry: str = "{} = {}"
+    chained: bool = True
+    is_word: Callable[[str], bool] = lambda name: False
 
     def expression(self, e: Expression) -> str:
         """A constant expression, or one linear in joint positions."""
-        text = re.sub(
-            r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}({self.lift}", str(e)
-        )
+        text = re.sub(r"\b(cos|sin|sqrt)\(", lambda name: f"{self.calls[name[1]]}(", str(e))
         return re.sub(r"\bpi\b", self.pi, text)
+
+    def entries(self, targets: Sequence[str], value: str, remark: str) -> list[str]:
+        """The lines that fill the places of one entry; a remark stands behind a tab."""
+        targets = [" = ".join(targets)] if self.chained else targets
+        return [f"{self.entry.format(target, value)}\t{remark}" for target in targets]
 
 
 def _calls(package: str) -> dict[str, str]:
@@ -86,19 +99,10 @@ def _calls(package: str) -> dict[str, str]:
     }
 
 
-NUMPY = Language(
-    _calls("np.") | {"power": "np.power"}, "np.maximum({}, 0.0)", "np.minimum({}, 0.0)", "np.pi"
+PYTHON = Language(
+    _calls("xp.") | {"power": "xp.power"}, "xp.maximum({}, 0.0)", "xp.minimum({}, 0.0)", "xp.pi"
 )
-CASADI = Language(
-    _calls("ca.") | {"power": "ca.power"}, "ca.fmax({}, 0.0)", "ca.fmin({}, 0.0)", "ca.pi"
-)
-ARRAYS = Language(
-    _calls("xp.") | {SIGN: "_sign"},
-    "xp.clip({}, min=0.0)",
-    "xp.clip({}, max=0.0)",
-    "xp.pi",
-    lift="zero + ",
-)
+"""Over a namespace `xp`: NumPy, or the functions of another package under the same names."""
 PLAIN = Language(
     _calls(""), "max({}, 0)", "min({}, 0)", "pi", number=partial(decimal, fractions=False)
 )
@@ -136,7 +140,7 @@ class Text:
         What each output is called, for parts that several share.
     """
 
-    language: Language = NUMPY
+    language: Language = PYTHON
 
     def __init__(
         self,
@@ -159,7 +163,7 @@ class Text:
         self.named = {n.index for n in self.nodes if n.op not in (SYM, CONST) and self._has_line(n)}
         self._assign_names(outputs, labels)
         self._marks = [(0, "Inputs"), *headings]
-        self.sections = self._sections()
+        self.sections = self.sections_of({n.index for n in self.nodes})
 
     def _uses(self, outputs: Sequence[Scalar | int]) -> Iterator[Scalar]:
         for node in self.nodes:
@@ -257,7 +261,8 @@ class Text:
 
     # --- lines ---
 
-    def _sections(self) -> tuple[Section, ...]:
+    def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
+        """The lines of some of its nodes, under their headings."""
         circular = [self._positive(n) for n in self.nodes if n.op in (COS, SIN)]
         trigonometry = {n.index for n in reachable(circular)}
 
@@ -267,7 +272,8 @@ class Text:
         def title(node: Node) -> str:
             return ("Constants", "Trigonometry", self._title(node))[place(node)]
 
-        named = sorted((n for n in self.nodes if n.index in self.named), key=place)
+        lines = (n for n in self.nodes if n.index in self.named and n.index in nodes)
+        named = sorted(lines, key=place)
         return under_titles((title(n), self._line(n)) for n in named)
 
     def _title(self, node: Node) -> str:
@@ -275,7 +281,7 @@ class Text:
         return self._marks[bisect_right(self._marks, node.index, key=itemgetter(0)) - 1][1]
 
     def _line(self, node: Node) -> str:
-        return f"{self.called[node.index]} = {self._body(self._as_named(node))}"
+        return self.language.step.format(self.called[node.index], self._body(self._as_named(node)))
 
     def _name_sign(self, node: Node) -> int:
         return self.sign.get(node.index, 1)
@@ -315,9 +321,8 @@ class Text:
                 return text if (s.sign > 0) == (x.sign > 0) else "-" + text
             case "inv":
                 return f"{minus}{language.one}/{self._divisor(node.operands[0])}"
-        lift = language.lift if node.fixed else ""
         operands = ", ".join(map(self._operand, node.operands))
-        return f"{minus}{language.calls[node.op]}({lift}{operands})"
+        return f"{minus}{language.calls[node.op]}({operands})"
 
     def _sum(self, s: Scalar) -> str:
         """Positive terms first: that saves a negation."""

@@ -1,32 +1,44 @@
-"""What the Python modules of every array package share: signatures with hints, formulas of the base
-parameters, tables that depend on constants.
+"""The Python module of a robot: one text for NumPy, the arrays of any other package, and CasADi.
+
+A block is a function of plain expressions over a namespace `xp` that fills a container by index:
+NumPy's array in place, a table that is stacked for packages whose arrays cannot be written to,
+matrices of CasADi. What functions share of the motion of the links is a block of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any
 
 from symgen.derive.closure import Closure
 from symgen.derive.columns import acting, element_names
-from symgen.derive.model import Entry
+from symgen.derive.graph import SYM, Node, Scalar
+from symgen.derive.loop_equations import loop_system
+from symgen.derive.model import Entry, Model
 from symgen.derive.models import EMITTED, ON_REQUEST
 from symgen.description.expression import Expression
 from symgen.description.namespace import Namespace
-from symgen.description.robot import FIXED, Robot
-from symgen.emit.header import header, packed, plain, wrapped
-from symgen.emit.printers import Language, Section, Text, under_titles
-from symgen.emit.render import WIDTH
-from symgen.emit.spec import STATES, Function, ModuleSpec
+from symgen.description.robot import FIXED, PRISMATIC, Robot
+from symgen.emit.header import data, header, literal, packed, plain, tables, wrapped
+from symgen.emit.printers import PYTHON, Language, Section, Text, under_titles
+from symgen.emit.render import WIDTH, laid_out
+from symgen.emit.spec import SHARING, STATES, Function, ModuleSpec
 from symgen.regroup.regrouping import Regrouping, sign_conditions
 from symgen.version import VERSION
+
+BLOCK = 4096  # samples
+FEWEST_SHARED = 8  # values of the motion of the links that are worth a function of their own
+IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m
+
+
+# --- functions as text, in any language ---
 
 
 @dataclass(frozen=True)
 class Block:
-    """A function in Python: what it reads, its lines, and the array that it fills.
+    """A function as text: what it takes, its lines, and the array that it fills.
 
     Attributes
     ----------
@@ -34,92 +46,159 @@ class Block:
         The model.
     text : Text
         Its printed values.
-    names : Namespace
-        Its local names.
+    sections : tuple of Section
+        Inputs and steps.
     result : str
         The array, under its local name.
     arguments : tuple of str
-        States, X and constants that its lines read.
+        States, X and constants.
     constants : tuple of str
-        The last of them.
-    inputs : tuple of str
-        Lines that unpack states and X.
+        The last of them, those that are functions of time at the end.
     """
 
     function: Function
     text: Text
-    names: Namespace
+    sections: tuple[Section, ...]
     result: str
     arguments: tuple[str, ...]
     constants: tuple[str, ...]
-    inputs: tuple[str, ...]
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        return self.function.states
-
-    def sections(self, results: Sequence[Section]) -> tuple[Section, ...]:
-        """Inputs, steps and `results`, those without lines left out."""
-        every = (Section("Inputs", self.inputs), *self.text.sections, *results)
-        return tuple(section for section in every if section.lines)
 
     def results(self, target: Callable[[Sequence[int]], str]) -> list[Section]:
         """Assignments of the computed entries under their headings; `target` of a place."""
+        language = self.text.language
         lines = []
         for entry in self.function.computed:
-            targets = " = ".join(map(target, self.function.places(entry)))
-            line = f"{targets} = {self.text.expression(entry.value)}\t{entry.comment}"
-            lines.append((entry.heading, line))
-        return [Section(s.title, aligned(s.lines)) for s in under_titles(lines)]
+            targets = [target(place) for place in self.function.places(entry)]
+            value = self.text.expression(entry.value)
+            for line in language.entries(targets, value, entry.comment):
+                lines.append((entry.heading, line))
+        return [Section(s.title, aligned(s.lines, language)) for s in under_titles(lines)]
+
+
+Inputs = Callable[[str, Sequence[tuple[int, str]], int], list[str]]
+"""Lines that name entries (index, name) of a source that has so many."""
 
 
 def blocks_of(
-    spec: ModuleSpec,
-    language: Language,
-    component: Callable[[str, int], str] = "{}[{}]".format,
-    unpack: bool = True,
+    spec: ModuleSpec, language: Language, component: Callable[[str, int], str] = "{}[{}]".format
 ) -> dict[str, Block]:
-    """The functions of a module in a language of Python.
+    """Every function of a module in a language, each by itself.
 
-    component : how an entry of a state or of X is read. unpack : whether several may be read in
-    one line.
+    component : how an entry of a state or of X is read.
     """
-    names = spec.names()
+
+    def inputs(source: str, wanted: Sequence[tuple[int, str]], count: int) -> list[str]:
+        return [language.step.format(name, component(source, k)) for k, name in wanted]
+
+    names = spec.names(language.is_word)
     return {
-        name: _block(spec, f, names.inner(), language, component, unpack)
+        name: Printed(spec, [f], names.inner(), language, inputs).block(f)
         for name, f in spec.functions.items()
     }
 
 
-def _block(
-    spec: ModuleSpec,
-    f: Function,
-    names: Namespace,
-    language: Language,
-    component: Callable[[str, int], str],
-    unpack: bool,
-) -> Block:
-    result, rates = names.own(f.model.result), names.own("G")
-    columns = dict.fromkeys(STATES.values(), spec.derivation.closure.independent)
-    labels = [label(f, e) for e in f.values.entries]
-    text = Text(f.values.outputs, f.values.algebra.sections, names, labels, language)
-    sources = {state: [f"{letter}{j}" for j in columns[letter]] for state, letter in STATES.items()}
-    named = spec.derivation.algebra.named
-    sources[rates] = [named("G", u, i) for u in spec.tied for i in spec.robot.joints]
-    sources["X"] = list(spec.regrouping.names)
-    written = {str(node.value): text.called[node.index] for node in text.nodes if node.op == "sym"}
-    inputs: list[str] = []
-    for source, items in sources.items():
-        wanted = [(k, written[item]) for k, item in enumerate(items) if item in written]
-        if unpack:
-            inputs += _unpack(source, wanted, len(items))
-        else:
-            inputs += [f"{name} = {component(source, k)}" for k, name in wanted]
-    constants = f.constants(spec.regrouping.constants)
-    constants = tuple(sorted(constants, key=spec.robot.channels.__contains__))
-    states = [rates if state == "G" else state for state in f.states]
-    X = ["X"] if f.reads("parameter") else []
-    return Block(f, text, names, result, (*states, *X, *constants), constants, tuple(inputs))
+class Printed:
+    """Functions over one graph as text, in one scope of names.
+
+    Parameters
+    ----------
+    spec : ModuleSpec
+        The module.
+    functions : sequence of Function
+        Over one graph.
+    names : Namespace
+        The names of the scope.
+    language : Language
+        How lines are written.
+    inputs : callable
+        How states and X are read.
+    """
+
+    def __init__(
+        self,
+        spec: ModuleSpec,
+        functions: Sequence[Function],
+        names: Namespace,
+        language: Language,
+        inputs: Inputs,
+    ) -> None:
+        self.spec, self.functions, self.inputs = spec, functions, inputs
+        self.results = {f.model.name: names.own(f.model.result) for f in functions}
+        self.rates = names.own("G") if spec.tied else ""
+        outputs = [value for f in functions for value in f.values.outputs]
+        labels = [label(f, e) for f in functions for e in f.values.entries]
+        headings = functions[0].values.algebra.sections
+        self.text = Text(outputs, headings, names, labels, language)
+        self.shared: set[int] = set()  # nodes of all functions, where there are several
+        if len(functions) > 1:
+            self.shared = set.intersection(*({n.index for n in f.nodes} for f in functions))
+
+    @property
+    def given(self) -> list[str]:
+        """Names of what the functions read of what they share."""
+        read = {n.index for f in self.functions for n in self._read(f)}
+        return [self.text.called[k] for k in sorted(read & self.shared & self.text.named)]
+
+    @property
+    def motion(self) -> Block:
+        """What the functions share, as a function of its own."""
+        own = [n for n in self.functions[0].nodes if n.index in self.shared]
+        operands = {x.node.index for n in own for x in n.operands}
+        return self._block(self.functions[0], own, [n for n in own if n.index in operands], ())
+
+    def block(self, f: Function) -> Block:
+        """A function without what it shares, for which it calls."""
+        own = [n for n in f.nodes if n.index not in self.shared]
+        call: list[str] = []
+        if self.given:
+            names = {self.text.called.get(n.index, "") for n in self._read(f)}
+            read = [name if name in names else "_" for name in self.given]
+            call = unpacked(read, f"_motion({', '.join(['xp', *self.motion.arguments])})")
+        return self._block(f, own, self._read(f), call)
+
+    def _read(self, f: Function) -> list[Node]:
+        """The nodes that the lines of a function read or make."""
+        read = {o.node.index for o in f.values.outputs if isinstance(o, Scalar)}
+        for node in f.nodes:
+            if node.index not in self.shared:
+                read |= {node.index, *(x.node.index for x in node.operands)}
+        return [node for node in f.nodes if node.index in read]
+
+    def _block(
+        self, f: Function, own: Sequence[Node], read: Sequence[Node], call: Sequence[str]
+    ) -> Block:
+        """The lines of the nodes `own`, which read others, behind a call."""
+        spec = self.spec
+        joints, independent = spec.robot.joints, spec.derivation.closure.independent
+        sources = {s: [f"{letter}{j}" for j in independent] for s, letter in STATES.items()}
+        sources[self.rates] = [
+            spec.derivation.algebra.named("G", u, i) for u in spec.tied for i in joints
+        ]
+        sources["X"] = list(spec.regrouping.names)
+        called = {str(n.value): self.text.called[n.index] for n in read if n.op == SYM}
+        inputs: list[str] = []
+        for source, items in sources.items():
+            wanted = [(k, called[item]) for k, item in enumerate(items) if item in called]
+            inputs += self.inputs(source, wanted, len(items))
+        sections = [
+            Section("Inputs", tuple(inputs)),
+            Section("Motion of the links", tuple(call)),
+            *self.text.sections_of({n.index for n in own}),
+        ]
+        states, reads_X = f.model.states, ["X"] if f.model.reads_X else []
+        if spec.tied and not f.model.of_loops:
+            states = ("q", "qd", "qdd", self.rates)
+        used = {n.value.name for n in (f.nodes if call else read) if n.op == SYM}
+        constants = [c for c in spec.regrouping.constants if c in used]
+        constants.sort(key=spec.robot.channels.__contains__)
+        return Block(
+            f,
+            self.text,
+            tuple(section for section in sections if section.lines),
+            self.results[f.model.name],
+            (*states, *reads_X, *constants),
+            tuple(constants),
+        )
 
 
 def label(f: Function, entry: Entry) -> str:
@@ -128,11 +207,248 @@ def label(f: Function, entry: Entry) -> str:
     return name or f"{f.model.result}{''.join(str(k + 1) for k in entry.place)}"
 
 
-def aligned(lines: Sequence[str]) -> tuple[str, ...]:
+def aligned(lines: Sequence[str], language: Language) -> tuple[str, ...]:
     """Comments behind a tab in one column, up to a limit; none where the line gets too long."""
     parts = [line.partition("\t") for line in lines]
     width = min(max((len(code) for code, _, _ in parts), default=0), 64)
-    return tuple(f"{code:<{width}}  # {comment}" if comment else code for code, _, comment in parts)
+    mark = language.comment
+    return tuple(
+        f"{code:<{width}}  {mark} {comment}" if comment else code for code, _, comment in parts
+    )
+
+
+# --- the Python module ---
+
+
+def render(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The module of `spec`. Same robot file, same version: same bytes."""
+    robot, regrouping, closure = spec.robot, spec.regrouping, spec.derivation.closure
+    free = regrouping.constants
+    blocks, motion = _blocks(spec)
+    models = {
+        name: m
+        for name, m in (EMITTED | ON_REQUEST).items()
+        if (name in spec.functions or not m.option)
+        and not (name == "forward_dynamics" and robot.loaded)
+    }
+    read = {name for b in regrouping.base for name in b.combination}
+    rates = {e for row in closure.row.values() for e in row.values()}
+    passive = [e for j in robot.passive for e in (closure.offset[j], *closure.row[j].values())]
+    coefficients = [c for b in regrouping.base for c in b.combination.values()]
+    coefficients += [ratio for _, ratio, _ in sign_conditions(regrouping)]
+    taken = {name: b.constants for name, b in blocks.items()} | {
+        "base_parameters": _symbols(coefficients),
+        "moving": _symbols(rates),
+        "passive_joints": _symbols(passive),
+    }
+    constants = {name: [c for c in free if c in used] for name, used in taken.items()}
+    scope = spec.names(PYTHON.is_word)
+    passive_names = [scope.own(name) for name in ("x", "P", "one")]
+    slides = any(robot.frame(j).sigma == PRISMATIC for j in closure.independent)
+    return laid_out(
+        "module.py",
+        {
+            **spec.sizes,
+            "opening": wrapped(
+                f'"""{plain(robot.title or robot.name)}: base parameters, regressor, dynamics.', ""
+            ),
+            "file": plain(robot.file or robot.name),
+            "sha256": robot.sha256,
+            "version": VERSION,
+            "command": plain(command or robot.file or robot.name),
+            "header": [
+                plain(line)
+                for line in header(spec, {n: b.text for n, b in blocks.items()}, formulas=False)
+            ],
+            "tables": [*tables(spec), *_loop_tables(spec, slides)],
+            "data": [*literal("LINKS", robot.links), *data(spec)],
+            "head": Heads(regrouping),
+            "models": models,
+            "shapes": {name: f.shape for name, f in spec.functions.items()},
+            "outputs": _outputs(spec, models.values()),
+            "constants": constants,
+            "passed": {name: _passed(robot, names) for name, names in constants.items()},
+            "tuple_of": tuple_of,
+            "listed": listed,
+            "keywords": "".join(f", {c}={c}" for c in free),
+            "channels": robot.channels,
+            "tied": spec.tied,
+            "passive": robot.passive,
+            "size": BLOCK,
+            "store_constants": _constant_entries(spec.functions["regressor"], "D"),
+            "elements": _element_lines(robot),
+            "unpack": unpacked(
+                [name if name in read else "_" for name in robot.parameters], "standard"
+            ),
+            "formulas": broken(
+                f"{b.name} = {b.formula.text(PYTHON.expression)}"
+                for b in regrouping.base
+                if b.name != b.own
+            ),
+            "conditions": [
+                (
+                    f"{source(ratio)} {'>' if sign > 0 else '<'} 0",
+                    f"{name} holds where {ratio} is {'positive' if sign > 0 else 'negative'}",
+                    name,
+                )
+                for name, ratio, sign in sign_conditions(regrouping)
+            ],
+            "packed": packed(list(regrouping.names)),
+            "moving": _moving(robot, closure),
+            "passive_names": passive_names,
+            "passive_rows": _passive_rows(robot, closure, passive_names),
+            "motion": motion,
+            "blocks": [_laid_out(spec, b) for b in blocks.values()],
+            "functions": spec.functions,
+            "slides": slides,
+            "turn": loop_system(robot).turn() if spec.tied else None,
+            "pace": f"{loop_system(robot).pace():.2g}" if spec.tied else "",
+            "joint": robot.joints[0],
+            "closed": 1e-13 if robot.longest > IN_METRES else 1e-16,
+        },
+    )
+
+
+def _blocks(spec: ModuleSpec) -> tuple[dict[str, Block], dict[str, Any] | None]:
+    """The functions of the module, and what those of SHARING share, where they share anything."""
+    names = spec.names(PYTHON.is_word)
+    functions = {name: f for name, f in spec.functions.items() if not f.model.case_of}
+    sharing = [functions[name] for name in SHARING]
+    shared = Printed(spec, sharing, names.inner(), PYTHON, _unpack)
+    in_one = len(shared.given) >= FEWEST_SHARED
+    blocks = {}
+    for name, f in functions.items():
+        if in_one and name in SHARING:
+            blocks[name] = shared.block(f)
+        else:
+            blocks[name] = Printed(spec, [f], names.inner(), PYTHON, _unpack).block(f)
+    if not in_one:
+        return blocks, None
+    motion = shared.motion
+    sections = [Section(s.title, tuple(broken(s.lines))) for s in motion.sections]
+    returned = [f"    {line}" for line in wrap(", ".join(shared.given), WIDTH - 12)]
+    lines = ["return (", *returned, ")"]
+    return blocks, {"arguments": motion.arguments, "sections": sections, "returned": lines}
+
+
+def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
+    f, sizes = block.function, spec.sizes
+
+    def target(place: Sequence[int]) -> str:
+        return f"{block.result}[{', '.join(map(str, place))}]"
+
+    constant = [] if f.model.by_columns else _constant_entries(f, block.result)
+    sections = [*block.sections, *block.results(target), Section("Constants", tuple(constant))]
+    count = len(block.arguments) - len(block.constants) - f.model.reads_X
+    states, rest = block.arguments[:count], block.arguments[count:]
+    rows = [
+        f"{s} ({sizes['m'] * sizes['n'] if k == 3 and spec.tied else sizes['k']}, N)"
+        for k, s in enumerate(states)
+    ]
+    return {
+        "name": f.model.name,
+        "arguments": ", ".join(["xp", *states, block.result, *rest]),
+        "summary": f"Fill {block.result}, shape ({', '.join(map(str, f.shape))}, N)"
+        + ", where it is not constant" * f.model.by_columns
+        + f", from {'; '.join(rows)}.",
+        "sections": [Section(s.title, tuple(broken(s.lines))) for s in sections if s.lines],
+    }
+
+
+def _passed(robot: Robot, names: Sequence[str]) -> str:
+    """Constants as arguments of `_evaluated`: one tuple, and one of those that are functions of
+    time.
+    """
+    timed = [c for c in names if c in robot.channels]
+    rest = tuple_of([c for c in names if c not in timed])
+    return f"{rest}, {tuple_of(timed)}" if timed else rest
+
+
+def _outputs(spec: ModuleSpec, models: Iterable[Model]) -> list[str]:
+    """{function: (columns that it reads, names of its results)}, for CasADi, as source."""
+    names, rows = spec.names(PYTHON.is_word), {"base_parameters": ("standard", "X")}
+    own = {result: names.own(result) for result in dict.fromkeys(m.result for m in models)}
+    for m in models:
+        results = [own[m.result]]
+        if m.name == "frame_poses":
+            results = [names.own(f"T{f.j}") for f in spec.robot.frames]
+        rows[m.name] = (" ".join(m.arguments), " ".join(results))
+    if spec.robot.passive:
+        rows["passive_joints"] = ("q qd qdd", "q_passive qd_passive qdd_passive")
+    return [f"    {name!r}: {row!r}," for name, row in rows.items()]
+
+
+def _constant_entries(f: Function, result: str) -> list[str]:
+    """Assignments of the entries that are numbers other than zero, equal ones together."""
+    by_value: dict[float, list[str]] = {}
+    for place, value in f.preset:
+        by_value.setdefault(value, []).append(f"{result}[{', '.join(map(str, place))}]")
+    lines = []
+    for value, targets in by_value.items():
+        line = ""
+        for target in targets:
+            if len(line) + len(target) > WIDTH - 12:
+                lines.append(f"{line}{value}")
+                line = ""
+            line += f"{target} = "
+        lines.append(f"{line}{value}")
+    return lines
+
+
+def _loop_tables(spec: ModuleSpec, slides: bool) -> Iterator[str]:
+    """The start of the loops and its assembly mode; a unit of motion for each independent joint
+    where some slide: 1 rad, and the longest length of the robot file.
+    """
+    robot, closure = spec.robot, spec.derivation.closure
+    if not spec.tied:
+        return
+    yield f"_START = {tuple(closure.start[j] for j in closure.independent)!r}"
+    mode = loop_system(robot).mode()
+    yield f"_MODE = {mode}  # sign of det J_u in the assembly mode of _START"
+    if slides:
+        kinds = [robot.frame(j).sigma for j in closure.independent]
+        units = ", ".join(repr(robot.longest) if sigma == PRISMATIC else "1.0" for sigma in kinds)
+        yield f"_UNITS = ({units},)  # rad; of slides the longest length, m"
+
+
+class Heads:
+    """First lines of public functions: signatures with hints."""
+
+    def __init__(self, regrouping: Regrouping) -> None:
+        channels = regrouping.robot.channels
+        self.constants = [
+            f"{name}: {hint('Array | float') if name in channels else 'float'} = {value!r}"
+            for name, value in regrouping.constants.items()
+        ]
+
+    def __call__(
+        self,
+        name: str,
+        arguments: Sequence[str],
+        keywords: Sequence[str] = (),
+        returns: str = "Array",
+        optional: bool = False,
+    ) -> str:
+        """`arguments` are arrays; those behind the first are `optional` or not."""
+        later = f"{hint('Array | None')} = None" if optional else hint("Array")
+        named = [*keywords, *self.constants]
+        parameters = [f"{a}: {later if k else hint('Array')}" for k, a in enumerate(arguments)]
+        if named:
+            parameters += ["*", *named]
+        return signature(f"def {name}", parameters, f" -> {hint(returns)}:")
+
+
+def hint(kind: str) -> str:
+    """A hint, quoted where it names arrays, which are of any package."""
+    return f'"{kind}"' if "Array" in kind else kind
+
+
+def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
+    """`start(parameters)end`, on as few lines as it needs."""
+    flat = f"{start}({', '.join(parameters)}){end}"
+    if len(flat) <= WIDTH:
+        return flat
+    return "\n".join((f"{start}(", *packed(parameters), f"){end}")).replace(",\n)", "\n)")
 
 
 def _unpack(source: str, used: Sequence[tuple[int, str]], count: int) -> list[str]:
@@ -163,133 +479,8 @@ def _bracketed(line: str) -> str:
     return f"{target} = ({value})" + mark + remark
 
 
-def context(
-    spec: ModuleSpec,
-    command: str | None,
-    language: Language,
-    array: str,
-    blocks: Mapping[str, Block],
-    quote: str = "",
-    what: str = "base parameters, regressor, dynamics",
-) -> dict[str, Any]:
-    """Values for the template of a Python module; `array` is the hint of its arrays, between
-    `quote` where it is no class; `what` it holds.
-    """
-    robot, regrouping, closure = spec.robot, spec.regrouping, spec.derivation.closure
-    read = {name for b in regrouping.base for name in b.combination}
-    loops = [b.constants for b in blocks.values() if b.function.model.of_loops]
-    closing = constants_of(regrouping, *loops)
-    rows = [(closure.offset[j], *closure.row[j].values()) for j in robot.passive]
-    return {
-        **spec.sizes,
-        "opening": wrapped(f'"""{plain(robot.title or robot.name)}: {what}.', ""),
-        "file": plain(robot.file or robot.name),
-        "sha256": robot.sha256,
-        "version": VERSION,
-        "command": plain(command or robot.file or robot.name),
-        "header": [
-            plain(line)
-            for line in header(spec, {name: b.text for name, b in blocks.items()}, formulas=False)
-        ],
-        "tied": spec.tied,
-        "passive": robot.passive,
-        "models": {
-            n: m
-            for n, m in (EMITTED | ON_REQUEST).items()
-            if (n in spec.functions or not m.option)
-            and not (n == "forward_dynamics" and robot.loaded)
-        },
-        "references": any(f.reads("qdr") or f.reads("qddr") for f in spec.functions.values()),
-        "functions": spec.functions,
-        "takes": {name: list(b.arguments) for name, b in blocks.items()},
-        "listed": listed,
-        "shapes": {name: f.shape for name, f in spec.functions.items()},
-        "head": Heads(regrouping, array, quote),
-        "closing": closing,
-        "closed_by": f"({', '.join(map(_tuple, loops))})",
-        "storing": constants_of(regrouping, blocks["regressor"].constants, closing),
-        "constants": listed(regrouping.constants),
-        "keywords": {
-            name: "".join(f", {c}={c}" for c in constants_of(regrouping, b.constants, closing))
-            for name, b in blocks.items()
-        },
-        "passed": {name: b.constants for name, b in blocks.items()},
-        "unpack": unpacked(
-            [name if name in read else "_" for name in robot.parameters], "standard"
-        ),
-        "formulas": broken(
-            f"{b.name} = {b.formula.text(language.expression)}"
-            for b in regrouping.base
-            if b.name != b.own
-        ),
-        "conditions": [
-            (
-                f"{source(language, ratio)} {'>' if sign > 0 else '<'} 0",
-                f"{name} holds where {ratio} is {'positive' if sign > 0 else 'negative'}",
-                name,
-            )
-            for name, ratio, sign in sign_conditions(regrouping)
-        ],
-        "packed": packed(list(regrouping.names)),
-        "paths": _paths(robot, closure, language),
-        "path_constants": constants_of(
-            regrouping, _symbols(row for rows in closure.row.values() for row in rows.values())
-        ),
-        "passive_constants": constants_of(regrouping, _symbols(e for row in rows for e in row)),
-        "passive_rows": _passive_rows(robot, closure, language),
-    }
-
-
-class Heads:
-    """First lines of public functions: signature with hints, then the summary."""
-
-    def __init__(self, regrouping: Regrouping, array: str, quote: str) -> None:
-        free = regrouping.constants
-        self.array, self.quote = array, quote
-        self.constants = [
-            f"{name}: {self._of(name, regrouping.robot)} = {value!r}"
-            for name, value in free.items()
-        ]
-
-    def _of(self, name: str, robot: Robot) -> str:
-        """The hint of a constant."""
-        return self.hint(f"{self.array} | float") if name in robot.channels else "float"
-
-    def hint(self, kind: str) -> str:
-        """A hint, quoted where its names are no classes of the module."""
-        return f"{self.quote}{kind}{self.quote}"
-
-    def __call__(
-        self,
-        name: str,
-        arguments: Sequence[str],
-        keywords: Sequence[str] = (),
-        returns: str = "",
-        optional: bool = False,
-    ) -> str:
-        """`arguments` without hints are arrays; those behind the first are `optional` or not."""
-        first, later = (
-            self.hint(self.array),
-            f"{self.hint(f'{self.array} | None')} = None" if optional else self.hint(self.array),
-        )
-        named = [*keywords, *self.constants]
-        parameters = [f"{a}: {later if k else first}" for k, a in enumerate(arguments)] + [
-            "*",
-            *named,
-        ] * bool(named)
-        return signature(f"def {name}", parameters, f" -> {self.hint(returns or self.array)}:")
-
-
-def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
-    """`start(parameters)end`, on as few lines as it needs."""
-    flat = f"{start}({', '.join(parameters)}){end}"
-    if len(flat) <= WIDTH:
-        return flat
-    return "\n".join((f"{start}(", *packed(parameters), f"){end}")).replace(",\n)", "\n)")
-
-
-def _tuple(names: Sequence[str]) -> str:
-    return f"({', '.join(names)}{',' * (len(names) == 1)})"
+def tuple_of(names: Sequence[object]) -> str:
+    return f"({', '.join(map(str, names))}{',' * (len(names) == 1)})"
 
 
 def listed(names: Iterable[str]) -> str:
@@ -297,59 +488,51 @@ def listed(names: Iterable[str]) -> str:
     return "".join(f", {name}" for name in names)
 
 
-def constants_of(regrouping: Regrouping, *used: Iterable[str]) -> tuple[str, ...]:
-    """The constants that may have other values and are among those used, in their order."""
-    return tuple(name for name in regrouping.constants if any(name in names for names in used))
-
-
 def _symbols(expressions: Iterable[Expression]) -> set[str]:
     return {name for e in expressions for name in e.symbols}
 
 
-def source(language: Language, e: Expression) -> str:
+def source(e: Expression) -> str:
     """A constant expression as source, numbers as floats."""
-    return repr(float(e.constant)) if e.constant is not None else language.expression(e)
+    return repr(float(e.constant)) if e.constant is not None else PYTHON.expression(e)
 
 
-def _paths(robot: Robot, closure: Closure, language: Language) -> list[str]:
-    """Entries {frame: ((joint, sigma, ((column, rate), ...)), ...)}: the moving joints below each
-    frame and how the actuated ones move them.
+def _moving(robot: Robot, closure: Closure) -> list[str]:
+    """Entries {frame: (antecedent, sigma, ((column, rate), ...))}: how the actuated joints move
+    the joint of each frame.
     """
     column = {j: k for k, j in enumerate(closure.independent)}
     entries = []
     for f in robot.frames:
-        steps = []
-        for j in (i for i in robot.path(f.j) if robot.frame(i).sigma != FIXED):
-            rates = " ".join(
-                f"({column[i]}, {source(language, g)})," for i, g in closure.row[j].items()
-            )
-            steps.append(f"({j}, {robot.frame(j).sigma}, ({rates})),")
-        entries.append(f"{f.j}: ({' '.join(steps)})")
+        rates = [] if f.sigma == FIXED else closure.row[f.j].items()
+        text = tuple_of([f"({column[i]}, {source(g)})" for i, g in rates])
+        entries.append(f"{f.j}: ({f.ant}, {f.sigma}, {text})")
     return packed(entries)
 
 
-def _passive_rows(
-    robot: Robot, closure: Closure, language: Language
-) -> list[tuple[str, list[tuple[int, str]]]]:
-    """Each passive joint over the independent ones: constant, then (column, rate), as source."""
+def _passive_rows(robot: Robot, closure: Closure, names: Sequence[str]) -> list[str]:
+    """Each passive joint over the independent ones; `names` of states, result, and what is 1 for
+    positions.
+    """
+    x, P, one = names
     rows = []
-    for j in robot.passive:
-        rates = [
-            (closure.independent.index(i), source(language, g)) for i, g in closure.row[j].items()
-        ]
-        rows.append((source(language, closure.offset[j]), rates))
+    for k, j in enumerate(robot.passive):
+        terms = [f"{_factor(closure.offset[j])}*{one}"] if closure.offset[j] else []
+        for i, g in closure.row[j].items():
+            terms.append(f"{_factor(g)}*{x}[{closure.independent.index(i)}]")
+        rows.append(f"{P}[{k}] = " + " + ".join(terms).replace(" + -", " - "))
     return rows
 
 
-def element_lines(robot: Robot, language: Language) -> list[str]:
+def _factor(e: Expression) -> str:
+    return source(e) if e.constant is not None else f"({source(e)})"
+
+
+def _element_lines(robot: Robot) -> list[str]:
     """Entries {parameter: (kind, direction of motion, row or form)} of the elements, as source."""
     entries = []
     for name, (e, j) in element_names(robot).items():
-        text = ", ".join(f"{at}: {source(language, g)}" for at, g in acting(e, j).items())
-        entries.append(
-            (
-                robot.parameters.index(name),
-                f"{name!r}: ({e.acts_as!r}, {e.when or 'both'!r}, {{{text}}})",
-            )
-        )
+        text = ", ".join(f"{at}: {source(g)}" for at, g in acting(e, j).items())
+        row = f"{name!r}: ({e.acts_as!r}, {e.when or 'both'!r}, {{{text}}})"
+        entries.append((robot.parameters.index(name), row))
     return packed([entry for _, entry in sorted(entries)])

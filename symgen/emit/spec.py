@@ -11,8 +11,9 @@ from functools import cached_property, lru_cache
 from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.derivation import Derivation, derive
 from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
-from symgen.derive.model import Entry, Model, Place, Request, Values, labels
+from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.models import MODELS
+from symgen.derive.rewrite import Rewrite
 from symgen.description.namespace import Namespace
 from symgen.description.robot import Robot
 from symgen.regroup.regrouping import Regrouping, regroup
@@ -187,6 +188,10 @@ class ModuleSpec:
         return Namespace(own, is_word)
 
 
+SHARING = ("regressor", "inverse_dynamics")
+"""Models over one graph: the motion of the links is the same in both."""
+
+
 def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSpec:
     """Every model of an emitted module, over the base parameters of `regrouping`, and those that
     `options` ask for.
@@ -197,17 +202,33 @@ def module_spec(regrouping: Regrouping, options: Sequence[str] = ()) -> ModuleSp
         for m in MODELS.values()
         if m.printed and (d.closure.tied or not m.of_loops) and m.option in ("", *options)
     ]
-    return ModuleSpec(d, regrouping, {m.name: function(regrouping, m.name) for m in printed})
+    shared = rewriting(d, _request(regrouping))
+    return ModuleSpec(
+        d,
+        regrouping,
+        {
+            m.name: function(regrouping, m.name, graph=shared if m.name in SHARING else None)
+            for m in printed
+        },
+    )
 
 
 def function(
-    regrouping: Regrouping, name: str, only: Callable[[str], bool] = lambda own: True
+    regrouping: Regrouping,
+    name: str,
+    only: Callable[[str], bool] = lambda own: True,
+    graph: Rewrite | None = None,
 ) -> Function:
-    """A model over the base parameters that are called after a standard parameter with `only`."""
-    d, model = derive(regrouping.robot), MODELS[name]
-    request = Request({b.own: b.name for b in regrouping.base if only(b.own)})
+    """A model over the base parameters that are called after a standard parameter with `only`; in
+    the `graph` of other models, of all parameters, where one is given.
+    """
+    d, model, request = derive(regrouping.robot), MODELS[name], _request(regrouping, only)
     shape = shape_of(model, d, tuple(request.parameters.values()))
-    return Function(model, model.values(d, request), shape)
+    return Function(model, model.values(d, request, graph), shape)
+
+
+def _request(regrouping: Regrouping, only: Callable[[str], bool] = lambda own: True) -> Request:
+    return Request({b.own: b.name for b in regrouping.base if only(b.own)})
 
 
 def shape_of(model: Model, d: Derivation, parameters: tuple[str, ...]) -> tuple[int, ...]:

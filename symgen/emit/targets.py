@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Target:
-    """One kind of emitted file.
+    """One use of an emitted file.
 
     Attributes
     ----------
@@ -17,18 +17,27 @@ class Target:
         Name of the file, {} for the robot.
     language : str
         What it is written for.
+    use : str
+        How the file {} of a robot is used.
     iterates : bool
         Whether it serves joints that only the closure equations tie, by iteration.
     """
 
     file: str
     language: str
+    use: str = ""
     iterates: bool = False
 
 
 TARGETS = {
     "numpy": Target("{}.py", "NumPy", iterates=True),
-    "casadi": Target("{}_casadi.py", "CasADi"),
+    "casadi": Target(
+        "{}.py", "CasADi", 'in CasADi {}.casadi("inverse_dynamics") is a casadi.Function of columns'
+    ),
     "c": Target("{}.c", "C11"),
-    "xp": Target("{}_xp.py", "arrays of any package"),
+    "xp": Target(
+        "{}.py",
+        "arrays of any package",
+        "functions of {} take arrays of CuPy, JAX, PyTorch too (pip install symgen[gpu])",
+    ),
 }

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+from certify.tables import table_errors
+from emit.test_casadi import loaded
 
 from oracles.loop_robots import BENNETT, JACKS, LIFT
-from symgen.certify.certificate import Certificate
 from symgen.certify.modules import certify
 from symgen.certify.witness import OF_THE_FILE, RANDOM, Witness
 from symgen.derive.models import EMITTED
@@ -23,8 +25,8 @@ def regrouped(text: str, folder: Path) -> Regrouping:
     return regroup(load_robot(path))
 
 
-def marked(regrouping: Regrouping, name: str, joint: int, mark: str) -> Certificate:
-    """The certificate of the module in which STRUCTURE marks an entry otherwise."""
+def marked(regrouping: Regrouping, name: str, joint: int, mark: str) -> ModuleType:
+    """The module in which STRUCTURE marks an entry otherwise."""
     ((file, text),) = generate_files(regrouping.robot, regrouping=regrouping).items()
     head, table, tail = text.partition("for mark in row] for row in (")
     rows = tail.split('"')
@@ -32,7 +34,7 @@ def marked(regrouping: Regrouping, name: str, joint: int, mark: str) -> Certific
     row = rows[2 * k + 1]
     assert len(row) == len(regrouping.robot.joints) and row[j] != mark
     rows[2 * k + 1] = row[:j] + mark + row[j + 1 :]
-    return certify(regrouping, {file: head + table + '"'.join(rows)})
+    return loaded(file, head + table + '"'.join(rows))
 
 
 @pytest.mark.parametrize(
@@ -40,15 +42,19 @@ def marked(regrouping: Regrouping, name: str, joint: int, mark: str) -> Certific
 )
 def test_entries_may_be_zero_on_the_closed_mechanism_alone(text: str, tmp_path: Path) -> None:
     """Links of a loop act on others by rates that the loop makes zero: a right table was FALSE."""
-    certificate = certify(regrouped(text, tmp_path))
+    regrouping = regrouped(text, tmp_path)
+    certificate = certify(regrouping)
     assert certificate.valid, str(certificate)
+    ((file, module),) = generate_files(regrouping.robot, regrouping=regrouping).items()
+    assert not any(table_errors(loaded(file, module), Witness(regrouping)).values())
 
 
 @pytest.mark.parametrize(("name", "joint", "mark"), [("ZZ7", 2, "."), ("ZZ1R", 2, "x")])
 def test_a_wrong_mark_of_a_loop_is_refused(name, joint, mark, tmp_path) -> None:
     """One that acts and is not marked; one that acts in no way, were the loop open, and is."""
-    (check,) = marked(regrouped(LIFT, tmp_path), name, joint, mark).texts.values()
-    assert check.wrong == ["STRUCTURE"]
+    regrouping = regrouped(LIFT, tmp_path)
+    errors = table_errors(marked(regrouping, name, joint, mark), Witness(regrouping))
+    assert [table for table, error in errors.items() if error] == ["STRUCTURE"]
 
 
 def test_formulas_that_are_numbers_are_checked_at_the_constants_of_the_file(tmp_path: Path) -> None:

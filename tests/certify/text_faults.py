@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 
-from symgen.certify.printed import evaluated
+from certify.printed import evaluated
+
 from symgen.certify.texts import text_check
 from symgen.certify.witness import Witness
 from symgen.description import load_robot
@@ -35,7 +36,7 @@ SAME = (  # changed lines that change no value, and why
         r"(double|int32_t) .*\w\[\d+\]\[(TILE|3|8)\]",
         "an array with room for more, or a parameter that is a pointer",
     ),
-    (r"how (= -way|== -2)|flags & \d", "the way of writing: through the caches, or past them"),
+    (r"how (= -way|== (-2|3))|flags & \d", "the way of writing: through the caches, or past them"),
     (r"ready = -True", "what is not zero is true"),
     (r"= -(np\.zeros|ca\.SX\()", "minus zero, where every entry is written"),
     (r"^    B = |every = int", "samples at a time"),
@@ -203,7 +204,7 @@ def faults(count: int, seed: int) -> list[Fault]:
 
 def refused(fault: Fault) -> bool:
     """Whether the certificate refuses a text with the fault."""
-    name = re.sub(r"(_casadi|_xp)?\.\w+$", "", fault.file)
+    name = fault.file.partition(".")[0]
     witness, files = texts(name)
     lines = files[fault.file][1].splitlines()
     assert lines[fault.line] == fault.old
@@ -217,7 +218,7 @@ def equivalent(fault: Fault) -> str:
         (parts(line, fault.target == "c") for line in (fault.old, fault.new)),
         fault.target,
     )
-    name = re.sub(r"(_casadi|_xp)?\.\w+$", "", fault.file)
+    name = fault.file.partition(".")[0]
     text = texts(name)[1][fault.file][1]
     body = [line for f, _, line in code_lines(text, c == "c") if f == fault.function]
     if old[0] == new[0] and re.fullmatch(NAME, old[0]):

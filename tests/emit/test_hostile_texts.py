@@ -32,7 +32,7 @@ from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
 from symgen.report.page import robot_page
 
-TARGETS = ("numpy", "casadi", "c", "xp")
+TARGETS = ("numpy", "c")
 CONSTANT, FAMILY = "LA", "SPR"
 TEMPLATE = """symgen: 1
 name: {name}
@@ -114,7 +114,6 @@ HIDING = {
     "len",
     "float",
     "np",
-    "array_namespace",
     "lambda",
     "QP1",
     "q1",

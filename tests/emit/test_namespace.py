@@ -36,7 +36,7 @@ frames:
   2: {{ant: 1, sigma: 0, alpha: 0, d: {L}, theta: q2, r: 0}}
 elements: {{{C}: {{kind: viscous, along: all}}}}
 """
-TARGETS = ("numpy", "casadi", "xp", "c")
+TARGETS = ("numpy", "c")
 
 
 def pendulum(L: str = "L", g: str = "g", C: str = "C") -> Robot:
@@ -77,13 +77,12 @@ def agrees(robot: Robot, C: str, folder: Path) -> None:
     X = module.base_parameters(chi)
     assert np.allclose(module.inverse_dynamics(q, qd, qdd, X), expected, rtol=1e-12)
     assert np.allclose(module.regressor(q, qd, qdd) @ X, expected, rtol=1e-12)
-    arrays = loaded(folder / "pendulum_xp.py")
-    assert np.allclose(arrays.regressor(q, qd, qdd) @ X, expected, rtol=1e-12)
-    assert np.allclose(arrays.inverse_dynamics(q, qd, qdd, X), expected, rtol=1e-12)
-    columns = loaded(folder / "pendulum_casadi.py")
-    label = columns.inverse_dynamics.name_out(0)
-    found = columns.inverse_dynamics(q=q.T, qd=qd.T, qdd=qdd.T, X=X)[label]
+    function = module.casadi("inverse_dynamics")
+    found = function(q=q.T, qd=qd.T, qdd=qdd.T, X=X)[function.name_out(0)]
     assert np.allclose(np.array(found).T, expected, rtol=1e-12)
+    vars(module)["_IN_PLACE"] = False
+    assert np.allclose(module.regressor(q, qd, qdd) @ X, expected, rtol=1e-12)
+    assert np.allclose(module.inverse_dynamics(q, qd, qdd, X), expected, rtol=1e-12)
     compiled = compiled_model(load_model(folder / "pendulum.py", trust=True), cache=folder)
     assert np.allclose(compiled.regressor(q, qd, qdd) @ X, expected, rtol=1e-12)
 
@@ -92,7 +91,7 @@ def test_a_family_called_as_a_cosine_keeps_its_parameter(tmp_path: Path) -> None
     """C for damping, as MuJoCo writes it: C1 was overwritten by cos(q1)."""
     agrees(pendulum(C="C"), "C", tmp_path)
     text = (tmp_path / "pendulum.py").read_text(encoding="utf-8")
-    assert "C1_ = np.cos(q1)" in text and "C1_ stands for C1" in text
+    assert "C1_ = xp.cos(q1)" in text and "C1_ stands for C1" in text
 
 
 @pytest.mark.parametrize("family", ["q", "QP", "QDP", "GAM"])
@@ -186,12 +185,10 @@ def test_layouts_use_reserved_words_alone(name: str) -> None:
     """In functions that take constants: what is neither theirs nor private is in LAYOUT."""
     robot = load_robot(name)
     allowed = LAYOUT | {*dir(builtins), *robot.constants}
-    for file, text in generate_files(robot, targets=("numpy", "casadi", "xp")).items():
+    for file, text in generate_files(robot).items():
         for f in (n for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)):
             arguments = {a.arg for a in (*f.args.args, *f.args.kwonlyargs)}
-            if not arguments & {*robot.constants} or f.name.endswith("_block"):
-                continue
-            if file.endswith("_casadi.py") and f.name[1:] in MODULE_BLOCKS:
+            if not arguments & {*robot.constants} or f.name.endswith(("_block", "_motion")):
                 continue
             scoped = {
                 x.id
@@ -204,8 +201,3 @@ def test_layouts_use_reserved_words_alone(name: str) -> None:
             own = {w for w in used if w.startswith("_")} | scoped | {*robot.parameters}
             bases = {f"{p}R" for p in robot.parameters}
             assert used - own - bases <= allowed, (file, f.name)
-
-
-MODULE_BLOCKS = {
-    "regressor", "inverse_dynamics", "inertia_matrix", "bias", "gravity", "frame_poses",
-}  # fmt: skip

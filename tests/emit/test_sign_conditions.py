@@ -38,7 +38,7 @@ def test_friction_of_a_mimic_joint_is_regrouped(KR: float, formula: str) -> None
         ValueError, match=rf"FS1R holds where KR is {'positive' if KR > 0 else 'negative'}"
     ):
         model.base_parameters(chi, KR=-KR)
-    function = symgen.model(robot, target="casadi").base_parameters
+    function = symgen.model(robot).casadi("base_parameters")
     k = model.BASE_PARAMETERS.index("FS1R")
     for value in (KR / 2, KR, -KR):
         X = np.asarray(function(standard=chi, KR=value)["X"]).ravel()

@@ -314,7 +314,6 @@ def test_unknown_reference(arm, clean):
     blind = Simulator(
         model,
         replace(study.controller, reference=replace(study.controller.reference, motion=None)),
-        symbolic=simulator.symbolic,
     )
     with pytest.raises(SettingsError, match=r"what the controller followed in .* is not known"):
         closed_loop(model, [record], study, blind)

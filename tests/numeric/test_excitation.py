@@ -16,7 +16,6 @@ from runtime.excitation.optimiser import Problem, improved, one_start, smoothed
 from runtime.excitation.search import excite
 from runtime.loop.dry_friction import dry_friction
 from runtime.loop.methods import estimate_of
-from runtime.model.casadi import load_symbolic
 from runtime.model.generated import load_model
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
@@ -46,14 +45,14 @@ S = (0.5, 0.2)
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, str, np.ndarray]:
+def planar(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, np.ndarray]:
     folder: Path = tmp_path_factory.mktemp("planar")
-    for name, text in generate_files(load_robot("planar_2r"), targets=("numpy", "casadi")).items():
+    for name, text in generate_files(load_robot("planar_2r")).items():
         (folder / name).write_text(text, encoding="utf-8")
     model = load_model(folder / "planar_2r.py", trust=True)
     standard = {name: {**VALUES, **FRICTION}.get(name, 0.0) for name in model.STANDARD_PARAMETERS}  # type: ignore[attr-defined]
     model.VALUES, model.LABELS = standard, {1: "shoulder"}
-    return model, str(folder / "planar_2r_casadi.py"), np.asarray(model.base_parameters(standard))  # type: ignore[attr-defined]
+    return model, np.asarray(model.base_parameters(standard))  # type: ignore[attr-defined]
 
 
 def settings(**changes: object) -> ExcitationSettings:
@@ -86,15 +85,15 @@ def free(planar: tuple) -> object:
 
 
 def test_smooth_sign_is_tanh_and_nothing_else_changes(planar: tuple) -> None:
-    symbolic = load_symbolic(planar[1], trust=True)
-    smooth = smoothed(symbolic.regressor, 1e-4)
+    model, exact_one = planar[0], planar[0].casadi("regressor")
+    smooth = smoothed(exact_one, 1e-4)
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.standard_normal((3, 2))
-    constants = list(symbolic.CONSTANTS.values())
-    exact, near = (np.array(f(q, qd, qdd, *constants)) for f in (symbolic.regressor, smooth))
+    constants = list(model.CONSTANTS.values())
+    exact, near = (np.array(f(q, qd, qdd, *constants)) for f in (exact_one, smooth))
     assert np.allclose(exact, near, rtol=0, atol=1e-12)
-    near = np.array(smoothed(symbolic.regressor, 0.1)(q, np.array([0.05, -0.02]), qdd, *constants))
-    friction = [symbolic.BASE_PARAMETERS.index(name) for name in ("FS1", "FS2")]
+    near = np.array(smoothed(exact_one, 0.1)(q, np.array([0.05, -0.02]), qdd, *constants))
+    friction = [model.BASE_PARAMETERS.index(name) for name in ("FS1", "FS2")]
     assert np.allclose(near[[0, 1], friction], np.tanh([0.5, -0.2]))
     assert ca.OP_SIGN not in [smooth.instruction_id(k) for k in range(smooth.n_instructions())]
 
@@ -136,7 +135,7 @@ def test_predicted_deviations_with_correlated_noise_and_rows_left_out() -> None:
 
 @pytest.mark.parametrize("criterion", [pytest.param("cond", marks=campaign), "sigma", "logdet"])
 def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion: str) -> None:
-    model, path, X = planar
+    model, X = planar
     asked = settings(criterion=criterion, begin=[0.1, -0.2])
     found = search(planar, asked)
     limits = limits_of(model, asked.limits)
@@ -151,7 +150,7 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
     smooth = dry_friction(model).smooth
     once = replace(asked, iterations=1)
-    first = one_start(Problem(path, once, weights, limits, X, smooth, trust=True), 0)
+    first = one_start(Problem(model, once, weights, limits, X, smooth), 0)
     begun = planned(model, motion_from_mapping(first.motion), STUDY, asked.rate)
     seen = planned(model, found.motion, STUDY, asked.rate)
     assert weights.relative_sigma(seen).max() < 0.8 * weights.relative_sigma(begun).max()
@@ -170,7 +169,7 @@ def test_prediction_is_what_identification_finds(planar: tuple, free: object) ->
     """60 draws of white torque noise at the raw rate: scatter of the weighted estimate against the
     predicted %sigma, within 20 %.
     """
-    model, _, X = planar
+    model, X = planar
     found = free
     t, q, qd, qdd = found.motion.sampled(1000.0)
     clean = model.inverse_dynamics(q, qd, qdd, X)
@@ -200,7 +199,7 @@ def _power_kept() -> float:
 
 @campaign
 def test_torque_limits_hold(planar: tuple, free: object) -> None:
-    model, _, X = planar
+    model, X = planar
     largest = np.abs(model.inverse_dynamics(*free.motion.sampled(1000.0)[1:], X)).max(axis=0)
     asked = settings(
         limits={**LIMITS, "tau": (0.8 * largest).tolist()},
@@ -219,7 +218,7 @@ def test_torque_rate_leaves_the_jump_of_dry_friction_out(planar: tuple, free: ob
     """A reversal of joint 1 switches 2 * 2 N m of dry friction between two samples: 4000 N m/s at 1
     kHz, whatever the motion does.
     """
-    model, _, X = planar
+    model, X = planar
     t, q, qd, qdd, tau = free.sampled()
     assert (np.diff(np.sign(qd[:, 0])) != 0).any() and np.abs(
         np.gradient(tau, t, axis=0)
@@ -263,7 +262,7 @@ def test_spheres_stay_apart(planar: tuple) -> None:
 
 
 def test_a_record_gives_parameters_and_a_motion_to_compare_with(planar: tuple) -> None:
-    model, _, X = planar
+    model, X = planar
     t = np.arange(4000) / 1000
     q = np.column_stack([0.3 * np.sin(2 * t), 0.4 * np.sin(3 * t)])
     qd, qdd = np.gradient(q, t, axis=0), np.gradient(np.gradient(q, t, axis=0), t, axis=0)
@@ -327,11 +326,11 @@ def test_what_cannot_be_is_said(planar: tuple) -> None:
 
 @campaign
 def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
-    model, path, X = planar
+    model, X = planar
     asked = settings()
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
     problem = Problem(
-        path, asked, weights, limits_of(model, asked.limits), X, dry_friction(model).smooth
+        model, asked, weights, limits_of(model, asked.limits), X, dry_friction(model).smooth
     )
     start = one_start(problem, 0)
     motion = motion_from_mapping(start.motion)

@@ -2,7 +2,6 @@
 study repeats, several records as one.
 """
 
-import ast
 import dataclasses
 import types
 from pathlib import Path
@@ -29,6 +28,9 @@ from runtime.rows.regressor import (
 from runtime.rows.selection import select_rows
 from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
 from runtime.signals.filters import States, decimated, decimation_plan, filtered_states
+from symgen.description import load_robot
+from symgen.emit import spec
+from symgen.regroup.regrouping import regroup
 
 RATE, N = 1000.0, 6000
 T = np.arange(N) / RATE
@@ -157,16 +159,13 @@ def test_loops_that_do_not_close_at_random_states():
 
 
 def test_signals_are_those_found_over_a_finite_field():
-    """ENTRIES of the array target, derived exactly: the numbers find the same signals; constants
+    """The distinct entries of the graph, derived exactly: the numbers find the same signals; constants
     are one signal there as here.
     """
+    f = spec.function(regroup(load_robot("tx40")), "regressor")
+    places = spec.signals(f, [e for e in f.values.entries if e.value != 0]).places
+    exact = {place: (s, sign) for place, s, sign in places}
     folder = Path(__file__).parents[2] / "generated"
-    table = next(
-        n.value
-        for n in ast.parse((folder / "tx40_xp.py").read_text()).body
-        if isinstance(n, ast.Assign) and n.targets[0].id == "ENTRIES"
-    )
-    exact = {(k, j): (s, c) for k, j, s, c in ast.literal_eval(table)}
     e = distinct_entries(load_model(folder / "tx40.py", trust=True), {})
     assert set(exact) == set(zip(e.k.tolist(), e.j.tolist(), strict=True))
     pairs = {

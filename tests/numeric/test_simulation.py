@@ -22,7 +22,6 @@ from runtime.loop.result import SimulationError
 from runtime.loop.simulation import Simulator
 from runtime.loop.simulation import simulate as simulate_study
 from runtime.loop.stick_slip import friction_function
-from runtime.model.casadi import load_symbolic
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.settings.controller import Controller
@@ -168,7 +167,6 @@ def test_energy_of_a_falling_arm_only_falls(tx40, step):
     """Kinetic and potential energy of the TX40, coupled wrist friction and gravity, no torque, from
     four random states until joints rest.
     """
-    symbolic = load_symbolic("tx40", folder=GENERATED)
     friction = dry_friction(tx40)
     assert (
         [1, 0, 0, 0, 0, 0] in friction.G.tolist()
@@ -177,7 +175,7 @@ def test_energy_of_a_falling_arm_only_falls(tx40, step):
     )
     values = {name: 0.0 if name.startswith("OFFSET") else x for name, x in tx40.VALUES.items()}
     X = tx40.base_parameters(values)
-    plant = plant_function(symbolic, friction, {}, "rk4")
+    plant = plant_function(tx40, friction, {}, "rk4")
     rng = np.random.default_rng(0)
     N, rested = round(1.0 / step), 0
     for _ in range(2):
@@ -212,9 +210,8 @@ def test_forces_at_rest_are_those_of_the_quadratic_program(tx40, truth):
     """
     from scipy.optimize import lsq_linear
 
-    symbolic = load_symbolic("tx40", folder=GENERATED)
     friction = dry_friction(tx40)
-    function = friction_function(symbolic, friction, {})
+    function = friction_function(tx40, friction, {})
     G, plus = friction.G, friction.plus @ truth
     rng, size = np.random.default_rng(0), np.array([7, 8, 6, 2.4, 5, 3.5])
     sticking = 0
@@ -246,9 +243,8 @@ def test_held_by_friction_alone(tx40, truth):
     """Below the breakaway torque nothing moves, not even slowly; the coupled element of the wrist
     carries joints 5 and 6 together.
     """
-    symbolic = load_symbolic("tx40", folder=GENERATED)
     friction = dry_friction(tx40)
-    plant = plant_function(symbolic, friction, {}, "rk4")
+    plant = plant_function(tx40, friction, {}, "rk4")
     column = {name: k for k, name in enumerate(tx40.BASE_PARAMETERS)}
     X = truth.copy()
     X[[column["FS5"], column["FS6"], column["FSM6"]]] = 2.0, 1.0, 1.5

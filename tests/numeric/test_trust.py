@@ -2,7 +2,6 @@
 reader trusts it. What is loaded is then checked.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ from runtime import load_model
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
 from runtime.errors import ModelError
-from runtime.model.casadi import load_symbolic
 from symgen.cli.main import app
 
 EMITTED = Path(__file__).parents[2] / "generated"
@@ -25,7 +23,7 @@ EMITTED = Path(__file__).parents[2] / "generated"
 def generated(tmp_path, monkeypatch):
     """planar_2r as `symgen generate` writes it, with a cache of its own."""
     monkeypatch.setenv("SYMGEN_CACHE", str(tmp_path / "cache"))
-    targets = ["--target", "numpy,casadi,c"]
+    targets = ["--target", "numpy,c"]
     done = CliRunner().invoke(app, ["generate", "planar_2r", *targets, "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     return tmp_path
@@ -37,34 +35,25 @@ def appended(path, line):
 
 def test_what_was_emitted_here_runs(generated):
     """Under any name, from any folder: the text counts."""
-    model = load_model("planar_2r", folder=generated)
-    assert load_symbolic("planar_2r", of=model, folder=generated).NAME == "planar_2r"
+    assert load_model("planar_2r", folder=generated).NAME == "planar_2r"
     moved = (generated / "planar_2r.py").rename(generated / "arm.py")
     assert load_model(moved).NAME == "planar_2r"
 
 
 def test_one_more_line_is_refused_without_trust(generated):
-    """It does not run: neither the module, nor the CasADi module, nor the C file."""
+    """It does not run: neither the module, nor the C file."""
     mark, model = generated / "mark", load_model("planar_2r", folder=generated)
-    for file, load in (("planar_2r.py", load_model), ("planar_2r_casadi.py", load_symbolic)):
-        appended(generated / file, f"__import__('pathlib').Path({str(mark)!r}).touch()")
-        with pytest.raises(ModelError, match="has not emitted and certified; pass trust=True"):
-            load(generated / file)
-        assert not mark.exists()
-        assert load(generated / file, trust=True).NAME == "planar_2r" and mark.exists()
-        mark.unlink()
+    file = generated / "planar_2r.py"
+    appended(file, f"__import__('pathlib').Path({str(mark)!r}).touch()")
+    with pytest.raises(ModelError, match="has not emitted and certified; pass trust=True"):
+        load_model(file)
+    assert not mark.exists()
+    assert load_model(file, trust=True).NAME == "planar_2r" and mark.exists()
     appended(generated / "planar_2r.c", "/* one more */")
     with pytest.warns(
         FallbackWarning, match=r"planar_2r\.c is code that this installation has not"
     ):
         assert compiled_model(model) is model
-
-
-def test_files_beside_a_trusted_module_are_trusted(generated):
-    appended(generated / "planar_2r.py", "MORE = 1")
-    appended(generated / "planar_2r_casadi.py", "MORE = 1")
-    model = load_model("planar_2r", folder=generated, trust=True)
-    assert load_symbolic("planar_2r", of=model, folder=generated).MORE == 1
 
 
 def test_a_cache_that_anyone_may_write_to_proves_nothing(generated):
@@ -88,14 +77,6 @@ def test_verbs_ask_for_trust(verb, generated):
     assert refused.exit_code == 2 and "pass trust=True (--trust)" in refused.stderr
     trusted = CliRunner().invoke(app, [*arguments, "--trust"])
     assert trusted.exit_code == 2 and "study.yaml" in trusted.stderr
-
-
-def test_an_array_module_is_no_model(monkeypatch):
-    with pytest.raises(ModelError, match=r"no store; expected an emitted model"):
-        load_model(EMITTED / "tx40_xp.py")
-    monkeypatch.setitem(sys.modules, "array_api_compat", None)
-    with pytest.raises(ModelError, match=r"pip install symgen\[gpu\]"):
-        load_model(EMITTED / "tx40_xp.py")
 
 
 def test_a_model_with_texts_that_are_no_names(tmp_path):

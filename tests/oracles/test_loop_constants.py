@@ -21,7 +21,7 @@ from oracles.test_loops_agree import whole
 from oracles.test_random_loops import module_of
 from symgen.certify.modules import certify
 from symgen.description import Robot, load_robot, parse_robot
-from symgen.emit.numpy_target import render
+from symgen.emit.python_target import render
 from symgen.emit.spec import module_spec
 from symgen.regroup.regrouping import EXACT, regroup
 

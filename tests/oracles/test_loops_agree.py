@@ -28,7 +28,7 @@ from symgen.description import load_robot
 from symgen.description.expression import Expression
 from symgen.description.grammar import parse
 from symgen.description.robot import REVOLUTE, Robot
-from symgen.emit.numpy_target import render
+from symgen.emit.python_target import render
 from symgen.emit.spec import module_spec
 from symgen.regroup.regrouping import EXACT, Regrouping, regroup
 

@@ -110,10 +110,11 @@ def base_wrench(oracle: PinocchioModel, q: Array, qd: Array, qdd: Array, chi: Ar
 @pytest.mark.parametrize("name", sampled(["scara", "sr400", "tx40", "haptic"], 1))
 def test_every_target_has_them_certified(name: str) -> None:
     robot = load_robot(name)
-    files = certified_files(robot, targets=("numpy", "casadi", "c", "xp"), options=OPTIONS)
-    assert len(files) == 4
+    files = certified_files(robot, targets=("numpy", "c"), options=OPTIONS)
+    assert len(files) == 2
     for text in files.values():
-        certificate = " ".join(text.partition("sha256 of what follows")[0].split())
+        said = text.partition("Certificate by symgen")[2].partition("sha256 of all but")[0]
+        certificate = " ".join(said.split())
         assert all(
             model in certificate.replace("# ", "").replace("// ", "") for model in ON_REQUEST
         )

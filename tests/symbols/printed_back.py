@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from certify.printed import equations, evaluated
 
-from symgen.certify.printed import equations, evaluated
 from symgen.certify.texts import difference
 from symgen.certify.witness import Witness
 from symgen.derive.exact import Array

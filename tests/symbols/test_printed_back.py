@@ -8,10 +8,10 @@ import re
 
 import pytest
 from campaign import sampled, some
+from certify.printed import equations
+from certify.tables import formulas_hold
 from symbols.printed_back import error_of
 
-from symgen.certify.printed import equations
-from symgen.certify.tables import formulas_hold
 from symgen.certify.texts import TOLERANCE
 from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.models import SYMBOLIC

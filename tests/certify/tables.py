@@ -8,8 +8,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from certify.printed import definitions, evaluated
 
-from symgen.certify.printed import definitions, evaluated
 from symgen.certify.witness import Witness
 from symgen.derive.columns import acting, element_names, unit
 from symgen.derive.exact import Array
@@ -54,14 +54,6 @@ def _right(module: ModuleType, name: str, witness: Witness) -> bool:
             return _same_elements(value, constants, witness) and _same_elements(
                 drawn, witness.constants, witness
             )
-        case "ENTRIES" | "SIGNALS":  # the functions read the entries
-            signals = module.signals(witness.q, witness.qd, witness.qdd, **witness.keywords)
-            D = np.zeros_like(witness.own)
-            for k, j, s, c in module.ENTRIES:
-                D[:, j, k] = c * signals[s]
-            return len(signals) == module.SIGNALS and bool(
-                np.allclose(D, witness.own, atol=EVALUATED_TWICE * np.abs(D).max())
-            )
         case "STRUCTURE":
             marked = np.asarray(value)
             closed, free = (
@@ -94,8 +86,6 @@ def _free_columns(witness: Witness) -> Array:
 
 def _defaults(function: Any) -> list[tuple[str, float]]:
     """(name, value) of the arguments of a function that have one."""
-    if hasattr(function, "default_in"):  # of CasADi
-        return [(function.name_in(k), function.default_in(k)) for k in range(function.n_in())]
     return [*(getattr(function, "__kwdefaults__", None) or {}).items()]
 
 

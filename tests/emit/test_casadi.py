@@ -1,22 +1,20 @@
-"""The CasADi module: agreement with NumPy on every packaged robot, derivatives against complex
-steps, batches, defaults, determinism.
+"""Functions of emitted modules in CasADi: agreement with NumPy, derivatives against differences,
+batches, defaults.
 """
 
 from __future__ import annotations
 
 import ast
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 from campaign import sampled
 
-from symgen.certify.importing import below
 from symgen.cli.generate import emitted
 from symgen.description import load_robot, packaged_robots, parse_robot
-from symgen.emit.generate import generate_files
+from symgen.emit.generate import generate_module
 
 GENERAL_LOOPS = {"four_bar", "five_bar"}  # closed by Newton iteration: NumPy only
 ROBOTS = [name for name in packaged_robots() if name not in GENERAL_LOOPS]
@@ -38,10 +36,8 @@ def loaded(name: str, text: str) -> ModuleType:
 
 
 @cache
-def modules(name: str) -> tuple[ModuleType, ModuleType]:
-    """(NumPy, CasADi)."""
-    files = generate_files(load_robot(name), targets=("numpy", "casadi"), command=name)
-    return loaded(name, files[f"{name}.py"]), loaded(f"{name}_casadi", files[f"{name}_casadi.py"])
+def module_of(name: str) -> ModuleType:
+    return loaded(name, generate_module(load_robot(name), command=name))
 
 
 def states(module: ModuleType, N: int, seed: int = 0) -> dict[str, np.ndarray]:
@@ -79,47 +75,38 @@ def by_sample(found: np.ndarray, N: int) -> np.ndarray:
 @pytest.mark.parametrize("name", SAMPLE)
 def test_agrees_with_numpy(name: str) -> None:
     """To 1e-12 of each column's maximum; batches side by side."""
-    numpy, casadi = modules(name)
+    numpy = module_of(name)
     N = 40
     x = states(numpy, N)
     for function, (label, columns) in RESULTS.items():
         given = [x[c] for c in columns.split()]
         expected = getattr(numpy, function)(*given)
         found = by_sample(
-            getattr(casadi, function)(**{c: x[c].T for c in columns.split()})[label].full(), N
+            numpy.casadi(function)(**{c: x[c].T for c in columns.split()})[label].full(), N
         )
         found = found.reshape(expected.shape)
         scale = np.abs(expected).reshape(-1, expected.shape[-1]).max(axis=0)
         assert (np.abs(found - expected) <= 1e-12 * scale).all(), function
-    found = casadi.frame_poses(q=x["q"].T)
+    found = numpy.casadi("frame_poses")(q=x["q"].T)
     for k, T in enumerate(np.moveaxis(numpy.frame_poses(x["q"]), 1, 0), start=1):
         np.testing.assert_allclose(by_sample(found[f"T{k}"].full(), N), T, rtol=0, atol=1e-12)
     np.testing.assert_allclose(
-        casadi.base_parameters(standard=list(x["standard"].values()))["X"].full()[:, 0],
+        numpy.casadi("base_parameters")(standard=list(x["standard"].values()))["X"].full()[:, 0],
         x["X"],
         rtol=1e-13,
     )
-    assert tuple(map(tuple, numpy.STRUCTURE.tolist())) == casadi.STRUCTURE
-    for constant in (
-        "NAME",
-        "JOINTS",
-        "BASE_PARAMETERS",
-        "STANDARD_PARAMETERS",
-        "FORMULAS",
-        "CONSTANTS",
-        "LIMITS",
-        "VALUES",
-        "DRIVES",
-    ):
-        assert getattr(casadi, constant) == getattr(numpy, constant)
 
 
 @pytest.mark.parametrize("name", SAMPLE)
 def test_forward_dynamics_inverts_the_inverse(name: str) -> None:
     """The residual of A qdd = tau - bias, so that the condition of A does not enter."""
-    numpy, casadi = modules(name)
+    numpy = module_of(name)
     x = states(numpy, 40)
-    qdd = casadi.forward_dynamics(**{c: x[c].T for c in ("q", "qd", "tau", "X")})["qdd"].full().T
+    qdd = (
+        numpy.casadi("forward_dynamics")(**{c: x[c].T for c in ("q", "qd", "tau", "X")})["qdd"]
+        .full()
+        .T
+    )
     A = numpy.inertia_matrix(x["q"], x["X"])
     assert (np.linalg.eigvalsh(A) > 0).all()
     torque = numpy.inverse_dynamics(x["q"], x["qd"], qdd, x["X"])
@@ -132,14 +119,13 @@ def test_forward_dynamics_inverts_the_inverse(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["haptic", "panda", "sr400"])
 def test_frames_and_passive_joints(name: str) -> None:
-    numpy, casadi = modules(name)
+    numpy = module_of(name)
     x = states(numpy, 9)
     for frame in range(1, numpy.frame_poses(x["q"][0]).shape[0] + 1):
-        J = by_sample(casadi.jacobian_of(frame)(q=x["q"].T)["J"].full(), 9)
+        J = by_sample(numpy.casadi("jacobian", frame=frame)(q=x["q"].T)["J"].full(), 9)
         np.testing.assert_allclose(J, numpy.jacobian(x["q"], frame=frame), rtol=0, atol=1e-12)
-    assert hasattr(casadi, "passive_joints") == hasattr(numpy, "PASSIVE")
     if hasattr(numpy, "PASSIVE"):
-        found = casadi.passive_joints(**{c: x[c].T for c in ("q", "qd", "qdd")})
+        found = numpy.casadi("passive_joints")(**{c: x[c].T for c in ("q", "qd", "qdd")})
         expected = numpy.passive_joints(x["q"], x["qd"], x["qdd"])
         for label, value in zip(("q_passive", "qd_passive", "qdd_passive"), expected, strict=True):
             np.testing.assert_allclose(found[label].full().T, value, rtol=0, atol=1e-12)
@@ -162,12 +148,12 @@ def differences(function, column: str, x: dict[str, np.ndarray], result: str) ->
 )
 def test_derivatives(name: str, model: str, result: str, columns: str) -> None:
     """Central differences of step 1e-6: 1e-7 of the largest entry is their own error."""
-    numpy, casadi = modules(name)
+    numpy = module_of(name)
     drawn = states(numpy, 1, seed=3)
     x = {c: drawn[c].reshape(-1) for c in columns.split()}
-    found = getattr(casadi, f"{model}_derivatives")(**x)
+    found = numpy.casadi(f"{model}_derivatives")(**x)
     for column in columns.split():
-        expected = differences(getattr(casadi, model), column, x, result)
+        expected = differences(numpy.casadi(model), column, x, result)
         np.testing.assert_allclose(
             found[f"d{result}_d{column}"].full(),
             expected,
@@ -184,44 +170,37 @@ def test_derivatives(name: str, model: str, result: str, columns: str) -> None:
 
 
 def test_constants_by_name_and_missing_inputs() -> None:
-    numpy, casadi = modules("planar_2r")
+    numpy = module_of("planar_2r")
     x = states(numpy, 5)
     given = {c: x[c].T for c in ("q", "qd", "qdd", "X")}
-    found = casadi.inverse_dynamics(**given, D2=0.7)["GAM"].full().T
+    function = numpy.casadi("inverse_dynamics")
+    found = function(**given, D2=0.7)["GAM"].full().T
     np.testing.assert_allclose(
         found, numpy.inverse_dynamics(x["q"], x["qd"], x["qdd"], x["X"], D2=0.7), rtol=1e-13
     )
-    by_position = casadi.inverse_dynamics(*given.values(), *casadi.CONSTANTS.values())
-    np.testing.assert_array_equal(
-        by_position.full(), casadi.inverse_dynamics(**given)["GAM"].full()
-    )
+    by_position = function(*given.values(), *numpy.CONSTANTS.values())
+    np.testing.assert_array_equal(by_position.full(), function(**given)["GAM"].full())
     del given["qd"]
-    assert np.isnan(casadi.inverse_dynamics(**given)["GAM"].full()).all()
+    assert np.isnan(function(**given)["GAM"].full()).all()
 
 
 def test_general_loops_have_none(capsys: pytest.CaptureFixture[str]) -> None:
     assert not emitted(["four_bar"], ("casadi",))
     assert "no casadi target, its loops are closed by iteration" in capsys.readouterr().err
+    assert not hasattr(module_of("four_bar"), "casadi")
 
 
-def test_imports_casadi_only() -> None:
-    tree = ast.parse(emitted(["tx40"], ("casadi",))["tx40_casadi.py"])
-    assert [
-        ast.unparse(n) for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)
-    ] == ["import casadi as ca"]
+def test_what_there_is_not_is_said() -> None:
+    with pytest.raises(
+        ValueError, match=r"casadi\('energy'\); there is base_parameters, regressor"
+    ):
+        module_of("planar_2r").casadi("energy")
 
 
-def test_sections_are_those_of_the_numpy_module() -> None:
-    """Line by line: what differs is the package and the result."""
-    files = generate_files(load_robot("tx40"), targets=("numpy", "casadi"), command="tx40")
-    lines = set(files["tx40_casadi.py"].replace("ca.", "np.").splitlines())
-    block = (
-        files["tx40.py"]
-        .partition("def _regressor_block(")[2]
-        .partition("\ndef ")[0]
-        .splitlines()[2:]
-    )
-    assert len(block) > 300 and not [line for line in block if line not in lines]
+def test_a_module_imports_numpy_alone_at_load() -> None:
+    tree = ast.parse(generate_module(load_robot("tx40")))
+    outside = [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
+    assert [ast.unparse(n) for n in outside] == ["import numpy as np"]
 
 
 CLASH = b"""
@@ -235,13 +214,6 @@ frames:
 
 
 def test_the_name_of_a_result_gives_way_to_a_constant() -> None:
-    text = generate_files(parse_robot(CLASH, "clash.yaml"), targets=("casadi",))["clash_casadi.py"]
-    function = loaded("clash_casadi", text).frame_poses
+    text = generate_module(parse_robot(CLASH, "clash.yaml"))
+    function = loaded("clash", text).casadi("frame_poses")
     assert function.name_in() == ["q", "g", "T1"] and function.name_out() == ["T1_"]
-
-
-@pytest.mark.parametrize("name", ["tx40", "emps"])
-def test_checked_in_modules_are_current(name: str) -> None:
-    path = Path(__file__).resolve().parents[2] / "generated" / f"{name}_casadi.py"
-    text = emitted([name], ("casadi",))[path.name]
-    assert below(path.read_text(encoding="utf-8")) == below(text) != text
