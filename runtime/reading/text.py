@@ -71,10 +71,9 @@ def _lines(path: Path) -> Lines:
             for number, line in enumerate(map(str.strip, text), 1):
                 if line and line[0] != "#":
                     yield number, line
-    except UnicodeDecodeError:
-        raise InputError(
-            f"not a text file in UTF-8 (behind line {number}); {UTF8}", file=path.name
-        ) from None
+    except UnicodeDecodeError as e:
+        byte = f"byte 0x{e.object[e.start]:02x} behind line {number}"
+        raise InputError(f"not a text file in UTF-8 ({byte}); {UTF8}", file=path.name) from None
 
 
 def _row(path: Path, has_header: bool, i: int) -> str:
@@ -154,7 +153,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 def _number(text: str, decimal: str) -> float | None:
     """The number that a field holds; None where it holds none."""
-    if "_" in text or (decimal != "." and "." in text):
+    if "_" in text or not text.isascii() or (decimal != "." and "." in text):
         return None
     try:
         return float(text if decimal == "." else text.replace(decimal, "."))
