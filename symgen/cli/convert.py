@@ -72,8 +72,9 @@ def convert(
     written, exit code 2.
     """
     with reported_errors():
+        from symgen.description.angles import SNAPPED
         from symgen.description.files import read_robot, write_robot
-        from symgen.description.tree import DROPPED, SNAPPED
+        from symgen.description.tree import DROPPED
         from symgen.description.values import assignment, values_of_csv, with_estimate, with_values
 
         if output.exists() and not force:

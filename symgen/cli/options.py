@@ -110,7 +110,7 @@ Chain = Annotated[
     tuple[str, str] | None,
     typer.Option(
         metavar="BASE TIP",
-        help="Of a URDF or MJCF: the joints between two links alone; others are held at zero.",
+        help="Of a URDF or MJCF: --lock of all joints but those between two links, at zero.",
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

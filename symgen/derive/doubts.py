@@ -1,6 +1,6 @@
 """What is valid in a robot but probably not meant: angles a hair off a round one, equal sides of a
-loop under two names, numbers in degrees, mm or
-cm/s^2."""
+loop under two names, a start at which it does not close, numbers in degrees or mm.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +13,7 @@ from symgen.description.expression import PI, twelfths
 from symgen.description.robot import REVOLUTE, Robot
 
 FAR = 0.3  # rad, or of the longest length
-# rad, or of a ratio of angles: nearer to a round angle or to a fraction of a denominator up to
-# FINE than a drawing shows, and not on it
-CLOSE, FINE = 1e-3, 12
-
-GRAVITY = 0.5, 30.0  # m/s^2, of small moons and large planets
+CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
 LONGEST = 100.0  # m
 LOPSIDED = 50.0  # a length over the sum of the others
 DEGREES = 30.0  # rad: a zero or a limit beyond is one in degrees ...
@@ -28,7 +24,6 @@ def doubts(robot: Robot) -> list[str]:
     """A sentence for each. Raises DescriptionError where a loop does not close."""
     return [
         *nearly_round(robot),
-        *nearly_fractions(robot),
         *other_units(robot),
         *equal_sides(robot),
         *far_starts(robot),
@@ -55,24 +50,9 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
     return notes
 
 
-def nearly_fractions(robot: Robot) -> list[str]:
-    """Ratios of two angles written as decimals, such as 0.333."""
-    return [
-        f"q{j} turns {float(n):g} times with q{i}, not {meant}: another robot, with other base "
-        f"parameters; if {meant} is meant, write it"
-        for j in robot.constraints
-        if robot.frame(j).sigma == REVOLUTE
-        for i, n in close(robot).turn(j)[0]
-        if 0 < abs(n - (meant := Fraction(n).limit_denominator(FINE))) < CLOSE
-    ]
-
-
 def other_units(robot: Robot) -> list[str]:
-    """Sizes that no robot has in SI and rad: gravity, lengths, zeros of the drives, limits."""
+    """Sizes that no robot has in m and rad: lengths, zeros of the drives, limits."""
     notes = []
-    g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
-    if g and not GRAVITY[0] <= g <= GRAVITY[1]:
-        notes.append(f"gravity is {g:g} m/s^2; that of the Earth is 9.81, in m/s^2")
     lengths = {
         (f.j, name): abs(getattr(f, name).value(robot.constants))
         for f in robot.frames
@@ -87,9 +67,7 @@ def other_units(robot: Robot) -> list[str]:
             )
     turning = [k for k, j in enumerate(robot.joints) if robot.frame(j).sigma == REVOLUTE]
     zeros = robot.drives.offset if robot.drives else ()
-    bounds = [
-        max(map(abs, x)) if isinstance(x, tuple) else abs(x) for x in robot.limits.get("q", ())
-    ]
+    bounds = [max(map(abs, x)) for x in robot.limits.get("q", ())]  # type: ignore[arg-type]
     for what, values in (("drives.offset", zeros), ("limits.q", bounds)):
         for k in turning:
             if k < len(values) and DEGREES < abs(values[k]) < UNLIMITED:

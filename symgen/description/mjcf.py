@@ -20,14 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from symgen.description.angles import SNAP, Angles, reaches
+from symgen.description.angles import SNAP, Angles
 from symgen.description.expression import ZERO, Expression, ratio, twelfths
 from symgen.description.mjcf_model import Mjcf, compiled
 from symgen.description.tree import (
     FIXED_TYPE,
     FREE_TYPE,
     MAX_JOINTS,
-    SNAPPED,
     Array,
     Inertial,
     Joint,
@@ -47,31 +46,8 @@ def parse_mjcf(content: bytes, file: str, *, exact: bool = False, sites: bool = 
     """
     mjcf, angles = compiled(content), Angles(exact)
     tree = _tree(mjcf, angles, sites=sites)
-    text, changes = angles.report(file, reaches(_distances(mjcf.model), "moved 0"))
-    return replace(
-        tree, angles=text, notes=(*tree.notes, *(f"{SNAPPED} {change}" for change in changes))
-    )
-
-
-def _distances(model: Any) -> list[tuple[str, str, float]]:
-    """Frames of bodies and sites by number, each body in a frame "moved" by its joints, with the
-    distance that may lie between, m: a hinge at p moves its body by up to 2 |p|.
-    """
-    strokes = np.where(
-        model.jnt_type == SLIDE_JOINT,
-        np.abs(model.jnt_range).max(axis=1),
-        2 * np.linalg.norm(model.jnt_pos, axis=1),
-    )
-    bodies = range(1, model.nbody)
-    ways = [
-        *((f"moved {model.body_parentid[b]}", f"{b}", model.body_pos[b]) for b in bodies),
-        *((f"{b}", f"moved {b}", strokes[model.jnt_bodyid == b].sum()) for b in bodies),
-        *(
-            (f"moved {model.site_bodyid[s]}", f"site {s}", model.site_pos[s])
-            for s in range(model.nsite)
-        ),
-    ]
-    return [(ant, end, float(np.linalg.norm(way))) for ant, end, way in ways]
+    text, notes = angles.report(file)
+    return replace(tree, angles=text, notes=(*tree.notes, *notes))
 
 
 @dataclass
@@ -125,7 +101,7 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
             link, pose = growing.place[int(model.site_bodyid[s])]
             name = _new(growing, model.site(s).name or f"site{s}")
             growing.links[name] = None
-            own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", "", angles)
+            own = _turned(model.site_pos[s], model.site_quat[s], f"site {name!a:.60}", angles)
             growing.joints.append(_fixed(name, link, pose @ own))
     gx, gy, gz = (0.0 if mjcf.weightless else float(x) + 0.0 for x in model.opt.gravity)
     notes = (*mjcf.notes, *_left_out(model))
@@ -179,7 +155,7 @@ def _pose(position: Array, quaternion: Array) -> Array:
     return T
 
 
-def _turned(position: Array, quaternion: Array, what: str, frame: str, angles: Angles) -> Array:
+def _turned(position: Array, quaternion: Array, what: str, angles: Angles) -> Array:
     """`_pose` of a body or site, whose roll, pitch and yaw, as a URDF has them, are taken as
     `angles` says; with a pitch of a quarter turn roll and yaw are one angle.
     """
@@ -189,7 +165,7 @@ def _turned(position: Array, quaternion: Array, what: str, frame: str, angles: A
     quarter = twelfths(pitch, SNAP) in (-6, 6)
     roll = 0.0 if quarter else math.atan2(R[2, 1], R[2, 2])
     yaw = math.atan2(-R[0, 1], R[1, 1]) if quarter else math.atan2(R[1, 0], R[0, 0])
-    taken = rotation((roll, pitch, yaw), what, frame, angles)
+    taken = rotation((roll, pitch, yaw), what, angles)
     T[:3, :3] = R if angles.exact else taken
     return T
 
@@ -200,7 +176,7 @@ def _body(growing: _Growing, b: int) -> None:
     name = _new(growing, model.body(b).name or f"body{b}")
     link, pose = growing.place[int(model.body_parentid[b])]
     what = f"body {name!a:.60} (line {growing.mjcf.bodies[b - 1]})"
-    pose = pose @ _turned(model.body_pos[b], model.body_quat[b], what, f"{b}", growing.angles)
+    pose = pose @ _turned(model.body_pos[b], model.body_quat[b], what, growing.angles)
     first, count = int(model.body_jntadr[b]), int(model.body_jntnum[b])
     if not count:
         growing.joints.append(_fixed(name, link, pose))

@@ -25,7 +25,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
-from symgen.description.angles import SNAP, Angles, reaches
+from symgen.description.angles import SNAP, Angles
 from symgen.description.expression import ONE, PI, Expression, twelfths
 from symgen.description.fields import located
 from symgen.description.grammar import parse
@@ -139,11 +139,7 @@ def read_par(
     with located(file, par.line):
         _scan(_text(content), par)
         robot = _robot(par, dict(constants or {}), file, hashlib.sha256(content).hexdigest())
-    edges = [
-        (str(f.ant), str(f.j), sum(abs(x.value(robot.constants)) for x in (f.b, f.d, f.r0)))
-        for f in robot.frames
-    ]
-    angles, notes = par.angles.report(file, reaches(edges, "0"))
+    angles, notes = par.angles.report(file)
     return replace(robot, angles=angles), (*par.notes, *notes)
 
 
@@ -346,7 +342,7 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
             )
         e = {key: _expression(*rows[key][k]) for key in ("gamma", "b", "alpha", "d", "theta", "r")}
         for key in ("gamma", "alpha", "theta"):
-            e[key] = _rounded(e[key], f"{key} of frame {j} (line {rows[key][k][1]})", str(j), par)
+            e[key] = _rounded(e[key], f"{key} of frame {j} (line {rows[key][k][1]})", par)
         moved = {REVOLUTE: "theta", PRISMATIC: "r"}.get(sigma)
         if moved is not None:
             variable = _variable(e[moved], j, moved, rows[moved][k][1])
@@ -393,12 +389,12 @@ def _variable(e: Expression, j: int, key: str, line: int) -> str:
     return (usual or alone)[0]
 
 
-def _rounded(e: Expression, name: str, frame: str, par: _Par) -> Expression:
+def _rounded(e: Expression, name: str, par: _Par) -> Expression:
     """Decimal approximations of multiples of pi/12, as programs write them, become exact."""
     c = e.terms.get(())
     if c is None or len(e.terms) > 2 or not twelfths(float(c), SNAP):
         return e
-    k = par.angles.twelfths(float(c), name, frame)
+    k = par.angles.twelfths(float(c), name)
     return e if k is None else e - c + PI * Fraction(k, 12)
 
 

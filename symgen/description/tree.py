@@ -15,7 +15,7 @@ from symgen.description.expression import Expression
 
 Array = np.ndarray
 MAX_JOINTS = 200
-SNAPPED, DROPPED = "snapped:", "not read:"  # how notes start: a changed angle, elements left out
+DROPPED = "not read:"  # how the note on elements that are left out starts
 EARTH = 9.81  # m/s^2, along -z of the root link
 MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed", "free"
 
@@ -131,12 +131,10 @@ def turn(axis: int, angle: float) -> Array:
     return R
 
 
-def rotation(rpy: Sequence[float], what: str, frame: str, angles: Angles) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), each as `angles` takes it; they are of `what`, and turn the
-    link `frame`.
-    """
+def rotation(rpy: Sequence[float], what: str, angles: Angles) -> Array:
+    """R = Rz(yaw) Ry(pitch) Rx(roll) of `what`, each as `angles` takes it."""
     roll, pitch, yaw = (
-        x if (k := angles.twelfths(x, f"{name} of {what}", frame)) is None else k * (math.pi / 12)
+        x if (k := angles.twelfths(x, f"{name} of {what}")) is None else k * (math.pi / 12)
         for name, x in zip(("roll", "pitch", "yaw"), rpy, strict=True)
     )
     return np.asarray(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll))

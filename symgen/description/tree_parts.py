@@ -1,14 +1,9 @@
-"""Part of a tree: joints held at positions, and the chain between two links alone.
+"""Part of a tree: joints held at positions; of a chain from `base` to `tip` all but those between
+these two links, at zero.
 
 A joint that is held is a fixed joint with the pose of that position; what follows it stands where
-its relation says. The inertia of a link that no
-longer moves belongs to the body that holds it, as with any fixed joint.
-
-Of a chain from `base` to `tip`, the joints between these two links move. The others outward of
-`base` are held at zero, so that a gripper and the
-branches stay as masses; `base` is the ground, the acceleration of gravity that of the tree with the
-joints before `base` at zero, and
-what stands before `base` is left out.
+its relation says. The inertia of a link that no longer moves belongs to the body that holds it, as
+with any fixed joint.
 """
 
 from __future__ import annotations
@@ -18,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symgen.description.angles import SHOWN
 from symgen.description.expression import Expression
 from symgen.description.tree import FIXED_TYPE, FREE_TYPE, Array, Joint, Tree, turn
 from symgen.errors import DescriptionError
@@ -41,11 +35,11 @@ class TreePart:
 
 
 WHOLE_TREE = TreePart()
+SHOWN = 20  # names in a message
 
 
 def part_of(tree: Tree, part: TreePart) -> Tree:
-    """The tree with the joints of `part.lock` held, cut down to `part.chain`; notes tell what was
-    held and left out.
+    """The tree with the joints of `part.lock` held, and those beside `part.chain`; notes tell which.
 
     Raises
     ------
@@ -55,10 +49,44 @@ def part_of(tree: Tree, part: TreePart) -> Tree:
     """
     for name in part.lock:
         _require_independent(tree, name)
+    notes = list(tree.notes)
     if part.lock:
-        note = f"held: {_names([f'{name} at {x:.6g}' for name, x in part.lock.items()])}"
-        tree = replace(_held(tree, part.lock), notes=(*tree.notes, note))
-    return tree if part.chain is None else _chain(tree, *part.chain)
+        notes.append(f"held: {_names([f'{name} at {x:.6g}' for name, x in part.lock.items()])}")
+        tree = _held(tree, part.lock)
+    if part.chain:
+        base, tip = part.chain
+        others = _beside(tree, base, tip)
+        tree = _held(tree, others)
+        moving = [joint.name for joint in tree.joints if joint.kind != FIXED_TYPE]
+        notes.append(f"chain from {base!a:.60} to {tip!a:.60}: {_names(moving)} move")
+        notes += [f"held at zero: {_names(others)}"] if others else []
+    return replace(tree, notes=tuple(notes))
+
+
+def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
+    """Positions of the moving joints that are not between two links: zero, of one that follows that
+    where its leaders are at zero.
+    """
+    for link in (base, tip):
+        if link not in tree.links:
+            raise DescriptionError(
+                f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}"
+            )
+    holding = {joint.child: joint for joint in tree.joints}
+    between: list[Joint] = []
+    link = tip
+    while link != base and link in holding:
+        between.append(holding[link])
+        link = holding[link].parent
+    if link != base or all(joint.kind == FIXED_TYPE for joint in between):
+        raise DescriptionError(
+            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes "
+            "from base to tip, outward"
+        )
+    kept = {joint.name for joint in between}
+    others = [j.name for j in tree.joints if j.kind != FIXED_TYPE and j.name not in kept]
+    at_zero = {name: e.terms.get((), 0.0) for name, e in tree.relations.items()}
+    return {name: float(at_zero.get(name, 0.0)) for name in others}
 
 
 def _require_independent(tree: Tree, name: str) -> None:
@@ -108,80 +136,6 @@ def _motion(joint: Joint, q: float) -> Array:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     T[:3, :3] += s * cross + (1 - c) * cross @ cross
     return T
-
-
-def _chain(tree: Tree, base: str, tip: str) -> Tree:
-    for link in (base, tip):
-        if link not in tree.links:
-            raise DescriptionError(
-                f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}"
-            )
-    holding = {joint.child: joint for joint in tree.joints}
-    between = _path(holding, tip, base)
-    before = _path(holding, base, tree.root)
-    if between is None or all(joint.kind == FIXED_TYPE for joint in between):
-        raise DescriptionError(
-            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes "
-            "from base to tip, outward"
-        )
-    outward = {base}
-    while new := {joint.child for joint in tree.joints if joint.parent in outward} - outward:
-        outward |= new
-    between_names = {joint.name for joint in between}
-    held = {
-        joint.name: _zero(tree, joint.name)
-        for joint in tree.joints
-        if joint.kind != FIXED_TYPE and joint.name not in between_names
-    }
-    hanging = [
-        joint.name for joint in tree.joints if joint.name in held and joint.parent in outward
-    ]
-    dropped = [link for link in tree.links if link not in outward]
-    tree = _held(tree, held)
-    moving = [joint.name for joint in tree.joints if joint.kind != FIXED_TYPE]
-    notes = [f"chain from {base!a:.60} to {tip!a:.60}: {_names(moving)} move"]
-    notes += (
-        [f"held at zero, their links parts of the bodies that carry them: {_names(hanging)}"]
-        if hanging
-        else []
-    )
-    notes += (
-        [f"links left out, since the base of the chain is the ground: {_names(dropped)}"]
-        if dropped
-        else []
-    )
-    R = np.eye(3)
-    standing = {joint.name: joint for joint in tree.joints}
-    for joint in before or ():
-        R = R @ standing[joint.name].pose[:3, :3]
-    gx, gy, gz = (round(float(x), 12) + 0.0 for x in R.T @ tree.gravity)
-    return replace(
-        tree,
-        links={name: inertial for name, inertial in tree.links.items() if name in outward},
-        joints=tuple(joint for joint in tree.joints if joint.parent in outward),
-        root=base,
-        bare=tree.bare & outward,
-        gravity=(gx, gy, gz),
-        notes=(*tree.notes, *notes),
-    )
-
-
-def _zero(tree: Tree, name: str) -> float:
-    """Position of a joint that is held at zero, or of one that follows where its leaders are at
-    zero.
-    """
-    return float(tree.relations[name].terms.get((), 0.0)) if name in tree.relations else 0.0
-
-
-def _path(holding: Mapping[str, Joint], link: str, root: str) -> list[Joint] | None:
-    """Joints from `root` outward to `link`; None where it does not hang on it."""
-    path: list[Joint] = []
-    while link != root:
-        if link not in holding:
-            return None
-        path.insert(0, holding[link])
-        link = holding[link].parent
-    return path
 
 
 def _names(names: Collection[str]) -> str:

@@ -14,14 +14,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from symgen.description.angles import Angles, reaches
+from symgen.description.angles import Angles
 from symgen.description.expression import Expression, ratio
 from symgen.description.tree import (
     DROPPED,
     FIXED_TYPE,
     MAX_JOINTS,
     MOVING,
-    SNAPPED,
     Inertial,
     Joint,
     Tree,
@@ -74,15 +73,16 @@ def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
         if other
         else ()
     )
-    edges = [(joint.parent, joint.child, _length(joint)) for joint in joints]
-    reach = reaches(edges, base)
-    if lost := sorted(links.keys() - reach.keys()):
+    carried = {base}
+    while further := {j.child for j in joints if j.parent in carried} - carried:
+        carried |= further
+    if lost := sorted(links.keys() - carried):
         raise DescriptionError(
             f"links {', '.join(lost[:5])} do not hang on {base!r}; their joints form a cycle",
             line=root.line,
         )
-    angles_text, changes = angles.report(file, reach)
-    notes += tuple(f"{SNAPPED} {change}" for change in changes)
+    angles_text, snapped = angles.report(file)
+    notes += snapped
     points = [
         e.word("name")
         for e in root
@@ -112,13 +112,6 @@ def _left_out(root: XmlElement) -> Iterator[str]:
         yield from (child.tag for child in e if e.tag in READ and child.tag not in READ[e.tag])
 
 
-def _length(joint: Joint) -> float:
-    """Distance that a joint may put between the frames of its links, m."""
-    stroke = [abs(joint.limits.get(end, 0.0)) for end in ("lower", "upper")]
-    slide = max(stroke) if joint.kind == "prismatic" else 0.0
-    return float(np.linalg.norm(joint.pose[:3, 3])) + slide
-
-
 def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expression]:
     """q = multiplier q_leader + offset of the joints that mimic another, through any that follow
     each other.
@@ -142,15 +135,13 @@ def _relations(joints: list[Joint], mimics: dict[str, Mimic]) -> dict[str, Expre
     return relations
 
 
-def _pose(holder: XmlElement, what: str, frame: str, angles: Angles) -> Array:
-    """(4, 4) of the <origin> of a link or joint: R = Rz(yaw) Ry(pitch) Rx(roll); `frame`: the link
-    that it turns.
-    """
+def _pose(holder: XmlElement, what: str, angles: Angles) -> Array:
+    """(4, 4) of the <origin> of a link or joint: R = Rz(yaw) Ry(pitch) Rx(roll)."""
     T, e = np.eye(4), holder.find("origin")
     if e is None:
         return T
     rpy = e.numbers("rpy", 3, "0 0 0").tolist()
-    T[:3, :3] = rotation(rpy, f"{what} (line {e.line})", frame, angles)
+    T[:3, :3] = rotation(rpy, f"{what} (line {e.line})", angles)
     T[:3, 3] = e.numbers("xyz", 3, "0 0 0")
     return T
 
@@ -165,7 +156,7 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     M = mass.number("value")
     if M < 0:
         raise DescriptionError(f"mass {M}; expected 0 or more", line=mass.line)
-    pose = _pose(e, f"link {link.word('name')!a:.60}", "", angles)
+    pose = _pose(e, f"link {link.word('name')!a:.60}", angles)
     if inertia is None:  # a point mass: programs that read URDF say so and go on
         return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
@@ -209,7 +200,7 @@ def _joint(e: XmlElement, angles: Angles) -> Joint:
     )
     axis = axis if abs(length - 1) < 1e-15 else axis / length
     links = (ends["parent"].word("link"), ends["child"].word("link"))
-    pose = _pose(e, f"joint {name!a:.60}", links[1], angles)
+    pose = _pose(e, f"joint {name!a:.60}", angles)
     return Joint(name, kind, *links, pose, axis, e.line, limits, damping, friction)
 
 

@@ -47,7 +47,6 @@ def test_packaged_robots_raise_no_doubt(name):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("g: 9.81", "g: 981", "gravity is 981 m/s^2"),
         ("L1: 0.4", "L1: 400", "frame 2: d holds a length of 400 m; lengths are in m, not mm"),
         (
             "gravity:",

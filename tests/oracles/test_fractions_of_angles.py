@@ -20,7 +20,6 @@ from oracles.test_loops_agree import whole
 from oracles.test_random_loops import module_of
 from symgen.certify.modules import certify
 from symgen.cli.main import app
-from symgen.derive.doubts import doubts
 from symgen.description import Robot, parse_robot
 from symgen.description.grammar import parse
 from symgen.emit.generate import generate_module
@@ -100,11 +99,6 @@ def test_models_are_shown(ratio: str, form: str, tmp_path: Path) -> None:
 def test_a_ratio_that_is_no_number_is_refused_with_the_number(ratio: str, number: str) -> None:
     with pytest.raises(DescriptionError, match=rf"q3: q3 turns .* with q2; .* write {number}"):
         regroup(hand(ratio, "q1"))
-
-
-def test_a_decimal_close_to_a_fraction_is_told() -> None:
-    notes = doubts(hand("0.333*q2", "0.25*q1"))
-    assert [note[:45] for note in notes] == ["q3 turns 0.333 times with q2, not 1/3: anothe"]
 
 
 def tied(seed: int, relations: Mapping[int, str]) -> Robot:

@@ -13,7 +13,7 @@ import pytest
 from oracles.test_urdf_agrees import kept_frames, legend, pose_difference
 from oracles.urdf_table import FOUND, difference, snapped_text
 from symgen.certify.modules import certify
-from symgen.description.tree import SNAPPED
+from symgen.description.angles import SNAPPED
 from symgen.description.tree_robot import read_tree
 from symgen.description.urdf import parse_urdf
 from symgen.description.urdf_write import write_urdf

@@ -22,7 +22,6 @@ from symgen.derive.graph import Symbol, interpret
 from symgen.description import Robot
 from symgen.description.angles import SNAP
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
-from symgen.description.tree import SNAPPED
 from symgen.description.tree_robot import read_tree
 from symgen.errors import SymgenError
 from symgen.regroup.regrouping import regroup
@@ -97,7 +96,7 @@ def row(path: Path) -> str:
         as_it_is, said = read_tree(text.encode(), path.name, exact=True)
     except SymgenError as error:
         return f"| `{path.stem}` | | | | refused: {str(error).partition(' (')[0]} | | | |"
-    angles = sum(note.startswith(SNAPPED) for note in notes)
+    angles = int((robot.angles.split() or ["0"])[0])
     torques = ["no masses", "no masses"]
     if robot.values:
         torques = [
