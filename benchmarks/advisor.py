@@ -32,16 +32,13 @@ import numpy as np  # noqa: E402  (numpy reads the number of threads when it loa
 from scipy.special import stdtrit  # noqa: E402
 
 import symgen  # noqa: E402
+from runtime.compose import advise, cestac, observe, problem  # noqa: E402
 from runtime.estimators.essential import essential_of  # noqa: E402
 from runtime.model.generated import drives_of  # noqa: E402
 from runtime.reading.datasets import dataset_study  # noqa: E402
 from runtime.reading.records import read_records  # noqa: E402
 from runtime.resolution.advice import LIMITS, crossing  # noqa: E402
-from runtime.resolution.advisor import advise  # noqa: E402
-from runtime.resolution.cestac import cestac  # noqa: E402
 from runtime.resolution.coarse_encoders import CoarseEncoders  # noqa: E402
-from runtime.rows.observe import observe  # noqa: E402
-from runtime.rows.prepared import prepared  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
 from symgen.demo.tx40_tables import MAIN  # noqa: E402
 
@@ -72,7 +69,7 @@ def steps_table(name, model, study, record, names):
     first = advice.encoders[0]
     level = CoarseEncoders(
         model,
-        [prepared(model, record, study)],
+        [problem(model, record, study).prepared[0]],
         study,
         names,
         drives_of(model),
@@ -181,7 +178,7 @@ def real_table(name, model, study, record, names):
         flush=True,
     )
     for reader in advice.real:
-        own = [prepared(model, record, law)]
+        own = [problem(model, record, law).prepared[0]]
         real = CoarseEncoders(model, own, law, names, drives_of(model), {}, "phase", reader.reader)
         first, ratios = reader.encoders[0], []
         for limit in first.limits:

@@ -43,17 +43,16 @@ from rounds import interleave, processor, ratio
 from runtime import Record, Study, load_model
 from runtime.compiled.cache import FallbackWarning, compiler
 from runtime.compiled.model import compiled_model
+from runtime.compose import cestac, observe, problem
 from runtime.estimators.essential import essential_of
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.resolution.cestac import cestac, levels_of
+from runtime.resolution.cestac import levels_of
 from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
 from runtime.resolution.run import one_run
-from runtime.rows.observe import observe
-from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from runtime.signals.filters import filtered_states
 from symgen.description import load_robot
@@ -68,7 +67,7 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
     return Task(
-        (prepared_record(prepared(model, record, study), study),),
+        (prepared_record(problem(model, record, study).prepared[0], study),),
         model,
         names,
         replace(study.estimate, columns="all"),

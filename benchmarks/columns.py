@@ -27,13 +27,11 @@ import kr300
 import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
-from runtime.estimators.projection import LawProblem
-from runtime.identification.laws import fit_laws, fitted_laws
-from runtime.identification.transmitted import transmitted
-from runtime.loop.methods import estimate_of
+from runtime.compose import estimate_of, problem
+from runtime.laws.projection import LawProblem
+from runtime.laws.scalars import fit_laws, fitted_laws
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from symgen.description.element import LawScalar
 from symgen.description.expression import ONE
@@ -104,26 +102,28 @@ def truth(records, kinds, robots):
             columns = [plain.joints.index(j) for j in joints]
             tau[:, columns] += 1.0 * law_torque(kind, q[:, columns], qd[:, columns])
             noise = NOISE * tau.std(axis=0)
-            own = prepared(model, runtime.Record(t, q, tau, rate=RATE), PLAIN)
-            bare = prepared(without, runtime.Record(t, q, tau, rate=RATE), PLAIN).observation(
-                without
+            own = problem(model, runtime.Record(t, q, tau, rate=RATE), PLAIN).prepared[0]
+            bare = (
+                problem(without, runtime.Record(t, q, tau, rate=RATE), PLAIN)
+                .prepared[0]
+                .observation(without)
             )
-            problem = LawProblem(model, [own], model.BASE_PARAMETERS)
-            Y, sigma = problem.Y.copy(), noise[problem.joint]
+            laws = LawProblem(model, [own], model.BASE_PARAMETERS)
+            Y, sigma = laws.Y.copy(), noise[laws.joint]
             j = joints[0]
-            scalar = next(s for s in problem.scalars if s.endswith(str(j)))
+            scalar = next(s for s in laws.scalars if s.endswith(str(j)))
             told = {scalar: TRUE[kind][scalar.rstrip("0123456789")], f"LAW{j}": 1.0}
             found = {key: [] for key in told}
             usual = {f"FS{j}": [], f"FV{j}": []}
             pseudo = np.linalg.pinv(bare.W / sigma[:, None])
             for k in range(records):
-                problem.Y = Y + sigma * np.random.default_rng([k, 5]).standard_normal(len(Y))
-                fit = fitted_laws(problem, weights=True)
+                laws.Y = Y + sigma * np.random.default_rng([k, 5]).standard_normal(len(Y))
+                fit = fitted_laws(laws, weights=True)
                 s = next(x for x in fit.scalars if x.name == scalar)
                 test = next(x for x in fit.tests if x.parameter == f"LAW{j}")
                 found[scalar].append((s.value, s.sigma))
                 found[f"LAW{j}"].append((test.value, test.sigma))
-                X = pseudo @ (problem.Y / sigma)
+                X = pseudo @ (laws.Y / sigma)
                 for key, values in usual.items():
                     values.append(X[bare.names.index(key)])
             for key, true in told.items():
@@ -178,11 +178,11 @@ def loaded(records, robots):
             )
             record = runtime.Record(t, q, tau + noise, rate=RATE)
             channels = {f"tau_model{j}": record.tau[:, i] for j, i in zip(joints, k, strict=True)}
-            own = {"measured": prepared(model, replace(record, channels=channels), study)}
+            own = {
+                "measured": problem(model, replace(record, channels=channels), study).prepared[0]
+            }
             try:
-                (own["of the model"],), _, _ = transmitted(
-                    model, [prepared(model, record, study)], [], True
-                )
+                own["of the model"] = problem(model, record, study).prepared[0]
             except runtime.InputError:
                 refused += 1
             for way, one in own.items():
@@ -234,7 +234,9 @@ def measured(kinds=("stribeck", "tanh", "cubic", "sigmoid"), records=("emps", "k
                 bent, kind = replace(robot, elements=(*robot.elements, law)), "power"
             model = symgen.model(bent)
             records = read_records(study.record, model)
-            fit = fit_laws(model, [prepared(model, r, study) for r in records], weights=True)
+            fit = fit_laws(
+                model, [problem(model, r, study).prepared[0] for r in records], weights=True
+            )
             for test in fit.tests:
                 said = ", ".join(
                     s.doubt or f"{s.name} {s.value:.3g} ± {s.sigma:.1g}"

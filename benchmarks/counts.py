@@ -36,27 +36,27 @@ from scipy.io import loadmat
 
 import symgen
 from runtime import InputError, load_model
+from runtime.compose import cestac, estimate_of, observe
 from runtime.estimators.essential import essential_of
-from runtime.loop.methods import estimate_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.records.record import Record
-from runtime.resolution.cestac import cestac
 from runtime.resolution.coarse_encoders import READERS
-from runtime.rows.observe import observe
 from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.selection import certain_rows, select_rows
 from runtime.settings.study import Study, study_from_mapping
 from runtime.signals.counts.lattice import lattice
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import filtered_states
-from runtime.signals.states import observed_states
 from runtime.table import aligned
 from symgen.demo.tx40_tables import MAIN
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 
 import haptic_motion
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import observed_states
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"

@@ -26,19 +26,24 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
+import sys
+
 import numpy as np
 from estimators import AROUND, bench, determined, with_encoder
 
 from runtime import InputError
-from runtime.loop.closed_loop import ClosedLoop, closed_loop
-from runtime.loop.methods import estimate_of
+from runtime.compose import estimate_of, problem
+from runtime.loop.closed_loop import ClosedLoop
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.prepared import decimated_torque, prepared
+from runtime.rows.prepared import decimated_torque
 from runtime.settings.study import EstimateSettings, Lowpass, Study
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import lowpass_filtered
 from runtime.table import aligned
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import loop_of_records
 
 Array = np.ndarray
 STEPS = {
@@ -113,7 +118,7 @@ def first_loop(robot: str) -> ClosedLoop:
     """
     b = bench(robot)
     record = with_encoder(robot, 0.0).run(b.truth, b.reference, seed=0).record()
-    return closed_loop(
+    return loop_of_records(
         b.model, [replace(record, q_r=b.reference.q)], b.study, b.simulator, around=AROUND[robot]
     )
 
@@ -124,7 +129,7 @@ def observed(robot: str, record: Record, study: Study) -> Observation:
     selection = replace(loop.parts[0].selection, signals=study.signals)
     part = replace(
         loop.parts[0],
-        prepared=prepared(bench(robot).model, record, study),
+        prepared=problem(bench(robot).model, record, study).prepared[0],
         selection=selection,
         torque=decimated_torque(record.tau, selection),
     )

@@ -34,6 +34,8 @@ from typing import Any, NamedTuple
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
+import sys
+
 import numpy as np
 from counts import MAIN, STEPS, quantised
 from estimators import TX40, bench
@@ -42,8 +44,8 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.special import erf
 from simulation import LAW
 
+from runtime.compose import estimate_of
 from runtime.estimators.essential import essential_of
-from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.records.record import Record
@@ -54,8 +56,10 @@ from runtime.rows.sign_errors import switches
 from runtime.settings.study import Study, study_from_mapping
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import States, filtered_states
-from runtime.signals.states import observed_states
 from runtime.table import aligned
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import observed_states
 
 Array = np.ndarray
 RATE, SECONDS = 5000, 7.5

@@ -37,10 +37,10 @@ from simulation import LAW
 
 import symgen
 from runtime import InputError, load_model
+from runtime.compose import estimate_of
 from runtime.estimators.estimate import Estimate
-from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.control_law import parameters_of
-from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
@@ -54,6 +54,9 @@ from runtime.table import aligned
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 
 from haptic_motion import RATE, motion
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import loop_of_records
 
 Array = np.ndarray
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
@@ -158,7 +161,7 @@ def made(key: Key) -> tuple[Record, ClosedLoop]:
     """The record and its loop."""
     b = bench(key.robot)
     record = with_encoder(key.robot, key.step).run(b.truth, b.reference, seed=key.seed).record()
-    loop = closed_loop(
+    loop = loop_of_records(
         b.model,
         [replace(record, q_r=b.reference.q)],
         b.study,

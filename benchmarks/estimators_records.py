@@ -21,14 +21,15 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
+import sys
+
 import numpy as np
 from scipy.io import loadmat
 from simulation import LAW
 
 from runtime import load_model
+from runtime.compose import estimate_of
 from runtime.errors import InputError
-from runtime.loop.closed_loop import closed_loop
-from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
 from runtime.model.generated import GeneratedModel
@@ -37,6 +38,9 @@ from runtime.reading.records import read_records
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 from runtime.table import aligned
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import loop_of_records
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 TEXT = Path(__file__).with_name("estimators_records.md")
@@ -78,13 +82,13 @@ def emps() -> str:
     )
     lines: list[Sequence[str]] = [head]
     for k, record in enumerate(records):
-        other = closed_loop(model, [records[1 - k]], study, simulators[0]).measured()
+        other = loop_of_records(model, [records[1 - k]], study, simulators[0]).measured()
         for label, delay, settings in EMPS_METHODS:
             if k == 1 and settings.method in ("iv", "didim"):
                 # the pulses enter behind the controller: this loop is not simulated from its
                 # reference alone
                 continue
-            seen = closed_loop(model, [record], study, simulators[delay]).measured()
+            seen = loop_of_records(model, [record], study, simulators[delay]).measured()
             found = estimate_of(seen, settings, model=model)
             errors = []
             for simulator in simulators:
@@ -135,7 +139,7 @@ def tx40_rows(low_speed: float, around: float) -> tuple[GeneratedModel, Study, O
     record = read_records(study.record, model)[0]
     until = int(np.searchsorted(record.t, 7.6))
     record = replace(record, t=record.t[:until], q=record.q[:until], tau=record.tau[:until])
-    seen = closed_loop(
+    seen = loop_of_records(
         model,
         [record],
         study,

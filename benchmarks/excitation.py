@@ -26,16 +26,14 @@ from ruamel.yaml import YAML
 from simulation import LAW
 
 from runtime import load_model
+from runtime.compose import estimate_of, excite, observe
 from runtime.excitation.criteria import excesses, kept_correlation, planned, weights_of
-from runtime.excitation.search import excite
 from runtime.loop.control_law import parameters_of
-from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
 from runtime.parallel import processes
 from runtime.reading.names import study_of
 from runtime.reading.records import read_records
-from runtime.rows.observe import observe
 from runtime.settings.controller import Controller
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.schema import structure

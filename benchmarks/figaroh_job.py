@@ -45,14 +45,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 
 from runtime.compiled.model import compiled_model
+from runtime.compose import estimate_of, observe
 from runtime.estimators.estimate import Estimate
 from runtime.files import read_bytes
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, load_model
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
 from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files

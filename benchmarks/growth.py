@@ -39,10 +39,10 @@ from matplotlib.ticker import NullFormatter
 
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
+from runtime.compose import cestac
 from runtime.model.generated import GeneratedModel, load_model
 from runtime.parallel import processes
 from runtime.records.record import Record
-from runtime.resolution.cestac import cestac
 from runtime.rows.regressor import Columns
 from runtime.settings.study import CestacSettings, Decimate, Study
 from runtime.signals.filters import States, decimation_plan

@@ -20,13 +20,12 @@ import numpy as np
 
 import runtime
 import symgen
+from runtime.compose import estimate_of, problem
 from runtime.identification.elastic import elasticity
-from runtime.identification.torque_law import law_estimate
-from runtime.loop.methods import estimate_of
 from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.rows.observation import Observation, stack
-from runtime.rows.prepared import prepared, resolved
+from runtime.rows.prepared import stacked
 from runtime.settings.study import EstimateSettings, Study, study_from_mapping
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -72,8 +71,7 @@ def go2_study(
 def observed(model: runtime.GeneratedModel, study: Study) -> list[Observation]:
     """Rows of each run, one cut-off for all."""
     records = read_records(study.record, model)
-    study, _ = resolved(study, records)
-    return [runtime.observe(model, record, study) for record in records]
+    return [reading.observation(model) for reading in problem(model, records, study).prepared]
 
 
 def left_out(model: runtime.GeneratedModel, runs: Sequence[Observation]) -> np.ndarray:
@@ -142,9 +140,7 @@ def go2() -> None:
     for settings in ({"kd": "fit"}, {"delay": "fit"}):
         study = go2_study(**settings)  # type: ignore[arg-type]
         records = read_records(study.record, model)
-        study, _ = resolved(study, records)
-        own = [prepared(model, record, study) for record in records]
-        print(law_estimate(model, own, study, study.controller.law).text, "\n")  # type: ignore[union-attr]
+        print(problem(model, records, study).noted("law").text, "\n")
     print("Error on each run, %, of a fit of the other seven\n")
     cases: list[tuple[str, Study]] = [
         ("defaults (median 5, cut-off auto)", go2_study(cutoff="auto", median=5)),
@@ -195,15 +191,16 @@ def kr300() -> None:
             path.write_text(source.robot_text(load))
             model = symgen.model(path)
         for names in ("A", "B", "AB"):
-            own = []
+            records = []
             for name in names:
                 study = study_from_mapping(source.study(name))
                 columns = replace(study.record[0].columns, q_link=("rec.act_pos_se_deg",))
                 given = replace(study.record[0], columns=columns)
                 record: Record = read_records((given,), model)[0]
-                own.append(prepared(model, record, study))
-            fit = estimate_of(runtime.observe(model, own, study), EstimateSettings(), model=model)
-            gears = elasticity(model, own, fit.names, fit.X)
+                records.append(record)
+            whole = problem(model, records, study)
+            fit = estimate_of(stacked(model, whole.prepared), EstimateSettings(), model=model)
+            gears = elasticity(whole, fit.names, fit.X)
             assert gears is not None
             each = [
                 f"{K / 1e6:.2f} +- {1.96 * s / 1e6:.2f}" if np.isfinite(K) else "not told"

@@ -28,15 +28,19 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"  # before numpy
 
+import sys
+
 import numpy as np
 
 from runtime import load_model
 from runtime.settings.study import Signals, study_from_mapping
 from runtime.signals.filters import decimated, derivative
-from runtime.signals.states import observed_states
 from symgen import load_robot
 from symgen.certify.witness import bodies
 from symgen.emit.generate import generate_files
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+from problems import observed_states
 
 Array = np.ndarray[Any, Any]
 RATE, SECONDS, FACTOR = 1000.0, 20.0, 20  # Hz, s, decimation

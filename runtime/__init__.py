@@ -18,27 +18,33 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from runtime.compose import (
+        advise,
+        cestac,
+        compare,
+        delay,
+        essential,
+        estimate,
+        excite,
+        identify,
+        observe,
+        plausibility,
+        problem,
+        static_poses,
+    )
+    from runtime.core.problem import Problem
     from runtime.errors import InputError
     from runtime.estimators.estimate import Estimate
-    from runtime.excitation.poses import static_poses
-    from runtime.excitation.search import excite
-    from runtime.identification.compare import compare
-    from runtime.identification.identification import Identification, identify
-    from runtime.loop.methods import essential, estimate
+    from runtime.identification.result import Identification
     from runtime.loop.simulation import simulate
     from runtime.model.generated import load_model
-    from runtime.plausible.delay import delay
-    from runtime.plausible.plausibility import plausibility
     from runtime.reading.records import read_record
     from runtime.reading.resampling import resample
     from runtime.records.record import Record
     from runtime.reporting.files import report
     from runtime.resolution.advice import Advice
-    from runtime.resolution.advisor import advise
-    from runtime.resolution.cestac import cestac
     from runtime.resolution.result import Cestac
     from runtime.rows.observation import Observation
-    from runtime.rows.observe import observe
     from runtime.settings.files import load_study
     from runtime.settings.study import Study
 
@@ -49,6 +55,7 @@ __all__ = [
     "Identification",
     "InputError",
     "Observation",
+    "Problem",
     "Record",
     "Study",
     "advise",
@@ -63,6 +70,7 @@ __all__ = [
     "load_study",
     "observe",
     "plausibility",
+    "problem",
     "read_record",
     "report",
     "resample",
@@ -71,27 +79,33 @@ __all__ = [
 ]
 
 _MODULES = {
+    "runtime.compose": (
+        "advise",
+        "cestac",
+        "compare",
+        "delay",
+        "essential",
+        "estimate",
+        "excite",
+        "identify",
+        "observe",
+        "plausibility",
+        "problem",
+        "static_poses",
+    ),
+    "runtime.core.problem": ("Problem",),
     "runtime.errors": ("InputError",),
     "runtime.estimators.estimate": ("Estimate",),
-    "runtime.loop.methods": ("essential", "estimate"),
-    "runtime.excitation.poses": ("static_poses",),
-    "runtime.excitation.search": ("excite",),
-    "runtime.identification.compare": ("compare",),
-    "runtime.identification.identification": ("Identification", "identify"),
-    "runtime.plausible.delay": ("delay",),
-    "runtime.plausible.plausibility": ("plausibility",),
-    "runtime.model.generated": ("load_model",),
+    "runtime.identification.result": ("Identification",),
     "runtime.loop.simulation": ("simulate",),
-    "runtime.rows.observation": ("Observation",),
-    "runtime.rows.observe": ("observe",),
+    "runtime.model.generated": ("load_model",),
     "runtime.reading.records": ("read_record",),
     "runtime.records.record": ("Record",),
     "runtime.reading.resampling": ("resample",),
     "runtime.reporting.files": ("report",),
     "runtime.resolution.advice": ("Advice",),
-    "runtime.resolution.advisor": ("advise",),
-    "runtime.resolution.cestac": ("cestac",),
     "runtime.resolution.result": ("Cestac",),
+    "runtime.rows.observation": ("Observation",),
     "runtime.settings.files": ("load_study",),
     "runtime.settings.study": ("Study",),
 }

@@ -1,1 +1,1 @@
-"""Estimators, one file a method; `runtime.loop.methods` finds them by name."""
+"""Estimators, one file a method; `runtime.compose` names them by name."""

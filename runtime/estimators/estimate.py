@@ -84,7 +84,7 @@ class JointFit:
 
     @property
     def is_axis(self) -> bool:
-        """Whether it is an axis of a force sensor (`runtime.rows.wrench`), no joint."""
+        """Whether it is an axis of a force sensor (`runtime.wrench`), no joint."""
         return not self.joint[:1].isdigit()
 
 

@@ -3,7 +3,7 @@
     start = rows(observation, settings, options)     least squares, solved once for every method
     fitted = fit(start)                              what the method makes of it; None: nothing more
 
-A new method is a file with a function `fit` and a line in METHODS (`runtime.loop.methods`).
+A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`).
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class Method:
         What it makes of them; None: it is these least squares, which need no single row.
     weights : tuple of str
         Weights that it takes.
-    closed_loop : bool
-        Whether it simulates the closed loop of the records.
+    observe : callable or None
+        Makes the rows of a problem, of a method that needs rows of its own, as one that simulates the closed loop of the records; None: those of the measured positions.
     brief : mapping
         Options under which resampled records and explanations are left out.
     any_rank : bool
@@ -107,7 +107,7 @@ class Method:
     rows: Callable[[Observation, EstimateSettings, LinearOptions], System]
     fit: Callable[[Beginning], Fitted] | None = None
     weights: tuple[str, ...] = WEIGHTINGS
-    closed_loop: bool = False
+    observe: Callable[[Any], Observation] | None = None
     brief: Mapping[str, Any] = field(default_factory=dict)
     any_rank: bool = False
 

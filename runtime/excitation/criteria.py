@@ -29,15 +29,15 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
 from runtime.loop.dry_friction import dry_friction
 from runtime.model.generated import GeneratedModel, base_columns, joint_labels, require
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
 from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import Signals, Study
+from runtime.settings.study import Signals
 from runtime.settings.trajectories import Motion
 from runtime.signals.filters import decimation_factor
 from runtime.signals.noise_gain import bandwidth
@@ -270,13 +270,17 @@ def kept_correlation(signals: Signals, rate: float) -> Array:
     return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
 
 
-def planned(model: GeneratedModel, motion: Motion, study: Study, rate: float) -> Observation:
-    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time
-    window of the rows is left out.
-    """
+def planned(problem: Problem, motion: Motion, rate: float) -> Observation:
+    """W of the identification that a motion sampled at `rate`, Hz, will give; Y is zero. The time window of the rows is left out."""
     t, q, *_ = motion.sampled(rate)
     record = Record(t=t, q=q, tau=np.zeros_like(q), rate=rate, name="planned motion")
-    return observe(model, record, replace(study, rows=replace(study.rows, window=(None, None))))
+    settings = problem.settings
+    settings = replace(settings, rows=replace(settings.rows, window=(None, None)))
+    return (
+        problem.changed(settings=settings, records=(record,), unseen=())
+        .prepared[0]
+        .observation(problem.model)
+    )
 
 
 def excesses(

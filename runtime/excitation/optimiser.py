@@ -34,7 +34,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Search:
     """What every start needs; travels once to each process.
 
     Attributes
@@ -57,23 +57,23 @@ class Problem:
     smooth: Array
 
 
-def one_start(problem: Problem, number: int) -> Start:
+def one_start(search: Search, number: int) -> Start:
     """The motion that IPOPT reaches from the random start `number`."""
-    rng = np.random.default_rng([problem.settings.seed, number])
+    rng = np.random.default_rng([search.settings.seed, number])
     guess = Motion(
-        tuple(Part(family, _guess(problem, family, rng)) for family in problem.settings.parts)
+        tuple(Part(family, _guess(search, family, rng)) for family in search.settings.parts)
     )
-    return improved(problem, number, guess)
+    return improved(search, number, guess)
 
 
-def improved(problem: Problem, number: int, guess: Motion) -> Start:
+def improved(search: Search, number: int, guess: Motion) -> Start:
     """The motion that IPOPT reaches from `guess`."""
-    settings, n = problem.settings, len(problem.weights.s)
-    model = problem.model
+    settings, n = search.settings, len(search.weights.s)
+    model = search.model
     p = [ca.MX.sym(f"p{k}", len(family.names), n) for k, family in enumerate(settings.parts)]
     q, qd, qdd = _states(settings, p)
-    A = _information(model, settings, problem.weights, q, qd, qdd)
-    g, lower, upper = _constraints(model, problem, p, q, qd, qdd)
+    A = _information(model, settings, search.weights, q, qd, qdd)
+    g, lower, upper = _constraints(model, search, p, q, qd, qdd)
     least, most = (
         np.concatenate([np.tile(family.bounds()[k], n) for family in settings.parts])
         for k in (0, 1)
@@ -140,17 +140,17 @@ def _spread(A: Any, criterion: str) -> Any:
 
 
 def _constraints(
-    model: GeneratedModel, problem: Problem, p: Sequence[Any], q: Any, qd: Any, qdd: Any
+    model: GeneratedModel, search: Search, p: Sequence[Any], q: Any, qd: Any, qdd: Any
 ) -> tuple[Any, Array, Array]:
     """g(p) with its bounds, each divided by its scale."""
-    settings, limits = problem.settings, problem.limits.of(problem.settings.margin)
+    settings, limits = search.settings, search.limits.of(search.settings.margin)
     M = q.shape[0]
     half = (limits.upper - limits.lower) / 2
     rows: list[tuple[Any, Any, Any]] = [  # expression, lower, upper: (M, n) or (n,)
         ((q - _rows(limits.lower + half, M)) / _rows(half, M), -1.0, 1.0),
         (qd / _rows(limits.qd, M), -1.0, 1.0),
         (qdd / _rows(limits.qdd, M), -1.0, 1.0),
-        *_torques(model, problem, limits, q, qd, qdd),
+        *_torques(model, search, limits, q, qd, qdd),
         *_distances(model, settings, q),
     ]
     ends = []
@@ -181,10 +181,10 @@ def _constraints(
 
 
 def _torques(
-    model: GeneratedModel, problem: Problem, limits: MotionLimits, q: Any, qd: Any, qdd: Any
+    model: GeneratedModel, search: Search, limits: MotionLimits, q: Any, qd: Any, qdd: Any
 ) -> list[tuple[Any, float, float]]:
     """Torques, their root mean squares and rates of change, where they are limited."""
-    settings = problem.settings
+    settings = search.settings
     limited = np.isfinite(limits.tau)
     if not (limited.any() or settings.torque_rms or settings.torque_rate):
         return []
@@ -196,7 +196,7 @@ def _torques(
         function = ca.Function("torque", inputs, [dynamics(*inputs, X, *model.CONSTANTS.values())])
         return function.map(M)(q.T, qd.T, qdd.T).T
 
-    tau, share = torque(problem.X), 1 - settings.margin
+    tau, share = torque(search.X), 1 - settings.margin
     rows: list[tuple[Any, float, float]] = [
         (tau[:, j] / limits.tau[j], -1.0, 1.0) for j in np.flatnonzero(limited).tolist()
     ]
@@ -205,7 +205,7 @@ def _torques(
             (ca.sum1(tau**2).T / M / (share * np.array(settings.torque_rms)) ** 2, 0.0, 1.0)
         )
     if settings.torque_rate:
-        smooth = torque(problem.X * problem.smooth)
+        smooth = torque(search.X * search.smooth)
         rows.append(
             (
                 (smooth[1:, :] - smooth[:-1, :])
@@ -333,8 +333,8 @@ def _at(family: Any, p: Any, t: Array) -> list[Any]:
     return [ca.horzcat(*(joint[k] for joint in joints)) for k in range(3)]
 
 
-def _guess(problem: Problem, family: Any, rng: np.random.Generator) -> Array:
-    limits = problem.limits
+def _guess(search: Search, family: Any, rng: np.random.Generator) -> Array:
+    limits = search.limits
     speed = np.minimum(limits.qd, 1e3)
     return np.array(
         [

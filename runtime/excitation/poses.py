@@ -16,19 +16,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.excitation.criteria import limits_of
 from runtime.json_documents import Result
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.records.record import Record
-from runtime.rows.observe import at_rest, observe
+from runtime.rows.prepared import stacked
 from runtime.rows.selection import per_joint
 from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import EstimateSettings, Signals, Study
 from runtime.table import Table
 
 Array = np.ndarray
@@ -91,50 +90,51 @@ class StaticPoses(Result, keys="poses condition sigma compared s taken_in"):
         )
 
 
-def static_poses(
-    model: GeneratedModel, records: Sequence[Record] = (), study: Study | None = None
-) -> StaticPoses:
+def static_poses(problem: Problem) -> StaticPoses:
     """study.excitation.poses poses, default 20, within the limits of q that tell the parameters of
     gravity best.
 
     Parameters
     ----------
-    model : GeneratedModel
-    records : sequence of Record
-        Poses at rest that were recorded already, which stay: the next ones are sought.
-    study : Study, optional
-        Section `excitation`: poses, limits, columns, torque_sigma (default: 1), starts, seed.
+    problem : Problem
+        Prepared; its records are poses at rest that were recorded already, which stay: the next ones are sought. Section `excitation` of the settings: poses, limits, columns, torque_sigma (default: 1), starts, seed.
 
     Raises
     ------
     InputError
         Too few poses, no parameter that acts at rest, no limits of q, a record of a motion.
     """
-    study = study or Study()
-    if records and study.signals.reader != "static":
+    model, settings = problem.model, cast(Any, problem.settings).excitation or ExcitationSettings()
+    if problem.records and problem.settings.signals.reader != "static":
         raise InputError("poses are sought beside recorded poses: signals: {reader: static}")
-    settings, n = study.excitation or ExcitationSettings(), len(model.JOINTS)
-    count, rng = settings.poses or 20, np.random.default_rng(settings.seed)
+    count, n = settings.poses or 20, len(model.JOINTS)
+    rng = np.random.default_rng(settings.seed)
     s = per_joint(settings.torque_sigma or 1.0, n, "excitation.torque_sigma")
     limits = limits_of(model, {"qd": np.inf, "qdd": np.inf, **settings.limits})
     q = rng.uniform(limits.lower, limits.upper, (CANDIDATES, n))
-    drawn = Record(np.arange(float(CANDIDATES)), q, np.zeros_like(q), rate=1.0, name="poses")
-    columns: Any = "all" if settings.columns == "essential" else settings.columns
-    study = Study(signals=Signals(reader="static"), estimate=EstimateSettings(columns=columns))
-    shown: Any = at_rest(model, [drawn], study)[0].estimate.columns
-    rows = observe(model, [drawn, *records], study, columns=shown)
-    W, candidates, names = rows.W / s[rows.joints][:, None], rows.record == 0, np.array(shown)
-    size = np.linalg.norm(W[candidates], axis=0)
-    apart = np.abs(np.diag(np.linalg.qr(W[candidates] / size, mode="r"))) > RIDGE**0.5
-    W, size = W[:, apart] / size[apart], size[apart]
-    A = W[candidates].reshape(n, CANDIDATES, -1).transpose(1, 0, 2)
-    M = RIDGE * np.eye(len(size)) + W[~candidates].T @ W[~candidates]
+    shown = _acting(model, q, settings.columns)
+    candidates = _rows_at_rest(model, q, shown)  # (K, n, c)
+    W = (
+        candidates.transpose(1, 0, 2).reshape(n * CANDIDATES, -1)
+        / np.repeat(s, CANDIDATES)[:, None]
+    )
+    recorded = np.zeros((0, len(shown)))
+    if problem.records:
+        rows = stacked(model, problem.prepared, shown)
+        recorded = rows.W / s[rows.joints][:, None]
+    names = np.array(shown)
+    size = np.linalg.norm(W, axis=0)
+    apart = np.abs(np.diag(np.linalg.qr(W / size, mode="r"))) > RIDGE**0.5
+    W, recorded = W[:, apart] / size[apart], recorded[:, apart] / size[apart]
+    size = size[apart]
+    A = W.reshape(n, CANDIDATES, -1).transpose(1, 0, 2)
+    M = RIDGE * np.eye(len(size)) + recorded.T @ recorded
     starts = [rng.integers(CANDIDATES, size=count) for _ in range(settings.starts)]
     best = max(
         (_exchanged(A, M, start) for start in starts),
         key=lambda x: float(np.linalg.slogdet(_sum(A, M, x))[1]),
     )
-    others = starts[0][: 0 if records else count]
+    others = starts[0][: 0 if problem.records else count]
     condition, sigma = zip(*(_quality(_sum(A, M, x)) for x in (best, others)), strict=True)
     if np.isinf(condition[0]):
         raise InputError(
@@ -146,10 +146,31 @@ def static_poses(
         q[best],
         condition,
         dict(zip(names[apart].tolist(), (np.array(sigma) / size).T.tolist(), strict=True)),
-        "the record alone" if records else "random poses",
+        "the record alone" if problem.records else "random poses",
         s,
         tuple(names[~apart].tolist()),
     )
+
+
+def _rows_at_rest(model: GeneratedModel, q: Array, names: Sequence[str]) -> Array:
+    """Columns `names` of the regressor in poses q, shape (K, n, c)."""
+    rest = np.zeros_like(q)
+    numbers = [model.BASE_PARAMETERS.index(name) for name in names]
+    return np.asarray(model.regressor(q, rest, rest))[..., numbers]
+
+
+def _acting(model: GeneratedModel, q: Array, columns: Any) -> tuple[str, ...]:
+    """The base parameters, or those of `columns`, that have a torque in poses q."""
+    names = tuple(model.BASE_PARAMETERS)
+    size = np.abs(_rows_at_rest(model, q, names)).max(axis=(0, 1))
+    acting = {name for name, x in zip(names, size, strict=True) if x > 1e-9 * size.max()}
+    asked = names if columns in ("essential", "all") else columns
+    shown = tuple(name for name in asked if name in acting)
+    if not shown:
+        raise InputError(
+            f"poses at rest show no parameter of {model.NAME}: gravity acts along none of its joints, and there is no offset or spring; record a motion, or correct gravity in the robot file"
+        )
+    return shown
 
 
 def _sum(A: Array, M: Array, chosen: Array) -> Array:

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.blas import single_threaded
+from runtime.core.estimation import estimated, observed
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.estimators.essential import essential_of
 from runtime.excitation.criteria import (
@@ -30,16 +31,12 @@ from runtime.excitation.criteria import (
     planned,
     weights_of,
 )
-from runtime.excitation.optimiser import Problem, improved, one_start
+from runtime.excitation.optimiser import Search, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.limits import LIMIT
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel, require, require_no_channels
-from runtime.records.record import Record
-from runtime.rows.observe import observe
-from runtime.rows.prepared import resolved
 from runtime.settings.excitation import ExcitationSettings
 from runtime.settings.study import Study
 from runtime.settings.trajectories import Motion, motion_from_mapping
@@ -48,11 +45,8 @@ from runtime.signals.states import require_motion
 Array = np.ndarray
 
 
-@single_threaded
 def excite(
-    model: GeneratedModel,
-    records: Record | Sequence[Record] = (),
-    study: Study | None = None,
+    problem: Problem,
     *,
     map: Callable[..., Iterable[Any]] = map,
     progress: Callable[[int, int], None] | None = None,
@@ -62,12 +56,8 @@ def excite(
 
     Parameters
     ----------
-    model : GeneratedModel
-    records : Record or sequence of Record
-        Their estimate gives parameters and deviations of the torques; without records, the values
-        of the robot file serve.
-    study : Study, optional
-        Families, limits, criterion, filters and rows; default: Study().
+    problem : Problem
+        Prepared. The estimate of its records gives parameters and deviations of the torques; without records, the values of the robot file serve.
     map : callable, optional
         As the built-in one, such as `runtime.parallel.processes`; results do not depend on it.
     progress : callable, optional
@@ -79,12 +69,12 @@ def excite(
         No start keeps the limits, with the limit that was missed most; or the parameters are known
         neither from a record nor from the robot file.
     """
-    records = (records,) if isinstance(records, Record) else tuple(records)
+    model = problem.model
+    study: Any = problem.settings
     require_no_channels(model, "a motion that is sought")
-    study, _ = resolved(study or Study(), records)
     require_motion(study.signals, "a motion that is sought (poses: excitation: {poses: N})")
     settings = study.excitation or ExcitationSettings()
-    known = _known(model, records, study, settings)
+    known = _known(problem, settings)
     limits, weights = limits_of(model, settings.limits), known.weights
     if settings.criterion == "record" and not known.relative_sigma:
         raise InputError(
@@ -100,9 +90,9 @@ def excite(
         )
     require(model, "inverse_dynamics", "casadi")
     smooth = dry_friction(model).smooth
-    problem = Problem(model, settings, weights, limits, known.X, smooth)
+    search = Search(model, settings, weights, limits, known.X, smooth)
     starts = []
-    for start in map(partial(one_start, problem), range(settings.starts)):
+    for start in map(partial(one_start, search), range(settings.starts)):
         starts.append(start)
         if progress is not None:
             progress(len(starts), settings.starts)
@@ -119,8 +109,8 @@ def excite(
             "points, or free `begin`"
         )
     candidates = []
-    for motion, margin in _within(model, problem, kept[: LIMIT.STARTS_COMPARED]):
-        observation = planned(model, motion, study, settings.rate)
+    for motion, margin in _within(model, search, kept[: LIMIT.STARTS_COMPARED]):
+        observation = planned(problem, motion, settings.rate)
         candidates.append(
             (criterion_of(weights, observation, settings.criterion), motion, margin, observation)
         )
@@ -147,30 +137,29 @@ def excite(
 
 
 def _within(
-    model: GeneratedModel, problem: Problem, starts: Sequence[Start]
+    model: GeneratedModel, search: Search, starts: Sequence[Start]
 ) -> Iterator[tuple[Motion, float]]:
     """Motions of the starts within the limits at the controller rate, with the margin that took;
     none of a start where wider ones do not help.
     """
     for start in starts:
-        settings = problem.settings
+        settings = search.settings
         for _ in range(LIMIT.MARGIN_DOUBLINGS + 1):
             motion = motion_from_mapping(start.motion)
             if start.violation <= LIMIT.GRID_VIOLATION and not excesses(
-                model, motion, problem.limits, settings, problem.X
+                model, motion, search.limits, settings, search.X
             ):
                 yield motion, settings.margin
                 break
             settings = replace(settings, margin=max(2 * settings.margin, 0.01))
-            start = improved(replace(problem, settings=settings), start.number, motion)
+            start = improved(replace(search, settings=settings), start.number, motion)
 
 
-def _known(
-    model: GeneratedModel, records: Sequence[Record], study: Study, settings: ExcitationSettings
-) -> Known:
+def _known(problem: Problem, settings: ExcitationSettings) -> Known:
     """From records: estimate, deviations, essential parameters, condition and %sigma. Without: the
     values of the robot file.
     """
+    model, records, study = problem.model, problem.records, problem.settings
     if not records:
         X = parameters_of(model)
         return Known(
@@ -178,9 +167,9 @@ def _known(
             "values of the robot file",
             weights_of(model, settings, dict(zip(model.BASE_PARAMETERS, X, strict=True))),
         )
-    observation = observe(model, records, study)
+    observation = observed(problem)
     linear = replace(study.estimate, method="ols", weights="none", options={}, columns="all")
-    fit = estimate_of(observation, linear, model=model)
+    fit = estimated(problem, observation, linear)
     if fit.status == "rank-deficient":
         raise InputError(
             f"the record does not determine {', '.join(' '.join(group) for group in fit.groups)}; "

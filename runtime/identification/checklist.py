@@ -22,7 +22,6 @@ from runtime.identification.expected_error import Expected
 from runtime.identification.homogeneity import Homogeneity
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
-from runtime.loop.methods import CLOSED_LOOP
 from runtime.resolution.advice import Advice, step_text
 from runtime.resolution.runs import Level
 from runtime.table import Table, notebook
@@ -498,8 +497,7 @@ def resolved(advice: Advice | None) -> Answer:
     return Answer(
         _state(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
         f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
-        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: "
-        f"{', '.join(CLOSED_LOOP)})",
+        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: iv, didim)",
     )
 
 

@@ -25,29 +25,22 @@ from typing import Any
 
 import numpy as np
 
-from runtime.blas import single_threaded
+from runtime.core.estimation import estimated
+from runtime.core.problem import Problem, Step, prepared
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
 from runtime.identification.identification import identify
 from runtime.identification.parameter_sets import ORDER, SetName, best_set
 from runtime.identification.result import Identification
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import GeneratedModel
 from runtime.plausible.motion import low_speed_of_rest
 from runtime.plausible.plausibility import plausibility
 from runtime.plausible.samples import samples_of
 from runtime.progress import at
-from runtime.reading.records import read_records
-from runtime.records.law import require_found
 from runtime.records.record import Record
-from runtime.rows.observe import observe
-from runtime.settings.study import Study
+from runtime.rows.prepared import stacked
 from runtime.table import Table
 
-Candidate = Study | tuple[Study, Record | Sequence[Record], Record | Sequence[Record]]
-"""A study that names its records and validation records, or a study, records and validation
-records.
-"""
 STATED = "as stated"
 
 
@@ -153,42 +146,37 @@ class Ranking:
         return "\n\n".join([self.table().to_text(), *self.missing, self.verdict])
 
 
-@single_threaded
 def compare(
-    model: GeneratedModel,
-    candidates: Candidate | Mapping[str, Candidate],
+    problems: Mapping[str, Problem],
     *,
+    loaded: Mapping[str, Sequence[Record]] | None = None,
     variants: GeneratedModel | None = None,
 ) -> Ranking:
     """Identify with each of several treatments, and order them by what they predict.
 
     Parameters
     ----------
-    model : GeneratedModel
-        An emitted module.
-    candidates : mapping of str to Candidate, or Candidate
-        By name, each with validation records of the same instants. Of one alone the `treatments`
-        are compared.
+    problems : mapping of str to Problem
+        Prepared, by name of the treatment; their unseen records are the same instants.
+    loaded : mapping of str to sequence of Record, optional
+        Records with the load of settings.payload, by treatment.
     variants : GeneratedModel, optional
         The module of `symgen.variants`: the plausibility of the best treatment is then judged.
 
     Raises
     ------
     InputError
-        A candidate without validation records, or with others than the first; none that can be
-        identified.
+        A treatment without validation records, or with others than the first; none that can be identified.
     """
-    if not isinstance(candidates, Mapping):
-        candidates = treatments(model, candidates)
-    opened = {name: _opened(model, candidate) for name, candidate in candidates.items()}
-    for name, (_, _, further) in opened.items():
-        _require_alike(name, further, next(iter(opened.values()))[2])
+    first = next(iter(problems.values())).unseen
+    for name, problem in problems.items():
+        _require_alike(name, problem.unseen, first)
     results: dict[str, Identification] = {}
     missing: list[str] = []
-    for name, (study, records, further) in opened.items():
+    for name, problem in problems.items():
         at(f"treatment {name}")
         try:
-            results[name] = identify(model, records, study, further=further)
+            results[name] = identify(problem, loaded=(loaded or {}).get(name, ()))
         except InputError as e:
             missing.append(f"{name}: {e}")
     if not results:
@@ -197,18 +185,17 @@ def compare(
             if missing
             else "no treatment; expected one or more to compare"
         )
-    unseen = {name: opened[name][2] for name in results}
     standing = {name: standing_set(result) for name, result in results.items()}
     errors = {
-        name: {other: _error(model, fit, unseen[name], results[other].study) for other in results}
+        name: {other: _error(problems[name], fit, problems[other]) for other in results}
         for name, (_, fit) in standing.items()
     }
     means = Ranking(results, errors, standing).mean_errors
     order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
     if variants is not None:
-        study, records, _ = opened[order[0]]
-        found = plausibility(model, records, study, variants=variants)
-        results[order[0]] = replace(results[order[0]], plausibility=found)
+        best = results[order[0]]
+        found = plausibility(best.problem, variants=variants)
+        results[order[0]] = replace(best, plausibility=found)
     return Ranking(
         {name: results[name] for name in order},
         {name: errors[name] for name in order},
@@ -217,22 +204,22 @@ def compare(
     )
 
 
-def treatments(model: GeneratedModel, candidate: Candidate) -> dict[str, Candidate]:
-    """The candidate as stated, without the rows of joints that stand, and with its known torques
-    left out, as far as these differ.
-    """
-    study, records, further = _opened(model, candidate)
-    found: dict[str, Candidate] = {STATED: (study, records, further)}
-    low = low_speed_of_rest(samples_of(records, study), study)
+def treatments(problem: Problem, steps: Sequence[Step]) -> dict[str, Problem]:
+    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps."""
+    stated = prepared(problem, steps)
+    found = {STATED: stated}
+    low = low_speed_of_rest(samples_of(stated.prepared, stated.settings), stated.settings)
     if low is not None:
-        study = replace(study, rows=replace(study.rows, low_speed=low))
-        found["without rest"] = (study, records, further)
-    if any(record.tau_known is not None for record in (*records, *further)):
-        found["known torques left out"] = (
-            study,
-            [replace(record, tau_known=None) for record in records],
-            [replace(record, tau_known=None) for record in further],
+        settings = problem.settings
+        settings = replace(settings, rows=replace(settings.rows, low_speed=low))
+        problem = problem.changed(settings=settings)
+        found["without rest"] = prepared(problem, steps)
+    if any(record.tau_known is not None for record in (*problem.records, *problem.unseen)):
+        unknown = problem.changed(
+            records=tuple(replace(record, tau_known=None) for record in problem.records),
+            unseen=tuple(replace(record, tau_known=None) for record in problem.unseen),
         )
+        found["known torques left out"] = prepared(unknown, steps)
     return found
 
 
@@ -244,28 +231,13 @@ def standing_set(result: Identification) -> tuple[SetName, Estimate]:
     fit = result.sets.get(name, result.estimate)
     if name == "essential" and not result.sets:  # of a method that is not linear
         own = replace(result.study.estimate, columns=result.essential.names)
-        fit = estimate_of(result.observation, own, model=result.model)
+        fit = estimated(result.problem, result.observation, own)
     return name, fit
 
 
 def columns_text(name: SetName, fit: Estimate) -> str:
     """A set of parameters, and their number."""
     return f"{name} parameters, {len(fit.names)}"
-
-
-def _opened(
-    model: GeneratedModel, candidate: Candidate
-) -> tuple[Study, list[Record], list[Record]]:
-    if isinstance(candidate, Study):
-        own, unseen = (
-            read_records(x, model, missing=candidate.signals.admits_missing)
-            for x in (candidate.record, candidate.validate.record)
-        )
-        require_found(candidate.record, (record.measured for record in (*own, *unseen)))
-        return candidate, own, unseen
-    study, records, further = candidate
-    own, unseen = ([x] if isinstance(x, Record) else list(x) for x in (records, further))
-    return study, own, unseen
 
 
 def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
@@ -290,12 +262,13 @@ def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]
         )
 
 
-def _error(model: GeneratedModel, fit: Estimate, unseen: Sequence[Record], study: Study) -> float:
-    """Residual of an estimate on validation records treated as by `study`, % of the measured
-    torque.
-    """
-    residual, _ = observe(model, unseen, study).norms(fit.names, fit.X)
-    _, total = observe(model, [replace(record, tau_known=None) for record in unseen], study).norms(
-        (), np.zeros(0)
-    )
+def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
+    """Residual of an estimate on its validation records as another problem treats them, % of the measured torque."""
+    rows, signals = treatment.settings.rows, treatment.settings.signals
+    settings = replace(problem.settings, rows=rows, signals=signals)
+    treated = problem.changed(settings=settings, reader=treatment.reader)
+    whole = tuple(replace(record, tau_known=None) for record in problem.unseen)
+    residual, _ = stacked(problem.model, treated.prepared_unseen).norms(fit.names, fit.X)
+    measured = treated.changed(unseen=whole).prepared_unseen
+    _, total = stacked(problem.model, measured).norms((), np.zeros(0))
     return 100 * float(np.linalg.norm(residual) / np.linalg.norm(total))

@@ -42,11 +42,10 @@ from runtime.markup import number
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.model.inertia import physical_model
-from runtime.records.record import Record
 from runtime.rows.factor import triangularise
 from runtime.rows.observation import Observation, split_rows, stack
-from runtime.rows.prepared import Prepared, decimated_torque, prepared
-from runtime.settings.study import EstimateSettings, PayloadSettings, Study
+from runtime.rows.prepared import Prepared, decimated_torque
+from runtime.settings.study import EstimateSettings, PayloadSettings
 from runtime.table import Table
 
 Array = np.ndarray
@@ -132,9 +131,8 @@ class DriveGains(Result, keys="joints constant together sigma alone sigma_alone 
 
 def drive_gains(
     model: GeneratedModel,
-    without: Sequence[Record | Prepared],
-    loaded: Sequence[Record | Prepared],
-    study: Study,
+    without: Sequence[Prepared],
+    loaded: Sequence[Prepared],
     settings: PayloadSettings,
     *,
     seed: int = 1,
@@ -143,10 +141,8 @@ def drive_gains(
 
     Parameters
     ----------
-    without, loaded : sequence of Record or Prepared
+    without, loaded : sequence of Prepared
         Joint side, without and with the load.
-    study : Study
-        Signals and rows.
     settings : PayloadSettings
         Where the load is fixed, and its mass.
     seed : int
@@ -159,8 +155,8 @@ def drive_gains(
         )
     drives = _drives(model)
     constants = []
-    for record in (*without, *loaded):
-        constant = prepared(model, record, study).record.origin.torque_constant
+    for reading in (*without, *loaded):
+        constant = reading.record.origin.torque_constant
         constants.append(drives.torque_constant if constant is None else constant)
     if any(not np.array_equal(constant, constants[0]) for constant in constants):
         raise InputError(
@@ -171,12 +167,12 @@ def drive_gains(
         [
             _with_load(
                 model,
-                _with_motors(model, prepared(model, record, study), drives),
+                _with_motors(model, reading, drives),
                 settings,
                 mounted,
             )
             for records, mounted in ((without, 0.0), (loaded, 1.0))
-            for record in records
+            for reading in records
         ]
     )
     n = drives.n

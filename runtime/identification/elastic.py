@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels
@@ -84,14 +85,13 @@ class Elasticity(Result):
         return tuple(texts)
 
 
-def elasticity(
-    model: GeneratedModel, records: Sequence[Prepared], names: Sequence[str], X: Array
-) -> Elasticity | None:
-    """Stiffness of the joints with two encoders, all records together; None where there is none.
+def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
+    """Stiffness of the joints with two encoders, all records of a prepared problem together; None where there is none.
 
     names, X : parameters of the rigid fit, for the inertia about each joint.
     """
-    both = [record for record in records if "q_link" in record.record.channels]
+    model = problem.model
+    both = [reading for reading in problem.prepared if "q_link" in reading.record.channels]
     if not both:
         return None
     first = both[0]

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from runtime.core.estimation import estimated
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.estimators.essential import Essential, essential_of
 from runtime.estimators.estimate import Estimate
@@ -28,8 +30,6 @@ from runtime.identification.validation import (
     cross_validation,
     split_validation,
 )
-from runtime.loop.methods import estimate_of
-from runtime.model.generated import GeneratedModel
 from runtime.progress import at
 from runtime.rows.observation import Observation, halves
 from runtime.settings.study import EstimateSettings, Study
@@ -62,10 +62,9 @@ class Fits:
         return self.sets.get(best_set(errors, study.essential.first), self.estimate)
 
 
-def fitted(
-    observation: Observation, study: Study, model: GeneratedModel, provenance: Mapping[str, Any]
-) -> Fits:
+def fitted(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
     """All parameters and the essential ones."""
+    study, model = problem.settings, problem.model
     at("least squares, essential parameters")
     reduced = essential_of(
         observation,
@@ -79,7 +78,7 @@ def fitted(
     at(study.estimate.method)
     essential = replace(study.estimate, columns=reduced.names)
     return Fits(
-        estimate_of(observation, study.estimate, model=model, provenance=provenance),
+        estimated(problem, observation, provenance=provenance),
         reduced,
         {},
         {"all": study.estimate, "essential": essential},
@@ -87,11 +86,10 @@ def fitted(
 
 
 def validated(
+    problem: Problem,
     fits: Fits,
     observation: Observation,
     unseen: Mapping[str, Observation],
-    study: Study,
-    model: GeneratedModel,
     name: str,
 ) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
     """Windows of the records of that `name` against each other, or fifths of them where halves
@@ -99,18 +97,19 @@ def validated(
     feasible set where it may stand for the robot; and what could not be done. Nothing is validated
     where the method did not end well, since each validation would simulate a wrong loop once more.
     """
+    study = problem.settings
     method, status = study.estimate.method, fits.estimate.status
     if status != "ok" and method not in LINEAR:
         return fits, (), (f"validation: {method} ended with status {status}",)
     at("validation")
-    predict = partial(_validation, observation, unseen, study, model, name)
+    predict = partial(_validation, problem, observation, unseen, name)
     validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
     errors = validation[-1].errors() if validation else {}
     linear = method in LINEAR
     possible = linear and physical_possible(observation, study.estimate, fits.estimate)
     if possible and physical_asked(errors, study.essential.first):
         try:
-            fit, settings = physical_set(observation, study.estimate, model)
+            fit, settings = physical_set(problem, observation)
         except InputError as e:
             return fits, validation, (f"physical parameters: {e}", *missing)
         if fit.status != "ok":
@@ -123,16 +122,15 @@ def validated(
         missing = tuple(dict.fromkeys((*missing, *more)))
     halved = not unseen and not study.validate.split and "feasible" in fits.sets
     if halved and validation and best_set(validation[0].errors()) == "all":
-        by_fifths = held_out_validation(observation, fits.settings, model=model)
+        by_fifths = held_out_validation(problem, observation, fits.settings)
         validation, missing = (by_fifths,), by_fifths.missing
     return fits, validation, missing
 
 
 def _validation(
+    problem: Problem,
     observation: Observation,
     unseen: Mapping[str, Observation],
-    study: Study,
-    model: GeneratedModel,
     name: str,
     choices: Mapping[Any, EstimateSettings],
     known: Mapping[Any, Estimate],
@@ -142,14 +140,14 @@ def _validation(
     """
     validation, missing = [], []
     try:
-        windows = study.validate.split or halves(*observation.span)
-        validation.append(split_validation(observation, windows, choices, model=model))
+        windows = problem.settings.validate.split or halves(*observation.span)
+        validation.append(split_validation(problem, observation, windows, choices))
     except InputError as e:
         missing.append(f"validation between windows of the record: {e}")
     if unseen:
         validation.append(
             cross_validation(
-                observation, unseen, choices, name=name, model=model, fitted=known, further=True
+                problem, observation, unseen, choices, name=name, fitted=known, further=True
             )
         )
     missing += [text for part in validation for text in part.missing]
@@ -157,20 +155,20 @@ def _validation(
 
 
 def agreement(
+    problem: Problem,
     fits: Fits,
     observation: Observation,
     fitted_names: Sequence[str],
     unseen: Mapping[str, Observation],
-    study: Study,
-    model: GeneratedModel,
 ) -> Homogeneity | None:
     """Whether several records agree: in all parameters, or in the essential ones where one of the
     records does not determine all. None for one record.
     """
     if len(fitted_names) + len(unseen) < 2:
         return None
+    settings, model = problem.settings.estimate, problem.model
     parts = {name: observation.of_record(k) for k, name in enumerate(fitted_names)} | dict(unseen)
-    in_all = homogeneity(parts, fits.reduced.all_parameters.names, study.estimate, model=model)
+    in_all = homogeneity(parts, fits.reduced.all_parameters.names, settings, model=model)
     if not in_all.untested:
         return in_all
-    return homogeneity(parts, fits.reduced.names, study.estimate, model=model)
+    return homogeneity(parts, fits.reduced.names, settings, model=model)

@@ -31,6 +31,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import percent
@@ -48,10 +49,8 @@ from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels, require
 from runtime.model.inertia import physical_model
-from runtime.records.record import Record
-from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.prepared import Prepared
 from runtime.rows.regressor import in_time
-from runtime.settings.study import Study
 from runtime.signals.filters import decimated
 from runtime.signals.states import require_motion
 from runtime.table import Table
@@ -201,17 +200,12 @@ def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
     )
 
 
-def friction_curves(
-    model: GeneratedModel, records: Sequence[Record | Prepared], study: Study, fit: Estimate
-) -> tuple[FrictionCurve, ...]:
-    """Friction against velocity, one curve per joint, from records of the joint side and an
-    estimate of all parameters.
-    """
-    require_motion(study.signals, "a friction curve")
+def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...]:
+    """Friction against velocity, one curve per joint, from the records of a prepared problem and an estimate of all parameters."""
+    require_motion(problem.settings.signals, "a friction curve")
+    model = problem.model
     require(model, "inverse_dynamics")
-    parts = [
-        _terms(model, prepared(model, record, study), fit, k) for k, record in enumerate(records)
-    ]
+    parts = [_terms(model, record, fit, k) for k, record in enumerate(problem.prepared)]
     return tuple(
         _curve(label, joined([part[j] for part in parts]))
         for j, label in enumerate(joint_labels(model))

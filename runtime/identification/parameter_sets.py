@@ -29,13 +29,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from runtime.core.estimation import estimated
+from runtime.core.problem import Problem
 from runtime.errors import instant
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
 from runtime.identification.validation import CrossValidation, cross_validation
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of
-from runtime.model.generated import GeneratedModel
 from runtime.progress import at
 from runtime.rows.observation import Observation
 from runtime.settings.study import EstimateSettings
@@ -74,18 +74,17 @@ def physical_possible(observation: Observation, settings: EstimateSettings, fit:
     return whole and settings.weights != "covariance"
 
 
-def physical_set(
-    observation: Observation, settings: EstimateSettings, model: GeneratedModel
-) -> tuple[Estimate, EstimateSettings]:
+def physical_set(problem: Problem, observation: Observation) -> tuple[Estimate, EstimateSettings]:
     """The feasible parameters of all rows, and the settings that give those of parts of them: with
     the prior, its weight and the bounds by reach that all rows asked for.
     """
     at("physical parameters")
+    settings = problem.settings.estimate
     options = {"linear": settings.options} if settings.options else {}
     own = EstimateSettings(
         "feasible", "none" if settings.method == "ols" else "joint", "all", options
     )
-    fit = estimate_of(observation, own, model=model)
+    fit = estimated(problem, observation, own)
     decided = fit.details["options"]
     known = {"prior": decided["prior"], "reach": decided["reach"]}
     if decided["prior"] != "none":
@@ -94,10 +93,7 @@ def physical_set(
 
 
 def held_out_validation(
-    observation: Observation,
-    choices: Mapping[Any, EstimateSettings],
-    *,
-    model: GeneratedModel | None = None,
+    problem: Problem, observation: Observation, choices: Mapping[Any, EstimateSettings]
 ) -> CrossValidation:
     """`cross_validation` of each of LIMIT.HELD_OUT_PARTS parts of the span by all the others."""
     number, folds = observation.equal_parts(LIMIT.HELD_OUT_PARTS), []
@@ -105,7 +101,7 @@ def held_out_validation(
         part = observation.where(number == p)
         label = f"[{', '.join(map(instant, part.span))}] s"
         rest, name = observation.where(number != p), f"all but {label}"
-        folds.append(cross_validation(rest, {label: part}, choices, name=name, model=model))
+        folds.append(cross_validation(problem, rest, {label: part}, choices, name=name))
     predictions = tuple(p for fold in folds for p in fold.predictions if not p.fitted)
     missing = tuple(text for fold in folds for text in fold.missing)
     return CrossValidation(folds[0].joints, predictions, missing)

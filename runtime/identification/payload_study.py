@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import SettingsError
 from runtime.estimators.method import linear_companion
 from runtime.identification.drive_gains import DriveGains, drive_gains, scaled
@@ -19,8 +20,8 @@ from runtime.json_documents import Result
 from runtime.model.generated import GeneratedModel, require_no_channels
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, prepared
-from runtime.settings.study import Study
+from runtime.rows.prepared import Prepared
+from runtime.signals.states import require_motion
 from runtime.table import in_lines, with_intervals
 
 Array = np.ndarray
@@ -60,31 +61,23 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
         return "\n\n".join([self.payload.to_table(), *gains])
 
 
-def payload_study(
-    model: GeneratedModel,
-    without: Sequence[Record | Prepared],
-    loaded: Sequence[Record | Prepared],
-    study: Study,
-    *,
-    provenance: Mapping[str, Any] | None = None,
-) -> PayloadStudy:
-    """The load of study.payload, by ols, or by wls where the study has weights.
+def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
+    """The load of settings.payload, by ols, or by wls where the settings have weights.
 
     Parameters
     ----------
-    without, loaded : sequence of Record or Prepared
-        Joint side, without and with the load.
-    study : Study
-        Signals, rows, and the load in study.payload.
-    provenance : mapping, optional
-        Further entries of the provenance of the estimate.
+    problem : Problem
+        Prepared; its records are those without the load.
+    loaded : sequence of Record
+        Joint side, with the load, prepared by the same steps.
 
     Raises
     ------
     SettingsError
         No record with the load, or columns left out.
     """
-    settings = study.payload
+    study: Any = problem.settings
+    model, settings = problem.model, study.payload
     if settings is None or not loaded:
         raise SettingsError(
             "no record with the load; name it in payload.record", path=("payload", "record")
@@ -96,14 +89,14 @@ def payload_study(
             path=("estimate", "columns"),
         )
     require_no_channels(model, "the study of a load")
-    empty = [prepared(model, record, study) for record in without]
-    full = [prepared(model, record, study) for record in loaded]
+    require_motion(study.signals, "a load")
+    full = [problem.reading(record) for record in loaded]
     gains = None
     if settings.gains:
-        gains = drive_gains(model, empty, full, study, settings)
-    rows = [_rows(model, record, gains) for record in empty]
+        gains = drive_gains(model, problem.prepared, full, settings)
+    rows = [_rows(model, record, gains) for record in problem.prepared]
     loaded_rows = [_rows(model, record, gains) for record in full]
-    load = payload(model, rows, loaded_rows, settings, method, provenance=provenance)
+    load = payload(model, rows, loaded_rows, settings, method, provenance=problem.provenance)
     if gains is not None:
         load = replace(load, sigma=np.fmax(load.sigma, gains.sigma_load))
     return PayloadStudy(load, gains)

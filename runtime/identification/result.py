@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.estimators.essential import Essential
 from runtime.estimators.estimate import Estimate
@@ -21,7 +22,6 @@ from runtime.identification.checklist import Checklist, checklist_of, lost_joint
 from runtime.identification.expected_error import Expected, expected_error
 from runtime.identification.friction import FrictionCurve
 from runtime.identification.homogeneity import Homogeneity
-from runtime.identification.laws import FittedLaws
 from runtime.identification.parameter_sets import (
     ORDER,
     SetName,
@@ -41,6 +41,7 @@ from runtime.identification.validation import (
     record_errors,
 )
 from runtime.json_documents import json_text
+from runtime.laws.scalars import FittedLaws
 from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, joint_labels
@@ -51,7 +52,7 @@ from runtime.records.record import UNNAMED, Record
 from runtime.resolution.advice import Advice
 from runtime.resolution.result import Cestac
 from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, record_of
+from runtime.rows.prepared import Prepared
 from runtime.rows.selection import unused_joints
 from runtime.settings.study import Study
 from runtime.signals.encoder_advice import acceleration_error, encoder_sentences
@@ -67,11 +68,8 @@ class Identification:
 
     Attributes
     ----------
-    model : GeneratedModel
-    study : Study
-        Settings, complete; its files relative to the current folder.
-    prepared : tuple of Prepared
-        The records, joint side, SI, as the study reads them.
+    problem : Problem
+        Prepared: model, records, settings.
     observation : Observation
         Y = W X + rho of all records.
     estimate : Estimate
@@ -111,9 +109,7 @@ class Identification:
         Parts that were asked for and could not be done, each with its reason.
     """
 
-    model: GeneratedModel
-    study: Study
-    prepared: tuple[Prepared, ...]
+    problem: Problem
     observation: Observation
     estimate: Estimate
     essential: Essential
@@ -133,9 +129,24 @@ class Identification:
     missing: tuple[str, ...] = ()
 
     @property
+    def model(self) -> GeneratedModel:
+        """The model, with scalars of laws as fitted and with the axes of force sensors."""
+        return self.problem.model
+
+    @property
+    def study(self) -> Study:
+        """Settings, complete; files relative to the current folder."""
+        return self.problem.settings
+
+    @property
+    def prepared(self) -> tuple[Prepared, ...]:
+        """The records as the settings read them."""
+        return self.problem.prepared
+
+    @property
     def records(self) -> tuple[Record, ...]:
-        """The records."""
-        return tuple(map(record_of, self.prepared))
+        """The records, joint side, SI."""
+        return self.problem.records
 
     @property
     def name(self) -> str:
@@ -223,7 +234,7 @@ class Identification:
         if not physical_possible(self.observation, self.study.estimate, self.estimate):
             return self.sets
         try:
-            fit, _ = physical_set(self.observation, self.study.estimate, self.model)
+            fit, _ = physical_set(self.problem, self.observation)
         except InputError:
             return self.sets
         return {**self.sets, "feasible": fit} if fit.status == "ok" else self.sets

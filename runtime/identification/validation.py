@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from runtime.core.estimation import estimated, point_estimate
+from runtime.core.problem import Problem
 from runtime.errors import InputError, instant
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import percent
@@ -25,9 +27,7 @@ from runtime.estimators.method import linear_companion, linear_system
 from runtime.estimators.solution import unit_columns
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of, point_estimate
 from runtime.markup import number
-from runtime.model.generated import GeneratedModel
 from runtime.rows.observation import Observation, Window
 from runtime.settings.study import EstimateSettings
 from runtime.table import Table
@@ -213,12 +213,12 @@ def record_errors(
 
 
 def cross_validation(
+    problem: Problem,
     fit: Observation,
     predict: Mapping[str, Observation],
     choices: Mapping[Any, EstimateSettings],
     *,
     name: str = "fit",
-    model: GeneratedModel | None = None,
     fitted: Mapping[Any, Estimate] | None = None,
     further: bool = False,
 ) -> CrossValidation:
@@ -235,8 +235,6 @@ def cross_validation(
         Method and columns of every set, by its name.
     name : str
         Label of `fit`.
-    model : GeneratedModel, optional
-        For methods that need it.
     fitted : mapping of str to Estimate
         Estimates of `fit` that exist already, by set.
     further : bool
@@ -251,7 +249,7 @@ def cross_validation(
             estimate = (
                 known
                 if known is not None
-                else estimate_of(fit, point_estimate(settings), model=model)
+                else estimated(problem, fit, point_estimate(settings, problem.methods))
             )
         except InputError as e:
             missing.append(f"validation of {columns} parameters, fitted on {name}: {e}")
@@ -266,11 +264,10 @@ def cross_validation(
 
 
 def split_validation(
+    problem: Problem,
     observation: Observation,
     windows: Sequence[Window],
     choices: Mapping[Any, EstimateSettings],
-    *,
-    model: GeneratedModel | None = None,
 ) -> CrossValidation:
     """`cross_validation` between windows in s of one record: the first is fitted, the others are
     predicted.
@@ -288,7 +285,7 @@ def split_validation(
     }
     first = labels[0]
     others = {label: part for label, part in parts.items() if label != first}
-    return cross_validation(parts[first], others, choices, name=first, model=model)
+    return cross_validation(problem, parts[first], others, choices, name=first)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """The closed loop in which a record was made, run again with other parameters: what IV and
 DIDIM compare the record with.
 
-    loop = closed_loop(model, records, study, simulator)
+    loop = closed_loop(problem, problem.prepared, simulator)
     observation = loop.measured()             Y = W X + rho, to which the loop stays attached
     runs = loop.run(X, g)                     one simulation per record, exact states, no noise, no
                                               steps
@@ -36,16 +36,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError, SettingsError
 from runtime.limits import LIMIT
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
 from runtime.loop.result import Simulation
-from runtime.model.generated import GeneratedModel, joint_labels
+from runtime.model.generated import GeneratedModel, is_axis, joint_labels
 from runtime.progress import at
 from runtime.records.record import Record
 from runtime.rows.observation import LoopRows, Observation, stack
-from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states, prepared
+from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states, stacked
 from runtime.rows.selection import Selection, certain_rows, select_rows
 from runtime.settings.controller import Controller
 from runtime.settings.schema import NotNegative, Settings, structure
@@ -231,24 +232,45 @@ class ClosedLoop:
         return observation[0] if len(observation) == 1 else stack(observation)
 
 
+def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Observation:
+    """Rows of the records of a problem with the loop that made them attached, for a method that simulates it.
+
+    simulator : default: that of the section `controller` of the settings.
+    """
+    settings: Any = problem.settings
+    if any(is_axis(joint) for joint in problem.model.JOINTS):
+        raise InputError(
+            f"estimate.method: {settings.estimate.method} does not read wrenches; leave it out, or the wrench"
+        )
+    if simulator is None and settings.controller is not None:
+        from runtime.loop.simulation import (
+            Simulator as FromController,  # CasADi, for these methods alone
+        )
+
+        simulator = FromController(problem.model, settings.controller)
+    if simulator is None:
+        return stacked(problem.model, problem.prepared)
+    options = settings.estimate.options
+    asked = {key: options[key] for key in ("reference", "around") if key in options}
+    return closed_loop(problem, problem.prepared, simulator, **asked).measured()
+
+
 def closed_loop(
-    model: GeneratedModel,
-    records: Sequence[Record | Prepared],
-    study: Study,
+    problem: Problem,
+    measured: Sequence[Prepared],
     simulator: Simulator,
     *,
     keep: Sequence[Array] = (),
     **options: Any,
 ) -> ClosedLoop:
-    """The loop of a study with a section `controller`.
+    """The loop of some readings of records, and of the problem whose settings read them.
 
     keep : bool, shape (N,) or (N, n) per record: samples that may be used.
     options : those of LoopOptions.
     """
     asked = structure(LoopOptions, options, ("estimate", "options"))
-    controller = simulator.controller
+    controller, model, study = simulator.controller, problem.model, problem.settings
     parts = []
-    measured = [prepared(model, record, study) for record in records]
     every = controller.record_every
     around = 2 * round(asked.around * (controller.rate / every)) + 1  # samples
     for k, own in enumerate(measured):

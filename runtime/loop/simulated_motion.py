@@ -13,8 +13,8 @@ about this robot. Limits are conventions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,10 @@ import numpy as np
 from runtime.errors import InputError
 from runtime.estimators.estimate import Status
 from runtime.estimators.linear import percent
+from runtime.estimators.method import Beginning, Fitted
 from runtime.limits import LIMIT
-from runtime.loop.closed_loop import ClosedLoop
+from runtime.loop.closed_loop import ClosedLoop, loop_of
+from runtime.loop.fixed_point import full
 from runtime.loop.law_check import law_text
 from runtime.model.generated import joint_labels
 from runtime.rows.observation import Observation
@@ -134,4 +136,18 @@ def judged(
         "gains, its delay, the reference or the parameters are not those of "
         f"the record; what was fitted says nothing about this robot. {law}",
         details,
+    )
+
+
+def beside_record(fit: Callable[[Beginning], Fitted], start: Beginning) -> Fitted:
+    """What `fit`, a method that simulates the loop, gives, with its last simulation judged beside the record."""
+    fitted = fit(start)
+    loop = loop_of(start.observation, start.settings.method)
+    X = full(start.system.names, fitted.solution.X, loop.model.BASE_PARAMETERS)
+    status, note, motion = judged(loop, start.observation, X)
+    return replace(
+        fitted,
+        status=status if fitted.status == "ok" else fitted.status,
+        message=" ".join(text for text in (fitted.message, note) if text),
+        details={**fitted.details, **motion},
     )

@@ -246,7 +246,7 @@ def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
 
 
 def is_axis(joint: int | str) -> bool:
-    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.rows.wrench`), no joint."""
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), no joint."""
     return isinstance(joint, str)
 
 

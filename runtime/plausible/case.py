@@ -13,14 +13,13 @@ from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels, joint_units
 from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
-from runtime.plausible.delay import Delay, delay
+from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
 from runtime.plausible.samples import Samples
 from runtime.plausible.trials import Baseline, baseline_of
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
-from runtime.rows.prepared import Prepared
+from runtime.rows.prepared import Prepared, stacked
 from runtime.settings.study import Study
 
 Array = np.ndarray
@@ -98,7 +97,7 @@ class Case:
     def observation(self) -> Observation | None:
         """Rows of the study; None where none is used, or counts cannot be read."""
         try:
-            return observe(self.model, self.given, self.study)
+            return stacked(self.model, self.given)
         except (InputError, np.linalg.LinAlgError):
             return None
 
@@ -160,6 +159,6 @@ class Case:
         duration = float(record.record.t[-1] - record.record.t[0])
         longest = min(LIMIT.LONGEST_DELAY, duration / 20)
         try:
-            return delay(self.model, record, self.study, longest=longest)
+            return delay_of(self.model, record, longest)
         except (InputError, ValueError):
             return None

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
@@ -27,8 +28,7 @@ from runtime.markup import number
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.plausible.bodies import Grams, solved
 from runtime.plausible.samples import lowpassed, usable
-from runtime.records.record import Record
-from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.prepared import Prepared
 from runtime.settings.study import Study
 from runtime.signals.states import require_motion
 from runtime.table import Table
@@ -80,22 +80,13 @@ class Delay(Result):
         )
 
 
-def delay(
-    model: GeneratedModel,
-    record: Record | Prepared,
-    study: Study | None = None,
-    *,
-    longest: float = LIMIT.LONGEST_DELAY,
-) -> Delay:
-    """The time shift between positions and torques of a record, by joint.
+def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
+    """The time shift between positions and torques of the first record of a prepared problem, by joint.
 
     Parameters
     ----------
-    model : GeneratedModel
-    record : Record or Prepared
-        Joint side, SI.
-    study : Study, optional
-        Filters and window; default: Study().
+    problem : Problem
+        Filters and window by its settings.
     longest : float, s
         Largest delay looked for.
 
@@ -108,10 +99,13 @@ def delay(
     InputError
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
     """
-    study = study or Study()
+    return delay_of(problem.model, problem.prepared[0], longest)
+
+
+def delay_of(model: GeneratedModel, own: Prepared, longest: float) -> Delay:
+    """The same of one reading of a record."""
+    study, record = own.study, own.record
     require_motion(study.signals, "a delay")
-    own = prepared(model, record, study)
-    record = own.record
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
         raise InputError(

@@ -18,17 +18,18 @@ from dataclasses import replace
 import numpy as np
 
 from runtime.checks.check import Answer, Question, State, named
+from runtime.core.estimation import estimate_of
 from runtime.errors import InputError
+from runtime.estimators.method import LINEAR
 from runtime.excitation.criteria import Weights, kept_correlation
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
+from runtime.rows.prepared import stacked
 from runtime.rows.selection import per_joint
 from runtime.settings.study import EstimateSettings, Signals, Study
-from runtime.signals.recorded_speed import agreement
+from runtime.speeds import agreement
 
 Array = np.ndarray
 
@@ -52,13 +53,13 @@ def rest(case: Case) -> Answer:
     )
     try:
         moving = replace(study, rows=replace(study.rows, low_speed=proposed))
-        without = observe(model, case.given, moving)
+        without = stacked(model, [record.by(moving) for record in case.given])
     except InputError:
         without = None
     if case.observation is None or without is None:
         return Answer("doubtful", text, remedy)
     before, after = (
-        estimate_of(rows, EstimateSettings(), model=model).relative_error
+        estimate_of(rows, EstimateSettings(), LINEAR, model=model).relative_error
         for rows in (case.observation, without)
     )
     text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"

@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from runtime.checks.check import WORST, Check, worst_of
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.json_documents import Result
-from runtime.model.generated import GeneratedModel, require_no_channels
+from runtime.model.generated import GeneratedModel, is_axis, require_no_channels
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.jumps import cut_torques, jumps
@@ -47,8 +48,6 @@ from runtime.plausible.sizes import (
 )
 from runtime.plausible.trials import Trial, decisive, regressor, tried
 from runtime.progress import at
-from runtime.rows.prepared import Source, prepared, record_of
-from runtime.settings.study import Study
 from runtime.signals.states import require_motion, unwrapped
 from runtime.table import Table
 
@@ -150,33 +149,24 @@ class Plausibility(
         )
 
 
-def plausibility(
-    model: GeneratedModel,
-    records: Source | Sequence[Source],
-    study: Study | None = None,
-    *,
-    variants: GeneratedModel | None = None,
-) -> Plausibility:
-    """Whether record, study and robot file suit each other, and what explains the record better
-    where they do not.
+def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) -> Plausibility:
+    """Whether record, study and robot file suit each other, and what explains the record better where they do not.
 
     Parameters
     ----------
-    model : GeneratedModel
-    records : Record, Prepared, or a sequence of them
-        Joint side, SI.
-    study : Study, optional
-        Default: Study().
+    problem : Problem
+        Prepared.
     variants : GeneratedModel, optional
-        The module of `symgen.variants`: alternatives are then tried in any case, those of the table
-        of frames too.
+        The module of `symgen.variants`: alternatives are then tried in any case, those of the table of frames too.
     """
-    study = study or Study()
-    require_motion(study.signals, "a check of slips")
-    several = list(records) if isinstance(records, Sequence) else [records]
+    require_motion(problem.settings.signals, "a check of slips")
+    if any(is_axis(joint) for joint in problem.model.JOINTS):
+        raise InputError(
+            "plausibility of the record: not judged beside force sensors; identify without them too"
+        )
     at("plausibility of the record")
-    first = times([record_of(record) for record in several])
-    case = _case(model, several, study, variants)
+    first = times(problem.records)
+    case = _case(problem, variants)
     if isinstance(case, Check):
         return Plausibility((first, case))
     answers = {check: check(case) for check in CHECKS}
@@ -214,15 +204,10 @@ def plausibility(
     )
 
 
-def _case(
-    model: GeneratedModel,
-    records: Sequence[Source],
-    study: Study,
-    variants: GeneratedModel | None,
-) -> Case | Check:
+def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
     """What the checks read; the finding where there is nothing to read."""
-    parts = [part for record in records for part in excerpts(record, study)]
-    own = [prepared(model, part, study) for part in parts]
+    model, study = problem.model, problem.settings
+    own = [part for reading in problem.prepared for part in excerpts(problem, reading)]
     try:
         require_no_channels(model, "a trial of another reading")
         whole = [unwrapped(one.record, study.signals, one.drives) for one in own]

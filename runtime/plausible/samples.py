@@ -12,13 +12,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.records.record import Record
-from runtime.rows.prepared import Prepared, Source, record_of
+from runtime.rows.prepared import Prepared
 from runtime.rows.selection import window_of
 from runtime.settings.study import Study
-from runtime.signals.filters import Lowpass, States, lowpass_filtered, median_filtered
+from runtime.signals.filters import (
+    Lowpass,
+    States,
+    filtered_states,
+    lowpass_filtered,
+    median_filtered,
+)
 
 Array = np.ndarray
 
@@ -92,14 +99,14 @@ def moving(qd: Array) -> Array:
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
-def excerpts(source: Source, study: Study) -> list[Source]:
+def excerpts(problem: Problem, reading: Prepared) -> list[Prepared]:
     """EXCERPTS of a long record, evenly spread over the window; one that is not longer as it is."""
-    record = record_of(source)
-    start, stop = window_of(record.t, study.rows.window, record.name)
+    record = reading.record
+    start, stop = window_of(record.t, problem.settings.rows.window, record.name)
     number, length = LIMIT.EXCERPTS
     if stop - start <= number * length:
-        return [source]
-    parts: list[Source] = []
+        return [reading]
+    parts = []
     for begin in map(int, np.linspace(start, stop - length, number)):
         samples = slice(begin, begin + length)
         known, missing = record.tau_known, record.missing
@@ -112,11 +119,11 @@ def excerpts(source: Source, study: Study) -> list[Source]:
             missing=None if missing is None else replace(missing, samples=missing.samples[samples]),
             channels={name: x[samples] for name, x in record.channels.items()},
         )
-        parts.append(part)
+        parts.append(problem.reading(part))
     return parts
 
 
-def samples_of(records: Sequence[Record | Prepared], study: Study) -> Samples:
+def samples_of(records: Sequence[Prepared], study: Study) -> Samples:
     """Filtered instants of all records, in their windows, at most LIMIT.INSTANTS_KEPT.
 
     The cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that
@@ -127,8 +134,7 @@ def samples_of(records: Sequence[Record | Prepared], study: Study) -> Samples:
     InputError
         Records too short for the filters.
     """
-    own = [one if isinstance(one, Prepared) else Prepared(one, study) for one in records]
-    parts = [_filtered(one, study, number) for number, one in enumerate(own)]
+    parts = [_filtered(record, study, number) for number, record in enumerate(records)]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SIGNALS}
     every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
     return every.thinned(LIMIT.INSTANTS_KEPT)
@@ -156,7 +162,9 @@ def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Arr
     shape (N, n) each, and the function that filters torques alike.
     """
     low = Lowpass(cutoff=motion_cutoff(own.record, own.study))
-    states = own.by(replace(study, signals=replace(study.signals, lowpass=low))).filtered
+    record, signals = own.record, replace(study.signals, lowpass=low)
+    states = filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
+    states = replace(states, channels=own.channels)
 
     def torque(tau: Array) -> Array:
         return lowpass_filtered(

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from runtime.controller.law import torque_law
 from runtime.errors import InputError, ModelError
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, drives_of, joint_labels
@@ -25,7 +26,6 @@ from runtime.reading.names import Label, labels, study_of
 from runtime.reading.resampling import Stretch, resampled
 from runtime.reading.table import Array, Table
 from runtime.records.clock import Stamps, rate_of, time_stamps
-from runtime.records.law import torque_law
 from runtime.records.missing import COUNTS, Missing, bridged
 from runtime.records.record import JOINT_CHANNELS, Origin, Record, require_finite
 from runtime.settings.record import NONE, Columns, RecordSettings, each_record

@@ -136,7 +136,7 @@ class Record:
         origin = origin or Origin()
         file = ", ".join(origin.files) or name
         signals = {"t": t, "q": q, "tau": tau, "tau_known": tau_known}
-        given = {label: np.array(x, dtype=float) for label, x in signals.items() if x is not None}
+        given = {label: _array(x) for label, x in signals.items() if x is not None}
         shapes = {label: x.shape for label, x in given.items()}
         given |= {label: x[:, None] for label, x in given.items() if label != "t" and x.ndim == 1}
         N = len(given["t"]) if given["t"].ndim == 1 else -1
@@ -235,10 +235,15 @@ class Record:
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
 
 
+def _array(x: ArrayLike) -> Array:
+    """The numbers of x: a copy, or x itself where it cannot be written."""
+    array = np.asarray(x, dtype=float)
+    return array.copy() if array.flags.writeable else array
+
+
 def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
     """A channel of a record of positions of that shape, read-only."""
-    array = np.asarray(x, dtype=float)
-    array = array.copy() if array.flags.writeable else array
+    array = _array(x)
     array = array[:, None] if array.ndim == 1 else array
     expected = shape if label in JOINT_CHANNELS else (shape[0], *array.shape[1:2])
     if array.shape != expected:

@@ -37,14 +37,14 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.linear import assemble
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, joint_labels, joint_units, require_no_channels
-from runtime.records.provenance import origin
+from runtime.model.generated import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.records.record import Record
 from runtime.resolution.advice import (
     ALL,
@@ -56,15 +56,14 @@ from runtime.resolution.advice import (
     confirmed,
     limits_of,
 )
-from runtime.resolution.coarse_encoders import READERS, CoarseEncoders, Reader
+from runtime.resolution.coarse_encoders import READERS, CoarseEncoders, ReaderName
 from runtime.resolution.perturbed import study_columns
 from runtime.resolution.readers import reader_advice
 from runtime.resolution.result import deciding_names
 from runtime.resolution.rounding import VARIANCE, Mode
 from runtime.rows.observation import stack
 from runtime.rows.position_errors import Perturbation, perturbation, solution
-from runtime.rows.prepared import Prepared, common_drives, prepared, resolved
-from runtime.rows.wrench import with_wrench
+from runtime.rows.prepared import common_drives
 from runtime.settings.study import Study, to_mapping
 
 Array = np.ndarray
@@ -110,19 +109,15 @@ class Predictor:
 
 
 def advise(
-    model: GeneratedModel,
-    records: Record | Prepared | Sequence[Record | Prepared],
-    study: Study | None = None,
+    problem: Problem,
     *,
     columns: Sequence[str] | None = None,
     asked: Sequence[float] = (),
     encoders: Sequence[str] | None = None,
-    drives: Drives | None = None,
-    constants: Mapping[str, float] | None = None,
     confirm: bool = True,
     progress: Progress | None = None,
     provenance: Mapping[str, Any] | None = None,
-    readers: Sequence[Reader] | None = None,
+    readers: Sequence[ReaderName] | None = None,
 ) -> Advice:
     """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted;
     side, rounding, columns and runs by study.cestac.
@@ -132,21 +127,14 @@ def advise(
 
     Parameters
     ----------
-    model : GeneratedModel
-        Emitted module, or the same in C (`runtime.compiled.model`).
-    records : Record, Prepared, or a sequence of them
-    study : Study, optional
-        Default: Study().
+    problem : Problem
+        Prepared.
     columns : sequence of str, optional
         Essential names where they are known; default: by study.cestac.columns.
     asked : sequence of float, rad or m
         Further steps whose change is predicted.
     encoders : sequence of str, optional
         "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
-    drives : Drives, optional
-        Motor side; default: DRIVES of the model.
-    constants : mapping, optional
-        Values in place of the robot file's.
     confirm : bool
         Sample at the steps of the limits, study.cestac.runs times each.
     progress : callable, optional
@@ -163,27 +151,26 @@ def advise(
         A method that is not linear least squares, or a median filter, which no prediction goes
         through.
     """
-    several = records if isinstance(records, Sequence) else (records,)
-    model, several, study, _ = with_wrench(model, several, study or Study())
-    require_no_channels(model, "a study of encoders")
-    study = resolved(study, several)[0]
-    study = replace(study, cestac=replace(study.cestac, delta=()))  # steps are what is sought
-    as_measured = [prepared(model, record, study) for record in several]
-    whole = [own.record for own in as_measured]
+    if any(is_axis(joint) for joint in problem.model.JOINTS):
+        raise InputError(
+            "force sensors: the advisor judges encoders at every joint, and the axes of a sensor have none; leave the wrench out"
+        )
+    settings = problem.settings
+    sought = replace(settings.cestac, delta=())  # steps are what is sought
+    problem = problem.changed(settings=replace(settings, cestac=sought))
+    model, study, as_measured = problem.model, problem.settings, list(problem.prepared)
+    whole = list(problem.records)
     _refuse(study)
-    law, drives = study.cestac.rounding, drives or common_drives(model, as_measured)
-    names = study_columns(model, as_measured, study, columns, constants)
-    parts = tuple(
-        perturbation(model, own, study, names, drives=drives, constants=constants)
-        for own in as_measured
-    )
-    settings = replace(study.estimate, columns="all")
+    law, drives = study.cestac.rounding, common_drives(model, as_measured)
+    names = study_columns(problem, as_measured, columns)
+    parts = tuple(perturbation(model, own, study, names, drives=drives) for own in as_measured)
+    linear = replace(study.estimate, columns="all")
     measured = (
         stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     )
-    system = linear_system(measured, settings)
+    system = linear_system(measured, linear)
     reference = assemble(
-        system, system.solve(), model=model, provenance={**origin(whole), **(provenance or {})}
+        system, system.solve(), model=model, provenance={**problem.provenance, **(provenance or {})}
     )
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
@@ -202,10 +189,8 @@ def advise(
         if progress is not None:
             progress(next(done), total)
 
-    def coarse(law: Mode, reader: Reader) -> CoarseEncoders:
-        return CoarseEncoders(
-            model, as_measured, study, names, drives, constants or {}, law, reader
-        )
+    def coarse(law: Mode, reader: ReaderName) -> CoarseEncoders:
+        return CoarseEncoders(problem, names, drives, law, reader)
 
     rate = replace(predictor, share=VARIANCE["phase"]).rate(every)[decisive]
     fastest = np.abs(rate).max(initial=0.0)

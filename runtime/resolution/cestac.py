@@ -29,17 +29,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.blas import single_threaded
 from runtime.compiled.model import target_of
+from runtime.core.estimation import estimate_of, point_estimate
+from runtime.core.problem import Problem
 from runtime.errors import InputError, SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of, point_estimate
-from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, require_no_channels
-from runtime.records.law import require_found
-from runtime.records.provenance import origin, processor
-from runtime.records.record import Record
+from runtime.records.provenance import processor
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.loop import Loop, loop_of, without_loop_options
 from runtime.resolution.perturbed import (
@@ -52,8 +48,7 @@ from runtime.resolution.perturbed import (
 from runtime.resolution.result import Cestac, level_result
 from runtime.resolution.run import USABLE, run_block
 from runtime.resolution.runs import Level, Runs
-from runtime.rows.prepared import Prepared, common_drives, prepared, record_of, resolved
-from runtime.rows.wrench import with_wrench
+from runtime.rows.prepared import common_drives
 from runtime.settings.study import CestacSettings, Study, to_mapping
 
 if TYPE_CHECKING:
@@ -64,15 +59,10 @@ Key = tuple[int, int]
 Map = Callable[..., Iterable[Any]]
 
 
-@single_threaded
 def cestac(
-    model: GeneratedModel,
-    records: Record | Prepared | Sequence[Record | Prepared],
-    study: Study | None = None,
+    problem: Problem,
     *,
     columns: Sequence[str] | None = None,
-    drives: Drives | None = None,
-    constants: Mapping[str, float] | None = None,
     map: Map = map,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
@@ -84,19 +74,10 @@ def cestac(
 
     Parameters
     ----------
-    model : GeneratedModel
-        Emitted module, or the same in C (`runtime.compiled.model`).
-    records : Record, Prepared, or a sequence of them
-        One record of the robot, or several that are stacked.
-    study : Study, optional
-        Default: Study().
+    problem : Problem
+        Prepared.
     columns : sequence of str, optional
-        Essential names where they are known; default: those of `study` on these records. Unused
-        unless study.cestac.columns is "essential".
-    drives : Drives, optional
-        Motor side; default: DRIVES of the model.
-    constants : mapping, optional
-        Values in place of the robot file's.
+        Essential names where they are known; default: those of the problem. Unused unless settings.cestac.columns is "essential".
     map : callable, optional
         As the built-in one; computes the runs, in processes (`runtime.parallel.processes`) or by a
         Dask cluster (`runtime.cluster.cluster`). The results do not depend on it in any bit.
@@ -120,14 +101,10 @@ def cestac(
         A method that finds no estimate, or fewer than two at one of
         the steps.
     """
-    several = records if isinstance(records, Sequence) else (records,)
-    model, several, study, _ = with_wrench(model, several, study or Study())
-    study = resolved(study, several)[0]
-    require_found(study.record, (record_of(one).measured for one in several))
-    require_no_channels(model, "a study of encoders")
+    model, study = problem.model, problem.settings
     settings = study.cestac
-    as_measured = [prepared(model, record, study) for record in several]
-    drives = drives or common_drives(model, as_measured)
+    as_measured = list(problem.prepared)
+    drives = common_drives(model, as_measured)
     if settings.side == "motor" and drives is None:
         raise SettingsError(
             (
@@ -145,37 +122,30 @@ def cestac(
             ),
             path=("cestac", "rounding"),
         )
-    loop = loop_of(model, [own.record for own in as_measured], study, simulator)
-    if loop is not None and constants:
-        raise InputError(
-            f"constants with {study.estimate.method} or place: loop; the loop is that of the robot "
-            "file, change it there"
-        )
+    loop = loop_of(problem, simulator)
     if settings.place == "loop":
         assert loop is not None
         as_measured = [part.prepared for part in loop.closed.parts]
     asked = to_mapping(study.estimate)
     if loop is not None:
-        study = replace(study, estimate=without_loop_options(study.estimate))
+        study = replace(study, estimate=without_loop_options(study.estimate, problem.methods))
     task = Task(
         records=prepared_records(as_measured, study, drives, loop),
         model=model,
-        names=study_columns(model, as_measured, study, columns, constants, loop),
+        names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
         settings=settings,
         levels=levels_of(settings),
         drives=drives,
-        constants=dict(constants or {}),
+        reader=problem.reader,
+        methods=problem.methods,
         loop=loop,
     )
-    measured, whole = (
-        perturbed(task.columns, task, Level(0.0), ()),
-        [own.record for own in as_measured],
-    )
-    origins = {**origin(whole), **(provenance or {})}
-    reference = estimate_of(
-        measured, point_estimate(task.estimate), model=model, provenance=origins
-    )
+    measured = perturbed(task.columns, task, Level(0.0), ())
+    whole = [reading.record for reading in as_measured]
+    origins = {**problem.provenance, **(provenance or {})}
+    point = point_estimate(task.estimate, problem.methods)
+    reference = estimate_of(measured, point, problem.methods, model=model, provenance=origins)
     _refuse(reference)
     described = {
         **measured.settings,
@@ -326,7 +296,7 @@ def _identity(
         **{key: value for key, value in described.items() if key != "cestac"},
         **{f"cestac.{key}": value for key, value in described["cestac"].items() if key != "runs"},
         "columns": list(task.names),
-        "constants": dict(task.constants),
+        "constants": dict(task.model.CONSTANTS),
         "drives": None
         if drives is None
         else [

@@ -25,28 +25,38 @@ from typing import Literal
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.estimators.method import linear_system
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
 from runtime.records.missing import require_positions
 from runtime.resolution.advice import Sampled, sampled
 from runtime.resolution.perturbed import PreparedRecord, Task, prepared_record
 from runtime.resolution.rounding import Mode, counted, rounded, stream
 from runtime.rows.observation import stack
-from runtime.rows.prepared import Prepared, observation_of
+from runtime.rows.prepared import observation_of
 from runtime.rows.selection import certain_rows
-from runtime.settings.study import Study
 from runtime.signals.counts.reading import Starts, read_counts
 from runtime.signals.filters import SpeedErrors, States, filtered_states
-from runtime.signals.states import encoder_drives, encoder_position, encoder_root
+from runtime.signals.states import (
+    Reader,
+    encoder_drives,
+    encoder_position,
+    encoder_root,
+    lowpassed,
+)
+from runtime.signals.states import counted as counted_states
 
 Array = np.ndarray
 
-Reader = Literal["lowpass", "counts"]
+ReaderName = Literal["lowpass", "counts"]
 
-READERS: tuple[Reader, ...] = ("lowpass", "counts")
-PHASES: Mapping[Reader, int] = {"lowpass": 8, "counts": 4}  # nodes of the quadrature over the phase
+READERS: tuple[ReaderName, ...] = ("lowpass", "counts")
+STATES: Mapping[ReaderName, Reader] = {"lowpass": lowpassed, "counts": counted_states}
+PHASES: Mapping[ReaderName, int] = {
+    "lowpass": 8,
+    "counts": 4,
+}  # nodes of the quadrature over the phase
 QUADRATURE = 1 << 20  # number of the first stream of the nodes: beyond those of runs
 
 
@@ -81,15 +91,13 @@ class CoarseEncoders:
 
     def __init__(
         self,
-        model: GeneratedModel,
-        records: Sequence[Prepared],
-        study: Study,
+        problem: Problem,
         names: Sequence[str],
         drives: Drives | None,
-        constants: Mapping[str, float],
         law: Mode,
-        reader: Reader,
+        reader: ReaderName,
     ) -> None:
+        model, study = problem.model, problem.settings
         signals = study.signals
         if reader != signals.reader:
             signals = replace(signals, reader=reader, step=None, side="joint")
@@ -98,7 +106,8 @@ class CoarseEncoders:
         side = encoder_drives(settings.side, drives, "cestac")
         self.reader, self.root, self.parts = reader, encoder_root(side, len(model.JOINTS)), []
         into = np.linalg.inv(self.root).T
-        for own in records:
+        readings = problem.changed(settings=study, reader=STATES[reader]).prepared
+        for own in readings:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, drives)
             read = part.states or filtered_states(part.q, part.rate, part.selection.signals)
@@ -115,7 +124,8 @@ class CoarseEncoders:
             settings,
             (),
             drives,
-            dict(constants),
+            STATES[reader],
+            problem.methods,
         )
         self.columns = self.task.columns
         self.exact = [(part.states, part.record.selection.mask) for part in self.parts]
@@ -261,7 +271,7 @@ class CoarseEncoders:
             states = States(own.q + q.T, own.qd + qd.T, own.qdd + qdd.T)
             speeds = replace(states, errors=SpeedErrors(error[3].T * chosen, self.root))
             rows = speeds[selection.samples][selection.kept]
-            certain = selection.mask & certain_rows(self.task.model, rows, self.task.constants)
+            certain = selection.mask & certain_rows(self.task.model, rows)
             coarse.append((states, certain))
             exact.append((own, certain))
         if not any(mask.any() for _, mask in exact):

@@ -30,17 +30,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import SettingsError
+from runtime.estimators.method import Method
 from runtime.loop.closed_loop import ClosedLoop, closed_loop
 from runtime.loop.control_law import parameters_of
-from runtime.loop.methods import CLOSED_LOOP
 from runtime.loop.reference import Reference, reference_of
 from runtime.model.generated import GeneratedModel
-from runtime.records.record import Record
 from runtime.resolution.rounding import stream
 from runtime.resolution.runs import Level
 from runtime.rows.observation import LoopRows, Observation
-from runtime.settings.study import EstimateSettings, Study
+from runtime.settings.study import EstimateSettings
+from runtime.signals.states import lowpassed
 
 if TYPE_CHECKING:
     from runtime.loop.simulation import Simulator
@@ -56,23 +57,28 @@ class Loop:
 
     Attributes
     ----------
-    model : GeneratedModel
-    study : Study
-        With the median of study.cestac in its signals.
+    problem : Problem
+        With the median of settings.cestac in its signals; of place loop, its records are those that the reference may come from.
     simulator : Simulator
-        Without steps of its own making: its law has the encoder of the study.
-    records : tuple of Record
-        Measured ones; of place loop, those that the reference may come from.
+        Without steps of its own making: its law has the encoder of the settings.
     """
 
-    model: GeneratedModel
-    study: Study
+    problem: Problem
     simulator: Simulator
-    records: tuple[Record, ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: what makes the simulator, which is not pickled."""
-        return _loop, (self.model, self.study, self.records)
+        return _loop, (self.problem,)
+
+    @property
+    def model(self) -> GeneratedModel:
+        """The model of the problem."""
+        return self.problem.model
+
+    @property
+    def study(self) -> Any:
+        """The settings of the problem."""
+        return self.problem.settings
 
     @property
     def options(self) -> Mapping[str, Any]:
@@ -86,7 +92,7 @@ class Loop:
     @cached_property
     def reference(self) -> Reference:
         """What the controller follows, of place loop."""
-        return reference_of(self.simulator.controller, self.model, records=self.records)
+        return reference_of(self.simulator.controller, self.model, records=self.problem.records)
 
     @cached_property
     def truth(self) -> Array:
@@ -99,7 +105,7 @@ class Loop:
         study.
         """
         if self.study.cestac.place == "record":
-            return closed_loop(self.model, self.records, self.study, self.simulator, **self.options)
+            return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
 
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
@@ -145,30 +151,26 @@ class Loop:
             signals = replace(signals, step=step, side=self.study.cestac.side)
         elif signals.reader == "counts":
             signals = replace(signals, reader="lowpass", step=None, side="joint")
-        return closed_loop(
-            self.model,
-            [record],
-            replace(self.study, signals=signals),
-            self.simulator,
-            **self.options,
+        settings = replace(self.study, signals=signals)
+        reader = self.problem.reader if signals.reader == self.study.signals.reader else lowpassed
+        problem = self.problem.changed(
+            records=(record,), unseen=(), settings=settings, reader=reader
         )
+        return closed_loop(problem, problem.prepared, self.simulator, **self.options)
 
 
-def _loop(model: GeneratedModel, study: Study, records: tuple[Record, ...]) -> Loop:
-    """The loop with a simulator of study.controller."""
+def _loop(problem: Problem) -> Loop:
+    """The loop with a simulator of the section `controller`."""
     from runtime.loop.simulation import Simulator
 
-    assert study.controller is not None
-    return Loop(model, study, Simulator(model, study.controller), records)
+    settings: Any = problem.settings
+    return Loop(problem, Simulator(problem.model, settings.controller))
 
 
-def loop_of(
-    model: GeneratedModel, records: Sequence[Record], study: Study, simulator: Simulator | None
-) -> Loop | None:
-    """The loop of a study that simulates one; else None. simulator : default: that of
-    study.controller.
-    """
-    if study.cestac.place != "loop" and study.estimate.method not in CLOSED_LOOP:
+def loop_of(problem: Problem, simulator: Simulator | None) -> Loop | None:
+    """The loop of a problem that simulates one; else None. simulator : default: that of the section `controller`."""
+    study: Any = problem.settings
+    if study.cestac.place != "loop" and problem.method.observe is None:
         return None
     if study.controller is None:
         asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
@@ -184,14 +186,17 @@ def loop_of(
     ):  # the encoder on the side of the study, of any step: only then is it in the law
         encoder = replace(study.controller.encoder, side=study.cestac.side)
         quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
+    quiet_problem = problem.changed(settings=quiet)
     if simulator is not None and simulator.controller == quiet.controller:
-        return Loop(model, quiet, simulator, tuple(records))
-    return _loop(model, quiet, tuple(records))
+        return Loop(quiet_problem, simulator)
+    return _loop(quiet_problem)
 
 
-def without_loop_options(settings: EstimateSettings) -> EstimateSettings:
+def without_loop_options(
+    settings: EstimateSettings, methods: Mapping[str, Method]
+) -> EstimateSettings:
     """The settings as a method that simulates no loop takes them."""
-    if settings.method in CLOSED_LOOP:
+    if methods[settings.method].observe is not None:
         return settings
     return replace(
         settings,

@@ -13,28 +13,30 @@ and without torques and whatever records follow.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.estimators.essential import essential_of
-from runtime.estimators.method import linear_companion
+from runtime.estimators.method import Method, linear_companion
 from runtime.loop.closed_loop import LoopPart
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, base_columns
 from runtime.records.missing import COUNTS, Missing, require_positions
+from runtime.records.record import Origin, Record
 from runtime.resolution.loop import Loop
 from runtime.resolution.own_encoder import OwnEncoder, own_encoder
 from runtime.resolution.rounding import rounded, stream
 from runtime.resolution.runs import Level
 from runtime.rows.observation import Observation, stack
-from runtime.rows.prepared import Prepared, decimated_torque, observation_of
+from runtime.rows.prepared import Prepared, decimated_torque, observation_of, stacked
 from runtime.rows.regressor import Columns
 from runtime.rows.selection import Selection, select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Study
 from runtime.signals.filters import States, filtered_states
-from runtime.signals.states import observed_states, require_motion
+from runtime.signals.states import Reader, require_motion
 
 Array = np.ndarray
 
@@ -60,6 +62,8 @@ class PreparedRecord:
         The encoder that made it, under law phase.
     missing : Missing or None
         Samples without a position, in every run the same.
+    channels : mapping
+        Functions of time that laws of the model read, (N,) by name.
     note : str
         Why the record as measured is not read as counts, where the study asks for counts.
     """
@@ -73,6 +77,7 @@ class PreparedRecord:
     states: States | None = None
     own: OwnEncoder | None = None
     missing: Missing | None = None
+    channels: Mapping[str, Array] = field(default_factory=dict)
     note: str = ""
 
 
@@ -90,8 +95,10 @@ class Task:
     levels : tuple of Level
     drives : Drives or None
         Motor side.
-    constants : mapping
-        Values in place of the robot file's.
+    reader : Reader
+        States of a record.
+    methods : mapping of str to Method
+        That of `estimate` among them.
     loop : Loop or None
         Closed loop, of a study that simulates one.
     """
@@ -103,13 +110,14 @@ class Task:
     settings: CestacSettings
     levels: tuple[Level, ...]
     drives: Drives | None
-    constants: Mapping[str, float]
+    reader: Reader
+    methods: Mapping[str, Method]
     loop: Loop | None = None
 
     @property
     def columns(self) -> Columns:
         """Its columns of W, for some runs one after the other."""
-        return Columns(self.model, self.names, self.constants)
+        return Columns(self.model, self.names)
 
 
 def prepared_record(
@@ -132,7 +140,7 @@ def prepared_record(
             if signals.step is not None or encoder is None
             else replace(signals, step=tuple(encoder.step), side=study.cestac.side)
         )
-        own = replace(own, study=study, drives=drives).by(replace(study, signals=known))
+        own = replace(own, study=replace(study, signals=known))
         counts = own.states
     elif signals.reader == "counts":
         note = (
@@ -141,11 +149,12 @@ def prepared_record(
         )
     if counts is None:
         require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
-        own = own.by(replace(study, signals=signals))
     if part is not None:
         selection, torque = part.selection, part.torque
     else:  # without a limit any speed will do
-        speeds = (counts or own.filtered).qd if np.any(study.rows.low_speed) else record.q
+        speeds = record.q
+        if np.any(study.rows.low_speed):
+            speeds = (counts or filtered_states(record.q, record.rate, signals)).qd
         selection = select_rows(record, speeds, signals, study.rows)
         torque = decimated_torque(record.torque, selection)
     return PreparedRecord(
@@ -158,6 +167,7 @@ def prepared_record(
         counts,
         encoder,
         record.missing,
+        own.channels,
         note,
     )
 
@@ -181,28 +191,23 @@ def prepared_records(
 
 
 def study_columns(
-    model: GeneratedModel,
+    problem: Problem,
     records: Sequence[Prepared],
-    study: Study,
     columns: Sequence[str] | None,
-    constants: Mapping[str, float] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Columns of study.cestac.columns: a list, all, or the essential ones of the identification
-    that `study` describes.
+    """Columns of settings.cestac.columns: a list, all, or the essential ones of the identification that the problem describes.
 
     columns : essential names where they are known.
             Raises SettingsError for a name that is no base parameter, and for poses at rest.
     """
-    require_motion(study.signals, "the study of encoders")
-    if study.cestac.columns == "essential" and columns is None:
-        seen = (
-            stack([own.by(study).observation(model, None, constants) for own in records])
-            if loop is None
-            else loop.closed.measured()
-        )
-        return essential_of(seen, study.essential, linear_companion(study.estimate)).names
-    return base_columns(model, study.cestac.columns, columns or (), "cestac", "columns")
+    settings = problem.settings
+    require_motion(settings.signals, "the study of encoders")
+    if settings.cestac.columns == "essential" and columns is None:
+        rows = stacked(problem.model, records) if loop is None else loop.closed.measured()
+        linear = linear_companion(settings.estimate)
+        return essential_of(rows, settings.essential, linear).names
+    return base_columns(problem.model, settings.cestac.columns, columns or (), "cestac", "columns")
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -288,14 +293,23 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
     """
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
-        return record.states or filtered_states(q, record.rate, signals)
-    known = replace(signals, step=level.delta, side=task.settings.side)
-    try:
-        return observed_states(q, record.rate, known, task.drives, missing=record.missing)
-    except np.linalg.LinAlgError as e:
-        raise InputError(
-            f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps"
-        ) from e
+        states = record.states or filtered_states(q, record.rate, signals)
+    else:
+        known = replace(signals, step=level.delta, side=task.settings.side)
+        try:
+            states = task.reader(_moved(task, record, q), known)
+        except np.linalg.LinAlgError as e:
+            raise InputError(
+                f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps"
+            ) from e
+    return replace(states, channels=record.channels)
+
+
+def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
+    """A record of the positions q of one run, for a reader."""
+    origin = Origin(drives=task.drives)
+    t = np.arange(len(q)) / record.rate
+    return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)
 
 
 def system_of(

@@ -26,7 +26,7 @@ from runtime.resolution.advice import (
     limits_of,
     step_text,
 )
-from runtime.resolution.coarse_encoders import CoarseEncoders, Reader, mean_change
+from runtime.resolution.coarse_encoders import CoarseEncoders, ReaderName, mean_change
 from runtime.resolution.result import deciding_names
 
 Array = np.ndarray
@@ -176,7 +176,7 @@ def vague_steps(
 
 
 def uncertain(
-    reader: Reader, advice: EncoderAdvice, error: Array, names: Sequence[str]
+    reader: ReaderName, advice: EncoderAdvice, error: Array, names: Sequence[str]
 ) -> list[str]:
     """Sentences on the limits about which the change hardly depends on the step, or scatters as
     much; error : deviation of the change, shape (m, b), %.

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from runtime.core.estimation import estimate_of, point_estimate
 from runtime.errors import InputError
 from runtime.estimators.method import LINEAR, linear_system
-from runtime.loop.methods import estimate_of, point_estimate
 from runtime.resolution.perturbed import Task, perturbed
 from runtime.resolution.runs import Run, Runs
 from runtime.rows.observation import Observation
@@ -52,7 +52,8 @@ def _estimated(task: Task, observation: Observation) -> Array:
     if task.estimate.method in LINEAR:
         return linear_system(observation, task.estimate).solve().X
     try:
-        estimate = estimate_of(observation, point_estimate(task.estimate), model=task.model)
+        settings = point_estimate(task.estimate, task.methods)
+        estimate = estimate_of(observation, settings, task.methods, model=task.model)
         if estimate.status in USABLE:
             return estimate.X
     except InputError:

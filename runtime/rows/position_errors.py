@@ -31,15 +31,15 @@ import numpy as np
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel
 from runtime.records.missing import require_positions
-from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.prepared import Prepared
+from runtime.rows.regressor import in_time
 from runtime.rows.selection import Selection
 from runtime.rows.sign_errors import Kernels, Switch, Switched, kernels, switched, switches
 from runtime.settings.study import Study, to_mapping
 from runtime.signals.filters import States
 from runtime.signals.noise_gain import Bandwidth, bandwidth
-from runtime.signals.states import encoder_drives, encoder_root
+from runtime.signals.states import encoder_drives, encoder_root, lowpassed
 
 Array = np.ndarray
 
@@ -152,30 +152,28 @@ def solution(gram: Array, weights: Array) -> Array:
 
 def perturbation(
     model: GeneratedModel,
-    record: Record | Prepared,
+    record: Prepared,
     study: Study,
     names: Sequence[str],
     *,
     drives: Drives | None = None,
-    constants: Mapping[str, float] | None = None,
 ) -> Perturbation:
     """The record under errors of its encoders on the side study.cestac.side, through the filters of
     the study with the median of study.cestac.
 
     names : columns, as fitted.
-    drives : motor side; default: DRIVES of the model.
-    constants : values in place of the robot file's.
+    drives : motor side; default: those of the record.
     """
     signals = replace(study.signals, median=study.cestac.median)
     positions = replace(signals, reader="lowpass", step=None, side="joint")
-    own = prepared(model, record, replace(study, signals=positions))
+    own = replace(record, study=replace(study, signals=positions), reader=lowpassed)
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of steps on them", own.record.file)
     selection = own.selection
-    observation = own.observation(model, names, constants)
+    observation = own.observation(model, names)
     settings = {**observation.settings, "signals": to_mapping(signals)}
     observation = replace(observation, settings=settings)
-    window, switching = own.states[selection.samples], switches(model, names, constants)
+    window, switching = own.states[selection.samples], switches(model, names)
     root = encoder_root(
         encoder_drives(study.cestac.side, drives or own.drives, "cestac"), own.record.n
     )
@@ -189,7 +187,6 @@ def perturbation(
         band,
         root,
         switching,
-        dict(constants or {}),
     )
     nearest = np.rint((np.arange(len(window)) - selection.kept[0]) / selection.factor).astype(int)
     return Perturbation(
@@ -222,7 +219,6 @@ def _smooth(
     band: Bandwidth,
     root: Array,
     switching: Sequence[Switch],
-    constants: Mapping[str, float],
 ) -> tuple[Array, Array]:
     """Per encoder: what errors of variance 1 add to the Gram matrices, and the sensitivities to the speed; of the states at the kept instants, of which mask, bool (n, K), is
     used.
@@ -234,14 +230,14 @@ def _smooth(
     axes = np.linalg.cholesky(band.before)
     into = np.linalg.inv(axes)
     C = np.linalg.cholesky(into @ band.after @ into.T)
-    out = model.store(len(kept))
+    out, timed = model.store(len(kept)), in_time(model, kept)
 
     def store(direction: Array, scale: float, joints: Array) -> Array:
         q, qd, qdd = (
             x + scale * c * joints
             for x, c in zip((kept.q, kept.qd, kept.qdd), direction, strict=True)
         )
-        D = model.regressor(q, qd, qdd, out=out, **constants)
+        D = model.regressor(q, qd, qdd, out=out, **timed)
         return np.asarray(D.transpose(2, 1, 0)[columns])
 
     at_rest = store(axes[:, 0], 0.0, root[:, 0])

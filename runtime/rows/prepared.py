@@ -1,6 +1,6 @@
 """One record as a study reads it: filtered, selected and decimated once, for whoever asks.
 
-    own = prepared(model, record, study)
+    own = problem.prepared[0]
     own.states                                q, qd, qdd, by the reader of the study
     own.selection                             window, decimated instants, rows left out
     own.torque                                Y before rows are left out, shape (n, K)
@@ -16,32 +16,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from runtime.errors import InputError
-from runtime.limits import LIMIT
 from runtime.model.drives import Drives
 from runtime.model.generated import GeneratedModel, check_states, drives_of
-from runtime.records.missing import COUNTS, require_positions
 from runtime.records.record import JOINT_CHANNELS, Record
-from runtime.rows.observation import Observation
+from runtime.rows.observation import Observation, stack
 from runtime.rows.regressor import Columns
 from runtime.rows.selection import (
     Selection,
     certain_rows,
     nothing_left,
     select_rows,
-    window_of,
 )
 from runtime.settings.study import Study
-from runtime.signals.cutoff import EXCERPT, cutoff
 from runtime.signals.decimation import decimate
-from runtime.signals.filters import States, filtered_states, median_filtered
-from runtime.signals.recorded_speed import crossings
-from runtime.signals.states import observed_states
-from runtime.signals.torque_median import taken
+from runtime.signals.filters import States, median_filtered
+from runtime.signals.states import Reader
 
 Array = np.ndarray
 
@@ -55,40 +49,27 @@ class Prepared:
     record : Record
         Joint side, SI.
     study : Study
-        Signals and rows.
-    drives : Drives or None
-        Motor side: those by which the record was read, or those of the robot.
+        Signals and rows, with numbers for what was automatic.
+    reader : Reader
+        States of the record.
     keep : ndarray of bool, shape (N,) or (N, n), or None
         Samples (and joints) that may be used; None: all.
     """
 
     record: Record
     study: Study
-    drives: Drives | None = None
+    reader: Reader
     keep: Array | None = None
 
-    @cached_property
-    def filtered(self) -> States:
-        """q, qd, qdd of the positions as they are, shape (N, n) each; straight lines over gaps."""
-        record, v = self.record, self.record.channels.get("qd")
-        states = filtered_states(record.q, record.rate, self.study.signals, v)
-        return replace(states, channels=self.channels)
+    @property
+    def drives(self) -> Drives | None:
+        """Motor side: the drives by which the record was read."""
+        return self.record.origin.drives
 
     @cached_property
     def states(self) -> States:
-        """q, qd, qdd by the reader of the study, shape (N, n) each."""
-        record, signals = self.record, self.study.signals
-        if signals.reader == "lowpass":
-            require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
-            return self.filtered
-        states = observed_states(
-            record.q,
-            record.rate,
-            signals,
-            self.drives,
-            missing=record.missing,
-            name=record.name,
-        )
+        """q, qd, qdd by the reader, shape (N, n) each."""
+        states = self.reader(self.record, self.study.signals)
         return replace(states, channels=self.channels)
 
     @property
@@ -108,17 +89,12 @@ class Prepared:
         """Y before rows are left out, shape (n, K), N m or N."""
         return decimated_torque(self.record.torque, self.selection)
 
-    def certain(
-        self, model: GeneratedModel, constants: Mapping[str, float] | None = None
-    ) -> Selection:
+    def certain(self, model: GeneratedModel) -> Selection:
         """The selection without rows of unknown state or of uncertain direction of friction."""
-        return certain(model, self.states, self.selection, constants)
+        return certain(model, self.states, self.selection)
 
     def observation(
-        self,
-        model: GeneratedModel,
-        columns: Sequence[str] | None = None,
-        constants: Mapping[str, float] | None = None,
+        self, model: GeneratedModel, columns: Sequence[str] | None = None
     ) -> Observation:
         """Y = W X + rho of the rows that are used."""
         return observation_from_states(
@@ -128,78 +104,28 @@ class Prepared:
             self.selection,
             files=self.record.files,
             columns=columns,
-            constants=constants,
         )
 
     def by(self, study: Study) -> Prepared:
         """The same record by another study; what both make alike is shared."""
-        other = replace(self, study=study)
-        if study.signals != self.study.signals:
-            return other
-        if study.rows == self.study.rows:
+        if study.signals == self.study.signals and study.rows == self.study.rows:
             return self
-        shared = ("states", "filtered") if study.signals.reader == "lowpass" else ("states",)
-        vars(other).update({name: getattr(self, name) for name in shared})
+        other = replace(self, study=study)
+        if study.signals == self.study.signals:
+            other.take_states(self)
         return other
+
+    def take_states(self, other: Prepared) -> None:
+        """Take the states that another reading of the same positions has made, if it has."""
+        same = self.record.q is other.record.q and self.record.missing is other.record.missing
+        same &= self.record.channels.get("qd") is other.record.channels.get("qd")
+        same &= self.reader is other.reader and self.study.signals == other.study.signals
+        if same and "states" in vars(other):
+            vars(self)["states"] = replace(other.states, channels=self.channels)
 
     def __getstate__(self) -> dict[str, Any]:
         """For other processes: nothing of what was made."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
-
-
-Source: TypeAlias = Record | Prepared
-
-
-def prepared(model: GeneratedModel, record: Source, study: Study) -> Prepared:
-    """The record as `study` reads it; one that was prepared shares what was made of it."""
-    study, _ = resolved(study, [record])
-    if isinstance(record, Prepared):
-        return record.by(study)
-    return Prepared(record, study, record.origin.drives or drives_of(model))
-
-
-def resolved(study: Study, records: Sequence[Source]) -> tuple[Study, str]:
-    """The study with numbers for signals.lowpass.cutoff: auto, for signals.torque_median: auto
-    where it is none and, where velocities were recorded, for signals.velocity: auto, one for all
-    records, and what they became and why, in words; empty where nothing changes.
-
-    The first EXCERPT samples in the window of the study are looked at, of every record.
-    """
-    signals, low = study.signals, study.signals.lowpass
-    automatic = low is not None and low.cutoff == "auto"
-    recorded = signals.velocity == "auto" and signals.reader == "lowpass"
-    recorded = recorded and all("qd" in record_of(record).measured for record in records)
-    torques = signals.torque_median == "auto" and signals.median > 1
-    if not automatic and not torques and not (recorded and records):
-        return study, ""
-    parts, shares = [], []
-    for record in map(record_of, records):
-        start, stop = window_of(record.t, study.rows.window, record.name)
-        part = slice(start, min(stop, start + EXCERPT))
-        q, tau = record.q[part], record.tau[part]
-        channels = {key: x[part] for key, x in record.channels.items()}
-        parts.append((q, channels, record.rate))
-        shares += [taken(tau, q, record.rate, signals.median)] if torques else []
-    positions, texts = [(q, rate) for q, _, rate in parts], []
-    if np.max(shares, initial=0.0) > LIMIT.MEDIAN_TAKES:
-        signals, worst = replace(signals, torque_median=1), np.max(shares, axis=0)
-        texts.append(
-            "Torques without a median (torque_median: auto): it would take "
-            f"{100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} in time with "
-            "the motion, as from a controller that answers every count of its encoder."
-        )
-    if recorded and records:
-        first = cutoff(positions, signals)[0] if automatic else 0.0
-        known = replace(signals, lowpass=replace(low, cutoff=first)) if low and first else signals
-        crossing, why = crossings(parts, known)
-        signals = replace(signals, velocity=crossing)
-        texts.append(why)
-    if low is not None and automatic:
-        given = np.inf if isinstance(signals.velocity, str) else signals.velocity
-        hertz, why = cutoff(positions, signals, given)
-        signals = replace(signals, lowpass=replace(low, cutoff=hertz))
-        texts.insert(0, f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}.")
-    return replace(study, signals=signals), " ".join(texts)
 
 
 def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
@@ -210,11 +136,6 @@ def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives 
     if len(coupled) > 1:
         raise InputError(f"records read with coupling {', '.join(sorted(coupled))}; expected one")
     return records[0].drives if records else drives_of(model)
-
-
-def record_of(record: Source) -> Record:
-    """The record itself."""
-    return record.record if isinstance(record, Prepared) else record
 
 
 def decimated_torque(tau: Array, selection: Selection) -> Array:
@@ -234,14 +155,13 @@ def observation_from_states(
     *,
     files: Mapping[str, str] | None = None,
     columns: Sequence[str] | None = None,
-    constants: Mapping[str, float] | None = None,
 ) -> Observation:
     """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated
     before.
 
     columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
     """
-    wanted = Columns(model, columns, constants)
+    wanted = Columns(model, columns)
     return observation_of(wanted, states, torque, selection, files=files)
 
 
@@ -271,7 +191,7 @@ def observation_of(
     used = np.flatnonzero(selection.mask.any(axis=0))
     inside = slice(used[0], used[-1] + 1)
     store = columns.decimated(window, selection.plan, inside)
-    selection = certain(model, states, selection, columns.constants)
+    selection = certain(model, states, selection)
     if not selection.mask.any():
         left_out = nothing_left(selection.dropped, K)
         raise InputError(left_out, file=", ".join(files or ()) or None)
@@ -296,7 +216,6 @@ def certain(
     model: GeneratedModel,
     states: States,
     selection: Selection,
-    constants: Mapping[str, float] | None = None,
 ) -> Selection:
     """The selection without rows in which missing positions leave the state unknown ("missing") or
     the direction of dry friction is uncertain
@@ -304,9 +223,32 @@ def certain(
     if states.errors is None:
         return selection
     known = selection.mask & states.errors[selection.samples][selection.kept].known
-    mask = known & certain_rows(model, states[selection.samples][selection.kept], constants)
+    mask = known & certain_rows(model, states[selection.samples][selection.kept])
     dropped = dict(selection.dropped)
     for reason, before, after in (("missing", selection.mask, known), ("direction", known, mask)):
         left_out = before.sum(axis=1) - after.sum(axis=1) + np.array(dropped.get(reason, 0))
         dropped[reason] = tuple(left_out.tolist())
     return replace(selection, mask=mask, dropped=dropped)
+
+
+def stacked(
+    model: GeneratedModel, records: Sequence[Prepared], columns: Sequence[str] | None = None
+) -> Observation:
+    """Y = W X + rho of several records as one system; columns : default: all."""
+    if not records:
+        raise InputError("no record to observe")
+    parts = [record.observation(model, columns) for record in records]
+    return parts[0] if len(parts) == 1 else stack(parts)
+
+
+def with_torques(
+    observation: Observation, records: Sequence[Prepared], torques: Sequence[Array]
+) -> Observation:
+    """The same rows of W beside other torques, shape (N, n), of the records observed."""
+    Y = np.empty_like(observation.Y)
+    for number, (own, tau) in enumerate(zip(records, torques, strict=True)):
+        rows = observation.record == number
+        Y[rows] = decimated_torque(tau, own.selection)[
+            observation.joints[rows], np.searchsorted(own.selection.t, observation.t[rows])
+        ]
+    return replace(observation, Y=Y)

@@ -9,7 +9,7 @@ decimated piece by piece: the signals are not stored.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -54,26 +54,22 @@ class Columns:
     names : sequence of str, optional
         Base parameters of the columns wanted, in the order wanted; default: all b. Others are not
         filtered.
-    constants : mapping, optional
-        Values in place of the robot file's.
     """
 
     def __init__(
         self,
         model: GeneratedModel,
         names: Sequence[str] | None = None,
-        constants: Mapping[str, float] | None = None,
     ) -> None:
         self.model = model
         self.names = tuple(model.BASE_PARAMETERS) if names is None else tuple(names)
-        self.constants = dict(constants or {})
         self._rooms: dict[int, tuple[Array, Array]] = {}
 
     @cached_property
     def entries(self) -> Entries:
         """Where the distinct signals of these columns stand."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
-        return distinct_entries(self.model, self.constants, numbers)
+        return distinct_entries(self.model, numbers)
 
     def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
         """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of
@@ -117,9 +113,7 @@ class Columns:
         store, signals = self._rooms[B]
         timed = in_time(self.model, states)
         try:
-            D = self.model.regressor(
-                states.q, states.qd, states.qdd, out=store, **self.constants, **timed
-            )
+            D = self.model.regressor(states.q, states.qd, states.qdd, out=store, **timed)
         except ValueError as e:  # what an emitted module of a general loop raises
             raise InputError(
                 f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the "
@@ -143,9 +137,7 @@ def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
     return {c: states.channels[c] for c in channels}
 
 
-def distinct_entries(
-    model: GeneratedModel, constants: Mapping[str, float], columns: Array | None = None
-) -> Entries:
+def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Entries:
     """Entries of STRUCTURE in the columns (default: all) grouped by equal values, up to the sign,
     at random states.
 
@@ -157,7 +149,7 @@ def distinct_entries(
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
     k = columns[row]
     place = k * len(model.JOINTS) + j
-    values = _probed(model, constants)[k, j]
+    values = _probed(model)[k, j]
     if not np.isfinite(values).all():
         every = np.arange(len(k))
         return Entries(row, k, j, every, np.ones(len(k)), every, place)
@@ -169,7 +161,7 @@ def distinct_entries(
     return Entries(row, k, j, which, sign * sign[source][which], source, place[source])
 
 
-def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:
+def _probed(model: GeneratedModel) -> Array:
     """The store at random states, shape (b, n, PROBES); nan where a loop does not close at one of
     them.
     """
@@ -179,9 +171,7 @@ def _probed(model: GeneratedModel, constants: Mapping[str, float]) -> Array:
     try:
         with np.errstate(all="ignore"):
             return np.asarray(
-                model.regressor(
-                    q, qd, qdd, out=model.store(PROBES), **constants, **timed
-                ).transpose(2, 1, 0)
+                model.regressor(q, qd, qdd, out=model.store(PROBES), **timed).transpose(2, 1, 0)
             )
     except ValueError:  # what an emitted module of a general loop raises
         return np.full((len(model.BASE_PARAMETERS), len(model.JOINTS), PROBES), np.nan)

@@ -118,6 +118,16 @@ def window_of(
     return max(start, margin), min(stop, len(t) - margin)
 
 
+EXCERPT = 2**16
+"""Samples of a record by which settings that are automatic are found."""
+
+
+def excerpt(record: Record, rows: Rows) -> slice:
+    """The first EXCERPT samples of a record in the window of the rows."""
+    start, stop = window_of(record.t, rows.window, record.name)
+    return slice(start, min(stop, start + EXCERPT))
+
+
 def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
     """Window and decimation of a record at the times t, shape (N,), s, at a rate, Hz.
 
@@ -245,7 +255,6 @@ def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
 def certain_rows(
     model: GeneratedModel,
     states: States,
-    constants: Mapping[str, float] | None = None,
     *,
     deviations: float = UNCERTAIN,
 ) -> Array:
@@ -258,7 +267,7 @@ def certain_rows(
     certain = np.ones(states.q.T.shape, dtype=bool)
     if states.errors is not None:
         certain &= states.errors.known
-        for switch in switches(model, model.BASE_PARAMETERS, constants, passive="left out"):
+        for switch in switches(model, model.BASE_PARAMETERS, passive="left out"):
             certain[list(switch.joints)] &= np.abs(
                 states.qd @ switch.G
             ) >= deviations * states.errors.along(switch.G)

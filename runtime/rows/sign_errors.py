@@ -23,7 +23,7 @@ References: Price (1958) and Bussgang (1952) for the covariances; Mehler's expan
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial
 from typing import Literal
@@ -113,16 +113,14 @@ class Switched:
 def switches(
     model: GeneratedModel,
     names: Sequence[str],
-    constants: Mapping[str, float] | None = None,
     passive: Literal["refused", "left out"] = "refused",
 ) -> tuple[Switch, ...]:
     """Columns among `names` that switch, from the elements of the model; ModelError where it has
     none.
 
-    constants : values in place of the robot file's.
     passive : what is done about one that acts along a passive joint.
     """
-    elements = elements_of(model, constants)
+    elements = elements_of(model)
     switching = []
     for column, name in enumerate(names):
         element = elements.get(name, elements.get(name.removesuffix("R")))

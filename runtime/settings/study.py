@@ -144,7 +144,7 @@ class Signals(Settings):
     torque_median : int or str
         Window of the median filter on torques; auto: as on positions, but none where it would take
         torque that goes with the motion, as from a controller that answers every count
-        (`runtime.signals.torque_median`).
+        (`runtime.median`).
     """
 
     median: OddWindow = 5

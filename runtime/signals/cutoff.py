@@ -30,9 +30,6 @@ from runtime.signals.filters import median_filtered
 
 Array = np.ndarray
 
-EXCERPT = 2**16
-"""Samples of a record that are looked at."""
-
 
 def cutoff(
     positions: Sequence[tuple[Array, float]],
@@ -43,7 +40,7 @@ def cutoff(
 
     positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
     crossing : Hz, from which on recorded velocities stand for differences of q
-        (`runtime.signals.recorded_speed`).
+        (`runtime.speeds`).
     """
     low, parts = signals.lowpass or Lowpass(), []
     highest = LIMIT.HIGHEST_CUTOFF * min((rate for _, rate in positions), default=np.inf)

@@ -103,7 +103,7 @@ def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = N
 
 def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
     """v + L (qd - v), shape (N, n), of differences qd and recorded velocities v; L the zero-phase
-    first-order low-pass at `crossing`, Hz (`runtime.signals.recorded_speed`).
+    first-order low-pass at `crossing`, Hz (`runtime.speeds`).
     """
     mixed = qd.copy()
     for j, f in enumerate(np.broadcast_to(crossing, qd.shape[1:]).tolist()):

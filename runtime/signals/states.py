@@ -1,17 +1,15 @@
-"""Joint states of measured positions, by the reader that the study names.
+"""Joint states of measured positions: the readers.
 
 lowpass    positions as they are, filtered and differentiated (`runtime.signals.filters`)
-counts
-    positions as counts of encoders (`runtime.signals.counts.reading`), whose posterior mean is then
-    filtered alike; errors of the
-           velocities are known
+counts     positions as counts of encoders (`runtime.signals.counts.reading`), whose posterior mean is then filtered alike; errors of the velocities are known
 static     poses at rest: q as it is, qd = qdd = 0
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,51 +25,32 @@ from runtime.signals.filters import SpeedErrors, States, filtered_states
 Array = np.ndarray
 
 
-def observed_states(
-    q: Array,
-    rate: float,
-    signals: Signals,
-    drives: Drives | None = None,
-    *,
-    missing: Missing | None = None,
-    name: str = "record",
-    v: Array | None = None,
-) -> States:
-    """q, qd, qdd of measured joint positions by the reader of the study.
+Reader: TypeAlias = Callable[[Record, Signals], States]
+"""From a record to its joint states q, qd, qdd, shape (N, n) each, by the settings of the signals."""
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, n), rad or m
-        Joint side.
-    rate : float, Hz
-        Sampling rate.
-    signals : Signals
-        Reader and filters.
-    drives : Drives, optional
-        Motor side, where signals.side asks for it.
-    missing : Missing, optional
-        Samples of q that hold no position.
-    name : str
-        What errors call the record.
-    v : ndarray, shape (N, n), optional
-        Recorded velocities, for reader lowpass.
+
+def lowpassed(record: Record, signals: Signals) -> States:
+    """Reader `lowpass`: positions as they are, median, low-pass and central differences (`runtime.signals.filters`)."""
+    require_positions(record.missing, "reader: lowpass", record.name, COUNTS)
+    return filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
+
+
+def counted(record: Record, signals: Signals) -> States:
+    """Reader `counts`: positions as counts of encoders, whose posterior mean goes through the filters of the study.
 
     Raises
     ------
     InputError
-        Positions are missing that the reader needs, or are no counts
-        (`runtime.signals.counts.reading.read_counts`).
+        Positions that are no counts (`runtime.signals.counts.reading.read_counts`).
     """
-    if signals.reader != "counts":
-        require_positions(missing, f"reader: {signals.reader}", name, COUNTS)
-        rest = np.zeros_like(q)
-        static = signals.reader == "static"
-        return States(q, rest, rest) if static else filtered_states(q, rate, signals, v)
-    drives = encoder_drives(signals.side, drives)
-    position = encoder_position(q, drives, missing)
-    reading = read_counts(position, rate, signals.step, name=name)
-    states = _joint_states(*reading.motion, rate, signals, drives)
-    return replace(states, findings=sentences(reading.findings, name))
+    drives = encoder_drives(signals.side, record.origin.drives)
+    position = encoder_position(record.q, drives, record.missing)
+    reading = read_counts(position, record.rate, signals.step, name=record.name)
+    q, deviation = reading.motion
+    q = q if drives is None else drives.joint_position(q)
+    states = filtered_states(q, record.rate, replace(signals, median=1))
+    errors = SpeedErrors(deviation, encoder_root(drives, q.shape[1]))
+    return replace(states, errors=errors, findings=sentences(reading.findings, record.name))
 
 
 def require_motion(signals: Signals, who: str) -> None:
@@ -100,20 +79,6 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
 def sentences(findings: Iterable[str], name: str) -> tuple[str, ...]:
     """Findings of one record as sentences that name it."""
     return tuple(f"{name}: {text}." for text in findings)
-
-
-def _joint_states(
-    x: Array, deviation: Array, rate: float, signals: Signals, drives: Drives | None
-) -> States:
-    """States of positions x read at the encoders, shape (N, n), joint side, through the filters of
-    the study.
-
-    deviation : of their velocities, shape (N, n), per s; infinite where the state is unknown.
-    drives : None for encoders on the joint side.
-    """
-    q = x if drives is None else drives.joint_position(x)
-    states = filtered_states(q, rate, replace(signals, median=1))
-    return replace(states, errors=SpeedErrors(deviation, encoder_root(drives, q.shape[1])))
 
 
 def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:

@@ -38,7 +38,7 @@ def report(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.identification.identification import assess
+        from runtime.compose import assess
         from runtime.json_documents import json_text
         from runtime.reading.records import read_records
 

@@ -73,7 +73,10 @@ class Demonstration:
         """Contents of the output folder, by file name."""
         simulated = bool(self.prepared.note)
         kind = "SIMULATED record, nothing measured" if simulated else "public measured record"
-        result = replace(self.result, study=located(self.result.study, folder))
+        result = replace(
+            self.result,
+            problem=self.result.problem.changed(settings=located(self.result.study, folder)),
+        )
         files = identification_files(
             result,
             folder,

@@ -163,16 +163,16 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """
     from runtime.identification.schemas import load_whole_estimate
     from runtime.identification.validation import direct_comparison
-    from runtime.rows.prepared import prepared
 
     place = Path(request["run"])
     loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
     fit = load_whole_estimate(place / "estimate.json")
-    own = prepared(loaded, record, study)
+    problem = runtime.problem(loaded, record, study)
+    own = problem.prepared[0]
     selection, K = own.selection, len(own.selection.kept)
     shown = np.unique(np.linspace(0, K - 1, min(K, INSTANTS_DRAWN)).astype(int))
     torques = np.full((2, len(loaded.JOINTS), K), np.nan)
-    for j, joint in enumerate(direct_comparison(own.observation(loaded), fit)):
+    for j, joint in enumerate(direct_comparison(own.observation(problem.model), fit)):
         rows = np.searchsorted(selection.t, joint.t).clip(max=K - 1)
         torques[:, j, rows] = joint.measured, joint.predicted
     return {

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 import runtime
 import symgen
+from runtime.compose import payload
 from runtime.errors import InputError
-from runtime.identification.payload_study import payload_study
 from runtime.model.generated import load_model
 from runtime.reading.records import read_records
 from symgen.cli.main import app
@@ -109,7 +109,7 @@ def test_gains_correct_the_constants_of_the_record_and_the_load(folder, tmp_path
         read_records(settings, model, folder=tmp_path)
         for settings in (study.record, study.payload.record)
     )
-    found = payload_study(model, records, loaded, study)
+    found = payload(model, records, study, loaded=loaded)
     gains, carried = found.gains, found.payload
     np.testing.assert_allclose(gains.constant, told)
     np.testing.assert_allclose(gains.together * gains.constant, true, rtol=0.01)
@@ -121,7 +121,7 @@ def test_gains_correct_the_constants_of_the_record_and_the_load(folder, tmp_path
     other = replace(study.payload.record[0], torque_constant=(2.0, 5.0))
     mixed = read_records((other,), model, folder=tmp_path)
     with pytest.raises(InputError, match="different torque constants"):
-        payload_study(model, records, mixed, study)
+        payload(model, records, study, loaded=mixed)
 
 
 def test_feasible(folder, tmp_path) -> None:

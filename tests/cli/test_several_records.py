@@ -10,11 +10,11 @@ from campaign import campaign
 from typer.testing import CliRunner
 
 from runtime import load_model
+from runtime.compose import observe
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
 from runtime.identification.validation import record_errors
 from runtime.reading.records import read_records
-from runtime.rows.observe import observe
 from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 

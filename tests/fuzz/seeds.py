@@ -279,12 +279,11 @@ def checkpoint_arrays() -> dict[str, np.ndarray]:
 
 @cache
 def estimate_file() -> bytes:
-    from runtime.loop.methods import estimate_of
+    from runtime.compose import estimate_of, observe
     from runtime.model.generated import load_model
     from runtime.model.loading import run
     from runtime.records.record import Record
     from runtime.rows.observation import stack
-    from runtime.rows.observe import observe
     from runtime.settings.study import study_from_mapping
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module

@@ -11,16 +11,15 @@ from campaign import campaign
 from planar_data import TRUE, motion, record
 from scipy.stats import t
 
+from runtime.compose import cestac, estimate_of, observe
 from runtime.errors import InputError, SettingsError
-from runtime.loop.methods import estimate_of
 from runtime.model.drives import Drives
 from runtime.parallel import processes
-from runtime.resolution.cestac import cestac, key_blocks, levels_of
+from runtime.resolution.cestac import key_blocks, levels_of
 from runtime.resolution.perturbed import perturbed_position, perturbed_torque
 from runtime.resolution.result import deciding_names, level_result, runs_needed
 from runtime.resolution.runs import Level, Run, Runs
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
 from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.selection import select_rows
 from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Rows, Signals, Study

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_data import motion
+from problems import observed_states
 
 import symgen
+from runtime.compose import cestac
 from runtime.errors import InputError, SettingsError
 from runtime.records.record import Record
-from runtime.resolution.cestac import cestac
 from runtime.resolution.own_encoder import own_encoder
 from runtime.resolution.rounding import rounded, stream
 from runtime.rows.prepared import decimated_torque, observation_from_states
@@ -17,7 +18,6 @@ from runtime.rows.selection import select_rows
 from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import filtered_states
-from runtime.signals.states import observed_states
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20), reader="counts")
 TIME = np.arange(6000) / 1000.0

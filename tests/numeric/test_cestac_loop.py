@@ -7,18 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaign import campaign
+from problems import loop_of_records
 from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 
+from runtime.compose import cestac, estimate_of, observe
 from runtime.errors import InputError, SettingsError
-from runtime.loop.closed_loop import closed_loop
-from runtime.loop.methods import estimate_of
 from runtime.loop.simulation import Simulator
 from runtime.parallel import processes
-from runtime.resolution.cestac import cestac
 from runtime.resolution.loop import loop_of
 from runtime.resolution.rounding import rounded, stream
 from runtime.resolution.runs import Level
-from runtime.rows.observe import observe
 from runtime.settings.study import CestacSettings, EstimateSettings, study_from_mapping
 
 STEP = 2e-4
@@ -71,8 +69,8 @@ def test_instruments_on_rounded_positions(arm, study, record, simulator):  # noq
     instruments = method(study, "iv", start=start, gains="one")
     found = cestac(model, record, instruments, simulator=simulator)
     q = rounded(record.q, STEP, "phase", stream(1, 0, 0))
-    selected = closed_loop(model, [record], instruments, simulator).measured()
-    by_hand = closed_loop(model, [replace(record, q=q)], instruments, simulator).measured()
+    selected = loop_of_records(model, [record], instruments, simulator).measured()
+    by_hand = loop_of_records(model, [replace(record, q=q)], instruments, simulator).measured()
     assert np.allclose(
         found.levels[0].runs[0].X,
         estimate_of(by_hand, instruments.estimate, model=model).X,

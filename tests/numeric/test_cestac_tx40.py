@@ -11,14 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from runtime.compose import cestac, estimate_of, observe
 from runtime.estimators.essential import essential_of
 from runtime.identification.validation import split_validation
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.resolution.cestac import cestac
-from runtime.rows.observe import observe
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 MODEL = Path(__file__).resolve().parents[2] / "generated" / "tx40.py"

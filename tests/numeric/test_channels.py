@@ -14,11 +14,10 @@ from scipy.optimize import least_squares
 
 import runtime
 import symgen
+from runtime.compose import problem
 from runtime.errors import InputError, ModelError
-from runtime.identification.transmitted import transmitted
 from runtime.model.generated import require
 from runtime.reading.records import read_records
-from runtime.rows.prepared import prepared
 from runtime.settings.study import study_from_mapping
 from symgen.certify.modules import certified_files
 from symgen.description.yaml import parse_robot
@@ -187,7 +186,7 @@ def test_the_load_is_least_squares_on_everything(model) -> None:
     an effect in proportion to c.
     """
     record, _ = record_of(model, 0.15)
-    (own,), _, _ = transmitted(model, [prepared(model, record, STUDY)], [], False)
+    (own,) = problem(model, record, STUDY).prepared
     rows = own.observation(model)
     X = np.linalg.lstsq(rows.W, rows.Y, rcond=None)[0]
     k = rows.names.index("LD2")
@@ -218,8 +217,6 @@ def test_what_does_not_have_channels_refuses(model) -> None:
         warnings.simplefilter("ignore")
         for ask in (
             lambda: runtime.identify(model, bare, STUDY),
-            lambda: runtime.cestac(model, record, STUDY),
-            lambda: runtime.advise(model, record, STUDY),
             lambda: runtime.excite(model, record, STUDY),
         ):
             with pytest.raises(

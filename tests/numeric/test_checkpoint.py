@@ -17,8 +17,8 @@ import planar_2r_model as planar
 import pytest
 from planar_data import record
 
+from runtime.compose import cestac
 from runtime.errors import InputError
-from runtime.resolution.cestac import cestac
 from runtime.resolution.checkpoint import Checkpoint
 from runtime.resolution.runs import Run, Runs
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study

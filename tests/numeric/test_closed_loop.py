@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import campaign, some
+from problems import loop_of_records
 
 from runtime import InputError, Record, identify, load_model
+from runtime.compose import estimate_of, observe
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
-from runtime.loop.closed_loop import closed_loop, loop_of, slips
+from runtime.loop.closed_loop import loop_of, slips
 from runtime.loop.control_law import parameters_of
-from runtime.loop.methods import estimate_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulated_motion import judged, simulated_motion
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.rows.observe import observe
 from runtime.settings.controller import ReferenceSettings
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
@@ -82,7 +82,7 @@ def clean(arm):
     """A record without noise, and its rows with the loop."""
     model, study, simulator, truth, reference = arm
     record = simulator.run(truth, reference).record()
-    return record, closed_loop(model, [record], study, simulator, around=0.05).measured()
+    return record, loop_of_records(model, [record], study, simulator, around=0.05).measured()
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +151,7 @@ def test_emps_record(emps, axes, method, masked, expected):
     """
     model, study, records = emps
     study = replace(study, rows=replace(study.rows, low_speed=0.01 if masked else 0.0))
-    seen = closed_loop(
+    seen = loop_of_records(
         model, records[:1], study, axes[0], around=0.02 if masked else 0.0
     ).measured()
     found = estimate_of(seen, EstimateSettings(method), model=model)
@@ -167,7 +167,7 @@ def test_emps_delay_moves_didim_and_spares_instruments(emps, axes):
     delay is a setting to compare.
     """
     model, study, records = emps
-    seen = closed_loop(model, records[:1], study, axes[1]).measured()
+    seen = loop_of_records(model, records[:1], study, axes[1]).measured()
     didim, iv = (
         estimate_of(seen, EstimateSettings(method), model=model) for method in ("didim", "iv")
     )
@@ -184,7 +184,7 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
     the message says what to start from.
     """
     model, study, records = emps
-    seen = closed_loop(model, records[:1], study, axes[0]).measured()
+    seen = loop_of_records(model, records[:1], study, axes[0]).measured()
     for method, M in (("iv", 95.141), ("didim", 94.890)):
         found = estimate_of(seen, EstimateSettings(method, options={"start": "unit"}), model=model)
         assert found.status == "ok" and found["M1R"] == pytest.approx(M, rel=1e-4)
@@ -209,7 +209,7 @@ def test_unit_start_needs_gains_that_follow(emps, axes):
 def test_instruments_of_another_motion_are_weak(emps, axes):
     model, study, records = emps
     record = records[0]
-    loop = closed_loop(model, [record], study, axes[0])
+    loop = loop_of_records(model, [record], study, axes[0])
     other_motion = 0.05 * (1 - np.cos(2 * np.pi * 0.7 * record.t[:, None])) + record.q_r[0]
     other = replace(
         loop, parts=(replace(loop.parts[0], reference=Reference.sampled(other_motion, 1000.0)),)
@@ -228,7 +228,7 @@ def test_rows_of_stacked_records(emps, axes):
     them and of a window.
     """
     model, study, records = emps
-    loop = closed_loop(
+    loop = loop_of_records(
         model, records, replace(study, rows=replace(study.rows, low_speed=0.01)), axes[0]
     )
     seen = loop.measured()
@@ -261,13 +261,13 @@ def test_slow_rows_are_those_where_a_friction_rests():
 def test_slow_rows_around(arm, clean):
     model, study, simulator, _, _ = arm
     near, alone = (
-        closed_loop(model, [clean[0]], study, simulator, around=around).measured()
+        loop_of_records(model, [clean[0]], study, simulator, around=around).measured()
         for around in (0.05, 0.0)
     )
     assert sum(near.rows) < sum(alone.rows) - 50
     every = replace(study, rows=replace(study.rows, low_speed=0.0))
     assert (
-        closed_loop(model, [clean[0]], every, simulator, around=0.05).measured().rows
+        loop_of_records(model, [clean[0]], every, simulator, around=0.05).measured().rows
         == observe(model, clean[0], every).rows
     )
 
@@ -282,7 +282,7 @@ def test_gaps_of_positions_stay_out_of_the_loop(arm, clean):
         clean[0], q=np.where(gap, np.nan, np.round(clean[0].q / 1e-4) * 1e-4), missing=gap
     )
     counted = replace(study, signals=replace(study.signals, reader="counts", step=1e-4))
-    loop = closed_loop(model, [record], counted, simulator, around=0.05)
+    loop = loop_of_records(model, [record], counted, simulator, around=0.05)
     selection, observation = loop.parts[0].selection, loop.measured()
     assert (
         not selection.mask[:, (selection.t > 0.99) & (selection.t < 1.41)].any()
@@ -316,18 +316,20 @@ def test_unknown_reference(arm, clean):
         replace(study.controller, reference=replace(study.controller.reference, motion=None)),
     )
     with pytest.raises(SettingsError, match=r"what the controller followed in .* is not known"):
-        closed_loop(model, [record], study, blind)
+        loop_of_records(model, [record], study, blind)
     with pytest.raises(SettingsError, match="expected known or measured"):
-        closed_loop(model, [record], study, blind, reference="guessed")
+        loop_of_records(model, [record], study, blind, reference="guessed")
     with pytest.raises(SettingsError, match="expected at least 0"):
-        closed_loop(model, [record], study, simulator, around=-1.0)
+        loop_of_records(model, [record], study, simulator, around=-1.0)
     with pytest.raises(InputError, match="the reference ends after"):
         longer = replace(
             record, t=np.arange(6000) / 1000, q=np.zeros((6000, 2)), tau=np.zeros((6000, 2))
         )
-        closed_loop(model, [longer], study, simulator)
+        loop_of_records(model, [longer], study, simulator)
     found = estimate_of(
-        closed_loop(model, [record], study, blind, reference="measured", around=0.05).measured(),
+        loop_of_records(
+            model, [record], study, blind, reference="measured", around=0.05
+        ).measured(),
         EstimateSettings("iv"),
         model=model,
     )
@@ -388,7 +390,7 @@ def test_a_record_slower_than_its_controller_is_its_own_reference(arm, every):
         own,
         signals=replace(own.signals, decimate=replace(own.signals.decimate, factor=40 // every)),
     )
-    loop = closed_loop(model, [record], own, Simulator(model, own.controller), around=0.05)
+    loop = loop_of_records(model, [record], own, Simulator(model, own.controller), around=0.05)
     assert loop.assumption == "" and all(
         fit.share > 90 and abs(fit.factor - 1) < 0.05 for fit in loop.law
     )
@@ -403,9 +405,13 @@ def test_a_record_slower_than_its_controller_is_its_own_reference(arm, every):
             rf"{every}"
         ),
     ):
-        closed_loop(model, [record], own, Simulator(model, replace(own.controller, record_every=1)))
+        loop_of_records(
+            model, [record], own, Simulator(model, replace(own.controller, record_every=1))
+        )
     with pytest.raises(SettingsError, match="is no multiple"):
-        closed_loop(model, [record], own, Simulator(model, replace(own.controller, rate=3700.0)))
+        loop_of_records(
+            model, [record], own, Simulator(model, replace(own.controller, rate=3700.0))
+        )
 
 
 def test_a_law_of_other_gains_is_told_before_the_simulation(arm, clean):
@@ -415,7 +421,7 @@ def test_a_law_of_other_gains_is_told_before_the_simulation(arm, clean):
     model, study, _, _, _ = arm
     law = replace(study.controller.law, kp=(1200, 360), kd=(90, 24))
     own = replace(study, controller=replace(study.controller, law=law))
-    loop = closed_loop(model, [clean[0]], own, Simulator(model, own.controller), around=0.05)
+    loop = loop_of_records(model, [clean[0]], own, Simulator(model, own.controller), around=0.05)
     for fit in loop.law:
         assert fit.share < 0 and fit.best > 90 and fit.factor == pytest.approx(1 / 3, rel=0.03)
     found = estimate_of(loop.measured(), EstimateSettings("didim"), model=model)
@@ -438,7 +444,7 @@ def test_recorded_feedforward_and_known_torques_are_in_the_loop(arm):
         study,
         controller=replace(study.controller, feedforward="record", reference=ReferenceSettings()),
     )
-    loop = closed_loop(model, [record], own, Simulator(model, own.controller), around=0.05)
+    loop = loop_of_records(model, [record], own, Simulator(model, own.controller), around=0.05)
     assert all(fit.share > 90 for fit in loop.law)
     found = estimate_of(loop.measured(), EstimateSettings("didim"), model=model)
     assert found.status == "ok", found.message
@@ -446,9 +452,9 @@ def test_recorded_feedforward_and_known_torques_are_in_the_loop(arm):
     with pytest.raises(
         SettingsError, match=r"no feed-forward torque; name its columns in record\.columns\.tau_ff"
     ):
-        closed_loop(model, [Record(run.t, run.q, run.tau, q_r=run.q_r)], own, loop.simulator)
+        loop_of_records(model, [Record(run.t, run.q, run.tau, q_r=run.q_r)], own, loop.simulator)
     rounded = replace(record, q=np.round(record.q, 6))
-    again = closed_loop(model, [rounded], own, loop.simulator, around=0.05)
+    again = loop_of_records(model, [rounded], own, loop.simulator, around=0.05)
     assert all(fit.share > 90 for fit in again.law)
 
 
@@ -458,7 +464,7 @@ def test_a_simulation_that_does_not_follow_is_no_result(arm, clean):
     """
     model, study, simulator, truth, reference = arm
     other = Reference.sampled(reference.q[::-1].copy(), reference.rate)
-    loop = closed_loop(model, [clean[0]], study, simulator, around=0.05)
+    loop = loop_of_records(model, [clean[0]], study, simulator, around=0.05)
     loop = replace(loop, parts=tuple(replace(part, reference=other) for part in loop.parts))
     status, message, details = judged(loop, loop.measured(), truth)
     assert status == "simulation-apart" and details["motion"][0]["position"] > 20
@@ -511,6 +517,6 @@ def test_a_law_with_an_integral_explains_its_own_record(arm, antiwindup):
     own = replace(study, controller=replace(study.controller, law=law))
     simulator = Simulator(model, own.controller)
     record = simulator.run(truth, reference).record()
-    loop = closed_loop(model, [record], own, simulator, around=0.05)
+    loop = loop_of_records(model, [record], own, simulator, around=0.05)
     for fit in loop.law:
         assert fit.share > 99 and fit.delay == 0 and fit.factor == pytest.approx(1, abs=0.01)

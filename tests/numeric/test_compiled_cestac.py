@@ -19,6 +19,7 @@ from oracles.random_robots import random_robot
 from runtime import load_model
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import CompiledModel, compiled_model
+from runtime.compose import cestac, problem
 from runtime.errors import InputError
 from runtime.estimators.method import linear_system
 from runtime.model.drives import Drives
@@ -26,10 +27,9 @@ from runtime.parallel import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.records.record import Origin, Record
-from runtime.resolution.cestac import cestac
 from runtime.resolution.coarse_encoders import CoarseEncoders
 from runtime.resolution.perturbed import perturbed_position, system_of
-from runtime.rows.prepared import decimated_torque, prepared
+from runtime.rows.prepared import decimated_torque
 from runtime.rows.regressor import Columns
 from runtime.rows.selection import select_rows
 from runtime.settings.study import (
@@ -203,7 +203,7 @@ def test_positions_moved_by_an_encoder(planar, method):
     q = record.q.copy()
     q[:, 1] = step * np.round(q[:, 1] / step)
     for model in (planar.module, planar):
-        own, names = prepared(model, record, settings), planar.BASE_PARAMETERS
+        own, names = problem(model, record, settings).prepared[0], planar.BASE_PARAMETERS
         real = CoarseEncoders(model, [own], settings, names, None, {}, "phase", "lowpass")
         found = real.reference * real.ratios([real._counts(step, np.zeros(2), (1,), ())], (1,))[0]
         task = real.task

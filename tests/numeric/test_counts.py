@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from campaign import campaign, sampled
 from planar_data import motion
+from problems import observed_states
 from scipy.integrate import quad
 from scipy.stats import norm, truncnorm
 
 import runtime
 import symgen
 from runtime import load_model
+from runtime.compose import observe, problem
 from runtime.errors import InputError, SettingsError
 from runtime.model.generated import drives_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.records.record import Record
-from runtime.rows.observe import observe
-from runtime.rows.prepared import decimated_torque, observation_from_states, prepared
+from runtime.rows.prepared import decimated_torque, observation_from_states
 from runtime.rows.selection import UNCERTAIN, certain_rows, select_rows
 from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping
 from runtime.signals.counts.boxes import box_moments
@@ -30,7 +31,6 @@ from runtime.signals.counts.reading import MARGIN, STRETCH, read_counts, stretch
 from runtime.signals.counts.spline import Basis, Factor, next_density
 from runtime.signals.encoder_advice import encoder_sentences
 from runtime.signals.filters import filtered_states
-from runtime.signals.states import observed_states
 from symgen.demo.tx40_tables import MAIN
 
 GENERATED = Path(__file__).parents[2] / "generated"
@@ -488,7 +488,7 @@ def test_motor_counts_are_counts_whatever_the_coupling(coupling, tmp_path):
     )
     (record,) = read_records(study.record, model, folder=tmp_path)
     assert record.origin.drives.coupling == coupling
-    assert prepared(model, record, study).states.errors.known.all()
+    assert problem(model, record, study).prepared[0].states.errors.known.all()
     coarse = replace(
         study, cestac=CestacSettings(side="motor", rounding="phase", delta=6 * step, runs=2)
     )
@@ -502,7 +502,7 @@ def test_settings_of_counts_need_the_reader():
 
 def test_a_record_that_counts_would_help_is_told(planar, record):
     positions = replace(STUDY.signals, reader="lowpass", step=None)
-    own = prepared(planar, record, replace(STUDY, signals=positions))
+    own = problem(planar, record, replace(STUDY, signals=positions)).prepared[0]
     (text,) = encoder_sentences(record, own.states, positions, own.drives)
     assert "reader: counts" in text and "0.005" in text
     fine = Record(record.t, counted(motion(record.t)[0], 1e-6), record.tau, rate=1000.0)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from problems import resolved
 
 import runtime
 import symgen
-from runtime.rows.prepared import resolved
+from runtime.median import taken
 from runtime.settings.study import Signals, Study
 from runtime.signals.cutoff import cutoff
 from runtime.signals.filters import median_filtered
-from runtime.signals.torque_median import taken
 
 RATE = 1000.0
 T = np.arange(10_000) / RATE

@@ -15,8 +15,8 @@ import pytest
 from planar_data import record
 
 from runtime.cluster import cluster as mapped
+from runtime.compose import cestac
 from runtime.errors import InputError
-from runtime.resolution.cestac import cestac
 from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
 
 RECORD = record(N=3000)

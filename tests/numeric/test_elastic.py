@@ -13,10 +13,10 @@ from planar_data import TRUE
 from scipy.integrate import solve_ivp
 
 from runtime import identify
+from runtime.compose import problem
 from runtime.identification.elastic import elasticity
 from runtime.reading.records import read_records
 from runtime.records.record import Record
-from runtime.rows.prepared import Prepared
 from runtime.settings.study import Lowpass, Signals, Study, study_from_mapping
 
 RATE, N = 500.0, 6000
@@ -55,8 +55,7 @@ def record(seed=0, link=None):
 
 
 def found(seed=0, link=None):
-    own = [Prepared(record(seed, link), STUDY)]
-    return elasticity(planar, own, planar.BASE_PARAMETERS, TRUE)
+    return elasticity(problem(planar, record(seed, link), STUDY), planar.BASE_PARAMETERS, TRUE)
 
 
 def test_stiffness_and_damping_within_their_deviations():
@@ -91,7 +90,7 @@ def test_a_joint_without_second_encoder_and_one_that_tells_nothing():
     noise = 1e-2 * np.random.default_rng(5).standard_normal(motor.shape)
     told = found(link=motor + noise)
     assert np.isnan(told.K).all() and "no stiffness can be told" in told.sentences[0]
-    assert elasticity(planar, [Prepared(Record(t, motor, tau), STUDY)], (), np.zeros(0)) is None
+    assert elasticity(problem(planar, Record(t, motor, tau), STUDY), (), np.zeros(0)) is None
 
 
 def test_identify_tells_it_from_a_file(tmp_path):

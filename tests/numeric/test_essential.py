@@ -7,9 +7,9 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 
+from runtime.compose import estimate_of
 from runtime.errors import SettingsError
 from runtime.estimators.essential import essential_of
-from runtime.loop.methods import estimate_of
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 

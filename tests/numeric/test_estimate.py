@@ -7,9 +7,9 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
+from runtime.compose import estimate_of
 from runtime.estimators.estimate import Estimate
 from runtime.json_documents import json_text
-from runtime.loop.methods import estimate_of
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 from scipy.signal import lfilter
 
+from runtime.compose import METHODS, estimate_of
 from runtime.errors import SettingsError
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.method import LINEAR, linear_system
 from runtime.estimators.solution import null_groups, solve
-from runtime.loop.methods import METHODS, estimate_of
 from runtime.rows.factor import Factor, factor, merged
 from runtime.rows.observation import split_rows
 from runtime.settings.study import EstimateSettings

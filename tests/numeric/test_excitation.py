@@ -10,16 +10,14 @@ import numpy as np
 import pytest
 from campaign import campaign
 
+from runtime.compose import estimate_of, excite, observe, problem
 from runtime.errors import InputError, SettingsError
 from runtime.excitation.criteria import Weights, excesses, limits_of, planned, usage, weights_of
-from runtime.excitation.optimiser import Problem, improved, one_start, smoothed
-from runtime.excitation.search import excite
+from runtime.excitation.optimiser import Search, improved, one_start, smoothed
 from runtime.loop.dry_friction import dry_friction
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe
 from runtime.settings.excitation import ExcitationSettings, Sphere
 from runtime.settings.schema import structure
 from runtime.settings.study import Decimate, Lowpass, Signals, Study
@@ -150,9 +148,9 @@ def test_motion_within_limits_and_better_than_the_start(planar: tuple, criterion
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
     smooth = dry_friction(model).smooth
     once = replace(asked, iterations=1)
-    first = one_start(Problem(model, once, weights, limits, X, smooth), 0)
-    begun = planned(model, motion_from_mapping(first.motion), STUDY, asked.rate)
-    seen = planned(model, found.motion, STUDY, asked.rate)
+    first = one_start(Search(model, once, weights, limits, X, smooth), 0)
+    begun = planned(problem(model, (), STUDY), motion_from_mapping(first.motion), asked.rate)
+    seen = planned(problem(model, (), STUDY), found.motion, asked.rate)
     assert weights.relative_sigma(seen).max() < 0.8 * weights.relative_sigma(begun).max()
     assert found.condition == pytest.approx(np.linalg.cond(weights.matrix(seen)))
     parts = found.motion.parts
@@ -329,10 +327,10 @@ def test_a_wider_margin_starts_from_the_motion_found(planar: tuple) -> None:
     model, X = planar
     asked = settings()
     weights = weights_of(model, asked, dict(zip(model.BASE_PARAMETERS, X, strict=True)))
-    problem = Problem(
+    search = Search(
         model, asked, weights, limits_of(model, asked.limits), X, dry_friction(model).smooth
     )
-    start = one_start(problem, 0)
+    start = one_start(search, 0)
     motion = motion_from_mapping(start.motion)
-    again = improved(problem, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
+    again = improved(search, 0, Motion(tuple(Part(p.family, p.p) for p in motion.parts)))
     assert again.criterion <= start.criterion + 1e-3

@@ -19,10 +19,10 @@ import scipy.io
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
+from runtime.compose import estimate_of
 from runtime.estimators.estimate import Estimate, load_estimate
 from runtime.identification.schemas import json_schema
 from runtime.latex import escaped, name_cell, number_cell, unit_cell
-from runtime.loop.methods import estimate_of
 from runtime.reporting.arrays import (
     array_files,
     cestac_arrays,

@@ -15,6 +15,7 @@ from scipy.optimize import minimize
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
+from runtime.compose import estimate_of
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.feasibility import (
@@ -37,7 +38,6 @@ from runtime.estimators.method import linear_companion, linear_system
 from runtime.estimators.physical import negative_elements, reach_of
 from runtime.estimators.semidefinite import closest, everything
 from runtime.identification.validation import split_validation
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.reading.datasets import dataset_study

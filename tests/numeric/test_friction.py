@@ -11,9 +11,9 @@ import pytest
 from campaign import campaign
 
 from runtime import InputError, Record, observe
+from runtime.compose import estimate_of, problem
 from runtime.identification.friction import friction_curves, own_friction
 from runtime.identification.residuals import correlation_time, residual_correlation
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
@@ -74,7 +74,7 @@ def test_own_friction_of_a_joint(arm) -> None:
 
 def test_plain_friction_is_left_alone(arm) -> None:
     record, fit = simulated(arm, coulomb)
-    for curve in friction_curves(arm, [record], STUDY, fit):
+    for curve in friction_curves(problem(arm, [record], STUDY), fit):
         assert curve.law_name == "coulomb+viscous" and curve.note == ""
         true = {"FS": 0.8, "FV": 0.5, "OFFSET": 0.1}
         for name, value in true.items():
@@ -88,7 +88,7 @@ def test_stribeck_friction_is_found(arm) -> None:
         return coulomb(v, rigid) + 0.6 * np.sign(v) * np.exp(-((v / 0.3) ** 2))
 
     record, fit = simulated(arm, law)
-    for curve in friction_curves(arm, [record], STUDY, fit):
+    for curve in friction_curves(problem(arm, [record], STUDY), fit):
         assert (
             curve.law_name.startswith("stribeck")
             and "Stribeck effect" in curve.note
@@ -104,7 +104,7 @@ def test_friction_under_load_is_found(arm) -> None:
     record, fit = simulated(
         arm, lambda v, rigid: coulomb(v, rigid) + 0.1 * np.sign(v) * np.abs(rigid)
     )
-    for curve in friction_curves(arm, [record], STUDY, fit):
+    for curve in friction_curves(problem(arm, [record], STUDY), fit):
         assert curve.law_name in ("load", "stribeck+load")
         load = next(law for law in curve.laws if law.name == "load")
         assert (
@@ -117,8 +117,8 @@ def test_two_records_are_one_curve(arm) -> None:
     record, fit = simulated(arm, coulomb, seconds=15.0)
     other, _ = simulated(arm, coulomb, seconds=15.0, seed=1)
     one, two = (
-        friction_curves(arm, [record], STUDY, fit)[0],
-        friction_curves(arm, [record, other], STUDY, fit)[0],
+        friction_curves(problem(arm, [record], STUDY), fit)[0],
+        friction_curves(problem(arm, [record, other], STUDY), fit)[0],
     )
     assert len(two.v) == 2 * len(one.v) and two.laws[0].sigma["FV"] < one.laws[0].sigma["FV"]
 
@@ -141,7 +141,7 @@ def test_emps_has_the_published_asymmetric_friction(emps_data) -> None:
     study = study_from_mapping(dataset_study("emps"))
     records = read_records(study.record, emps)
     fit = estimate_of(observe(emps, records[0], study), study.estimate, model=emps)
-    (curve,) = friction_curves(emps, records, study, fit)
+    (curve,) = friction_curves(problem(emps, records, study), fit)
     assert curve.law_name == "asymmetric"
     published = {"FVP": 166.7061, "FSP": 20.1440, "FVN": 240.4236, "FSN": 20.6277}
     for name, value in published.items():
@@ -157,7 +157,7 @@ def test_tx40_record(tx40_data) -> None:
     study = study_from_mapping(dataset_study("tx40"))
     records = read_records(study.record, tx40)
     curves = friction_curves(
-        tx40, records, study, estimate_of(observe(tx40, records[0], study), model=tx40)
+        problem(tx40, records, study), estimate_of(observe(tx40, records[0], study), model=tx40)
     )
     assert [curve.joint for curve in curves] == list("123456")
     assert all(curve.law.held_out < curve.laws[0].held_out for curve in curves)
@@ -180,4 +180,4 @@ def test_tx40_record(tx40_data) -> None:
 def test_too_few_rows(arm) -> None:
     record, fit = simulated(arm, coulomb, seconds=0.6)
     with pytest.raises(InputError, match="a friction curve needs more of the record"):
-        friction_curves(arm, [record], STUDY, fit)
+        friction_curves(problem(arm, [record], STUDY), fit)

@@ -16,7 +16,7 @@ from campaign import campaign
 import runtime
 import runtime.rows.prepared
 from runtime import InputError
-from runtime.identification.identification import assess
+from runtime.compose import assess
 from runtime.records.provenance import origin, record_names
 from runtime.records.record import Origin
 from runtime.settings.location import located, study_text

@@ -11,14 +11,13 @@ from campaign import campaign
 from planar_data import OLS, TRUE, observation
 from scipy.optimize import least_squares
 
+from runtime.compose import estimate_of, observe
 from runtime.errors import SettingsError
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.irls import slope, weight
-from runtime.loop.methods import estimate_of
 from runtime.model.generated import load_model
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.rows.observe import observe
 from runtime.settings.study import EstimateSettings, study_from_mapping
 
 HUBER = EstimateSettings(method="irls")

@@ -11,9 +11,9 @@ from campaign import campaign
 
 import runtime
 import symgen
+from runtime.compose import estimate_of
 from runtime.errors import InputError
 from runtime.identification.validation import prediction_errors
-from runtime.loop.methods import estimate_of
 from runtime.reading.records import read_records
 from runtime.settings.study import EstimateSettings, study_from_mapping
 

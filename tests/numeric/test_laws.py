@@ -13,9 +13,9 @@ from scipy.optimize import least_squares
 
 import runtime
 import symgen
-from runtime.estimators.projection import LawProblem, Projection
-from runtime.identification.laws import fit_laws
-from runtime.rows.prepared import prepared
+from runtime.compose import problem
+from runtime.laws.projection import LawProblem, Projection
+from runtime.laws.scalars import fit_laws
 
 ARM = """
 symgen: 1
@@ -77,28 +77,28 @@ def record_of(model, noise: float, seed: int = 1, **changes: float):
 @campaign
 def test_variable_projection_is_least_squares_on_everything(model) -> None:
     """The same minimum of X and scalars together, found by scipy from 20 other starts."""
-    own = [prepared(model, record_of(model, 0.2), STUDY)]
-    problem = LawProblem(model, own, model.BASE_PARAMETERS)
-    rows = np.ones(len(problem.Y), dtype=bool)
-    u, cost, _ = Projection(problem, rows, np.ones(len(rows))).fitted([[0], [1], [2]])
+    own = [problem(model, record_of(model, 0.2), STUDY).prepared[0]]
+    laws = LawProblem(model, own, model.BASE_PARAMETERS)
+    rows = np.ones(len(laws.Y), dtype=bool)
+    u, cost, _ = Projection(laws, rows, np.ones(len(rows))).fitted([[0], [1], [2]])
     fit = fit_laws(model, own)
-    np.testing.assert_allclose([*fit.constants.values()], problem.values(u), rtol=1e-6)
-    b, Y = len(problem.names), problem.Y
+    np.testing.assert_allclose([*fit.constants.values()], laws.values(u), rtol=1e-6)
+    b, Y = len(laws.names), laws.Y
 
     def system(v):
-        W = problem.W.copy()
-        for c in problem.moving:
-            W[:, c] = problem.column(c, v)
+        W = laws.W.copy()
+        for c in laws.moving:
+            W[:, c] = laws.column(c, v)
         return W
 
     best = np.inf
-    for start in np.random.default_rng(5).uniform(problem.lower, problem.upper, (20, 3)):
+    for start in np.random.default_rng(5).uniform(laws.lower, laws.upper, (20, 3)):
         everything = least_squares(
             lambda x: Y - system(x[b:]) @ x[:b],
             np.concatenate([np.linalg.lstsq(system(start), Y, rcond=None)[0], start]),
             bounds=(
-                [*[-np.inf] * b, *problem.lower],
-                [*[np.inf] * b, *problem.upper],
+                [*[-np.inf] * b, *laws.lower],
+                [*[np.inf] * b, *laws.upper],
             ),
             x_scale="jac",
             xtol=1e-12,
@@ -110,10 +110,10 @@ def test_variable_projection_is_least_squares_on_everything(model) -> None:
 
 def test_kaufmans_jacobian_leads_to_a_stationary_point(model) -> None:
     """The gradient of the projected squares is zero there, by differences of the squares."""
-    own = [prepared(model, record_of(model, 0.2), STUDY)]
-    problem = LawProblem(model, own, model.BASE_PARAMETERS)
-    rows = np.ones(len(problem.Y), dtype=bool)
-    projection = Projection(problem, rows, np.ones(len(rows)))
+    own = [problem(model, record_of(model, 0.2), STUDY).prepared[0]]
+    laws = LawProblem(model, own, model.BASE_PARAMETERS)
+    rows = np.ones(len(laws.Y), dtype=bool)
+    projection = Projection(laws, rows, np.ones(len(rows)))
     u, cost, _ = projection.fitted([[0], [1], [2]])
     for k in range(3):
         h = np.eye(3)[k] * 1e-4
@@ -123,7 +123,7 @@ def test_kaufmans_jacobian_leads_to_a_stationary_point(model) -> None:
 
 
 def test_scalars_come_back_with_their_deviations(model) -> None:
-    fit = fit_laws(model, [prepared(model, record_of(model, 0.2), STUDY)])
+    fit = fit_laws(model, [problem(model, record_of(model, 0.2), STUDY).prepared[0]])
     for scalar in fit.scalars:
         assert not scalar.doubt
         assert abs(scalar.value - TRUE[scalar.name]) < 4 * scalar.sigma
@@ -134,7 +134,7 @@ def test_scalars_come_back_with_their_deviations(model) -> None:
 
 def test_several_minima_are_told(model) -> None:
     """Cogging with a negative amplitude is the same half a turn away: two minima as good."""
-    fit = fit_laws(model, [prepared(model, record_of(model, 0.05), STUDY)])
+    fit = fit_laws(model, [problem(model, record_of(model, 0.05), STUDY).prepared[0]])
     phase = fit.scalars[-1]
     assert phase.minima
     assert min(abs(abs(x - phase.value) - np.pi) for x in phase.minima) < 0.05
@@ -142,7 +142,7 @@ def test_several_minima_are_told(model) -> None:
 
 def test_a_law_that_is_not_there_is_a_sentence(model) -> None:
     record = record_of(model, 0.2, STR1=0.0)
-    fit = fit_laws(model, [prepared(model, record, STUDY)])
+    fit = fit_laws(model, [problem(model, record, STUDY).prepared[0]])
     first, second = fit.scalars[:2]
     assert first.doubt.startswith("not determined") and not second.doubt
     assert not fit.tests[0].earned

@@ -11,23 +11,23 @@ import polars
 import pytest
 from campaign import campaign
 from planar_data import motion
+from problems import observed_states
 from scipy.io import savemat
 from typer.testing import CliRunner
 
 import symgen
 from runtime import load_model
+from runtime.compose import cestac, observe
 from runtime.errors import InputError
 from runtime.model.drives import Drives
 from runtime.model.generated import drives_of
 from runtime.reading.records import read_record
 from runtime.records.missing import Missing, bridged
 from runtime.records.record import Record
-from runtime.resolution.cestac import cestac
-from runtime.rows.observe import observe
 from runtime.settings.record import RecordSettings
 from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study
 from runtime.signals.filters import filtered_states
-from runtime.signals.states import encoder_position, observed_states
+from runtime.signals.states import encoder_position
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).parents[2] / "generated"

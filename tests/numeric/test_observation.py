@@ -17,6 +17,7 @@ from runtime import Record, essential, estimate, load_model, observe
 from runtime.errors import InputError
 from runtime.identification.uncertainty import block_bootstrap
 from runtime.identification.validation import weak_directions
+from runtime.model.bound import BoundModel
 from runtime.records.record import Origin
 from runtime.rows.factor import factor
 from runtime.rows.observation import stack
@@ -245,7 +246,10 @@ def test_steps_of_a_resolution_study(record):
 
 
 def test_constants_in_place_of_the_robot_file(record):
-    a, b = observe(planar, record, study()), observe(planar, record, study(), constants={"g": 0.0})
+    a, b = (
+        observe(planar, record, study()),
+        observe(BoundModel(planar, {"g": 0.0}), record, study()),
+    )
     assert np.linalg.norm(a.W[:, 1]) > 0 and not b.W[:, 1].any()
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from runtime import InputError, Record, observe
+from runtime.compose import problem
 from runtime.errors import SettingsError
 from runtime.identification.drive_gains import drive_gains
 from runtime.identification.payload import payload
@@ -30,6 +31,12 @@ BOX = {
     "MZ": 0.3,
     "M": 2.0,
 }
+
+
+def readings(model, without, loaded):
+    """The records as the study reads them."""
+    whole = problem(model, without, STUDY, unseen=loaded)
+    return whole.prepared, whole.prepared_unseen
 
 
 def emitted(name: str):
@@ -145,7 +152,7 @@ def test_drive_gains_of_the_planar_arm() -> None:
     arm, true = emitted("planar_2r"), np.array([30.0, 12.0])
     load = {"M": 2.0, "MX": 0.6, "ZZ": 0.2}
     without, loaded = record(arm, {}, 1, 0.3, true), record(arm, load, 2, 0.3, true)
-    found = drive_gains(arm, [without], [loaded], STUDY, PayloadSettings(known={"M": 2.0}))
+    found = drive_gains(arm, *readings(arm, [without], [loaded]), PayloadSettings(known={"M": 2.0}))
     np.testing.assert_allclose(found.together, true, rtol=0.01)
     assert (np.abs(found.together - true) < 3.5 * found.sigma).all()
     assert abs(found.alone[0] - 30) < 3.5 * found.sigma_alone[0] and np.isnan(
@@ -156,7 +163,9 @@ def test_drive_gains_of_the_planar_arm() -> None:
         known=load | dict.fromkeys(("XX", "XY", "XZ", "YY", "YZ", "MY", "MZ"), 0.0)
     )
     exact = drive_gains(
-        arm, [record(arm, {}, 1, 0.0, true)], [record(arm, load, 2, 0.0, true)], STUDY, full
+        arm,
+        *readings(arm, [record(arm, {}, 1, 0.0, true)], [record(arm, load, 2, 0.0, true)]),
+        full,
     )
     np.testing.assert_allclose(exact.together, true, rtol=1e-3)
     np.testing.assert_allclose(exact.alone, true, rtol=1e-3)
@@ -172,7 +181,10 @@ def test_gains_over_runs_are_unbiased_and_have_the_stated_sigma() -> None:
         )
         runs.append(
             drive_gains(
-                arm, [without], [loaded], STUDY, PayloadSettings(known={"M": 1.0}), seed=seed
+                arm,
+                *readings(arm, [without], [loaded]),
+                PayloadSettings(known={"M": 1.0}),
+                seed=seed,
             )
         )
     z = np.array([(r.together - true) / r.sigma for r in runs])
@@ -188,7 +200,7 @@ def test_motors_the_load_does_not_change_are_refused() -> None:
     tx40 = emitted("tx40")
     point = dict.fromkeys(INERTIAL, 0.0) | {"M": 4.0}
     without, loaded = record(tx40, {}, 1, 0.3), record(tx40, point, 2, 0.3)
-    found = drive_gains(tx40, [without], [loaded], STUDY, PayloadSettings(known=point))
+    found = drive_gains(tx40, *readings(tx40, [without], [loaded]), PayloadSettings(known=point))
     np.testing.assert_allclose(found.together[[1, 2]], 1.0, atol=0.03)
     assert np.isnan(found.alone[4]) and np.isnan(found.alone[5])
     assert not 100 * found.sigma_alone[3] < 20 * abs(found.alone[3])
@@ -212,5 +224,7 @@ def test_bad_input() -> None:
         study_from_mapping({"payload": {"gains": True}})
     with pytest.raises(InputError, match="weighed mass"):
         drive_gains(
-            arm, [record(arm, {}, 1, 0.1)], [record(arm, {}, 2, 0.1)], STUDY, PayloadSettings()
+            arm,
+            *readings(arm, [record(arm, {}, 1, 0.1)], [record(arm, {}, 2, 0.1)]),
+            PayloadSettings(),
         )

@@ -15,9 +15,9 @@ from campaign import campaign, sampled, some
 import runtime
 import symgen
 from oracles.random_robots import random_parameters, random_robot
+from runtime.compose import estimate_of
 from runtime.estimators.semidefinite import LinearBounds, closest, everything
 from runtime.limits import LIMIT
-from runtime.loop.methods import estimate_of
 from runtime.model.inertia import physical_model
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares

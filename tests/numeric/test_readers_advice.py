@@ -8,14 +8,12 @@ import numpy as np
 from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
+from runtime.compose import advise, cestac, problem
 from runtime.limits import LIMIT
 from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing
-from runtime.resolution.advisor import advise
-from runtime.resolution.cestac import cestac
 from runtime.resolution.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.resolution.readers import curves
-from runtime.rows.prepared import prepared
 from runtime.settings.study import CestacSettings, Rows, Study
 from runtime.signals.filters import filtered_states
 
@@ -36,7 +34,14 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
     real = CoarseEncoders(
-        planar, [prepared(planar, RECORD, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
+        planar,
+        [problem(planar, RECORD, STUDY).prepared[0]],
+        STUDY,
+        NAMES,
+        None,
+        {},
+        "phase",
+        "lowpass",
     )
     change = real.asked(STEP)
     level = found.levels[0]
@@ -133,7 +138,14 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
         ),
     )
     real = CoarseEncoders(
-        planar, [prepared(planar, record, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
+        planar,
+        [problem(planar, record, STUDY).prepared[0]],
+        STUDY,
+        NAMES,
+        None,
+        {},
+        "phase",
+        "lowpass",
     )
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
@@ -176,7 +188,14 @@ def test_more_phases_at_the_steps_beside_a_limit():
 
 def test_further_nodes_lie_in_the_middle_between_those_before():
     real = CoarseEncoders(
-        planar, [prepared(planar, PART, STUDY)], STUDY, NAMES, None, {}, "phase", "lowpass"
+        planar,
+        [problem(planar, PART, STUDY).prepared[0]],
+        STUDY,
+        NAMES,
+        None,
+        {},
+        "phase",
+        "lowpass",
     )
     real._counts = lambda delta, phases, moving, key: phases
     few = PHASES["lowpass"]

@@ -10,12 +10,11 @@ import numpy as np
 import planar_2r_model as planar
 import pytest
 from planar_data import TRUE, motion
+from problems import resolved
 
 from runtime import identify
-from runtime.plausible.plausibility import plausibility
+from runtime.compose import observe, plausibility
 from runtime.records.record import Record
-from runtime.rows.observe import observe
-from runtime.rows.prepared import resolved
 from runtime.settings.study import Lowpass, Signals, Study
 from runtime.signals.filters import filtered_states
 

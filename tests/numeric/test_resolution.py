@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from runtime.compose import advise, observe
 from runtime.errors import InputError, ModelError, SettingsError
 from runtime.limits import LIMIT
 from runtime.model.generated import load_model
@@ -18,8 +19,7 @@ from runtime.reading.records import read_records
 from runtime.records.record import Record
 from runtime.reporting.resolution import advice_section
 from runtime.resolution.advice import crossing, sampled
-from runtime.resolution.advisor import ALL, Predictor, advise, torque_sigma
-from runtime.rows.observe import observe
+from runtime.resolution.advisor import ALL, Predictor, torque_sigma
 from runtime.rows.position_errors import perturbation
 from runtime.rows.prepared import decimated_torque
 from runtime.rows.sign_errors import Switch, kernels, switched, switches

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from campaign import campaign
 
-from runtime.loop.methods import estimate_of
+from runtime.compose import estimate_of
 from runtime.model.generated import load_model
 from runtime.records.record import Record
 from runtime.rows.prepared import decimated_torque, observation_from_states

@@ -12,7 +12,7 @@ import pytest
 
 from oracles.pinocchio_model import PinocchioModel
 from runtime import Record, observe
-from runtime.loop.methods import estimate_of
+from runtime.compose import estimate_of
 from runtime.model.generated import load_model
 from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot

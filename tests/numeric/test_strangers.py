@@ -480,9 +480,9 @@ def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
 
 def test_names_of_joints_stand_in_limits_and_advice() -> None:
     """They had numbers alone there."""
+    from runtime.compose import advise
     from runtime.loop.reference import Reference, check_limits
     from runtime.model.generated import joint_labels
-    from runtime.resolution.advisor import advise
 
     text = (files("symgen.description.robots") / "planar_2r.yaml").read_text()
     named = parse_robot((text + "labels: {1: shoulder, 2: elbow}\n").encode(), "named.yaml")

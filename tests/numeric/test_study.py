@@ -8,8 +8,8 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
+from runtime.compose import METHODS
 from runtime.errors import InputError, SettingsError
-from runtime.loop.methods import METHODS
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.names import study_of
 from runtime.settings import gone

@@ -12,12 +12,12 @@ from planar_data import OLS, WLS, observation
 from scipy import stats
 from scipy.signal import lfilter
 
+from runtime.compose import estimate_of
 from runtime.estimators.essential import essential_of
 from runtime.identification.residuals import effective_share, joint_whiteness
 from runtime.identification.uncertainty import block_bootstrap, f_tests, uncertainty
 from runtime.identification.validation import JointComparison, direct_comparison
 from runtime.json_documents import json_text
-from runtime.loop.methods import estimate_of
 from runtime.settings.study import EssentialSettings, EstimateSettings
 
 

@@ -8,6 +8,7 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, TRUE, motion, observation
 
+from runtime.compose import estimate_of
 from runtime.errors import InputError
 from runtime.identification.parameter_sets import held_out_validation
 from runtime.identification.validation import (
@@ -17,7 +18,6 @@ from runtime.identification.validation import (
     split_validation,
     weak_directions,
 )
-from runtime.loop.methods import estimate_of
 from runtime.settings.study import EstimateSettings
 
 

@@ -15,9 +15,8 @@ import symgen
 from oracles.applying import motion
 from oracles.pinocchio_model import PinocchioModel
 from runtime.errors import InputError
-from runtime.loop.methods import estimate_of
-from runtime.rows.wrench import WrenchModel, with_wrench
 from runtime.settings.study import study_from_mapping
+from runtime.wrench import WrenchModel
 
 OPTION = ("base_wrench_regressor",)
 STUDY = study_from_mapping(
@@ -88,9 +87,8 @@ def test_parameters_come_back(torques: bool) -> None:
             record.t, record.q, 0 * record.tau, rate=1000.0, channels=record.channels
         )
     )
-    wide, own, study, _ = with_wrench(model, [record], STUDY)
-    rows = runtime.observe(wide, own[0], study)
-    fit = estimate_of(rows, study.estimate, model=wide)
+    wide = runtime.problem(model, record, STUDY).model
+    fit = runtime.estimate(model, record, STUDY)
     true = dict(zip(wide.BASE_PARAMETERS, wide.base_parameters([*chi, *BIAS]), strict=True))
     assert fit.status == "ok" and fit.names == wide.BASE_PARAMETERS
     # differences of positions at 1 kHz err by (w T)**2/6 of a rate: 5e-6; a sign at a reversal is
@@ -150,8 +148,8 @@ def test_deviations_by_row_group(name: str) -> None:
         tau = record.tau + 0.1 * rng.standard_normal(record.tau.shape)
         channels = {"wrench0": wrench}
         noisy = runtime.Record(record.t, record.q, tau, rate=1000.0, channels=channels)
-        wide, own, study, _ = with_wrench(model, [noisy], STUDY)
-        fit = estimate_of(runtime.observe(wide, own[0], study), study.estimate, model=wide)
+        wide = runtime.problem(model, noisy, STUDY).model
+        fit = runtime.estimate(model, noisy, STUDY)
         z.append((fit.X - wide.base_parameters([*chi, *BIAS])) / fit.sigma)
     scales = np.array([joint.scale for joint in fit.per_joint])
     np.testing.assert_allclose(scales[-6:], SIGMA, rtol=0.05)
@@ -162,7 +160,7 @@ def test_what_is_missing_is_said() -> None:
     model, _, record = measured("planar_2r")
     bare = runtime.Record(record.t, record.q, record.tau, rate=1000.0, name="bare")
     with pytest.raises(InputError, match="no wrench0 of three forces"):
-        with_wrench(model, [record, bare], STUDY)
+        runtime.problem(model, [record, bare], STUDY)
     with pytest.raises(InputError, match="--with base_wrench_regressor"):
         runtime.identify(symgen.model("planar_2r"), record, STUDY)
     counts = study_from_mapping({"signals": {"reader": "counts"}})
@@ -173,4 +171,4 @@ def test_what_is_missing_is_said() -> None:
     )
     with pytest.raises(InputError, match="a wrench in frame 9 of planar_2r: no such frame"):
         runtime.identify(model, elsewhere, STUDY)
-    assert with_wrench(model, [bare], STUDY)[0] is model
+    assert runtime.problem(model, bare, STUDY).model is model

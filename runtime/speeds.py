@@ -17,13 +17,15 @@ and v of a joint is left alone where gain and lag take more than LIMIT.SPEED_DIS
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime.core.problem import SIGNALS, Note, Problem
 from runtime.limits import LIMIT
+from runtime.rows.selection import excerpt
 from runtime.settings.study import Signals
-from runtime.signals.cutoff import white_noise
+from runtime.signals.cutoff import cutoff, white_noise
 from runtime.signals.filters import filtered_states, lowpass_filtered, median_filtered
 
 Array = np.ndarray
@@ -98,3 +100,23 @@ def crossings(
     off = ", ".join(str(j) for j, yes in enumerate(agrees, 1) if not yes)
     left = f"recorded velocities of joint {off} disagree with the positions and are not used"
     return hertz, "; ".join(part for part in (text, left if off else "") if part) + "."
+
+
+def recorded_speeds(problem: Problem) -> Problem:
+    """The step: signals.velocity as numbers where it is auto and every fitted record has velocities."""
+    signals = problem.settings.signals
+    if signals.velocity != "auto" or signals.reader != "lowpass" or not problem.records:
+        return problem
+    if not all("qd" in record.channels for record in problem.records):
+        return problem
+    parts = []
+    for record in problem.records:
+        samples = excerpt(record, problem.settings.rows)
+        parts.append((record.q[samples], {"qd": record.channels["qd"][samples]}, record.rate))
+    low, known = signals.lowpass, signals
+    if low is not None and low.cutoff == "auto":
+        hertz, _ = cutoff([(q, rate) for q, _, rate in parts], signals)
+        known = replace(signals, lowpass=replace(low, cutoff=hertz))
+    crossing, text = crossings(parts, known)
+    settings = replace(problem.settings, signals=replace(signals, velocity=crossing))
+    return problem.changed(Note(SIGNALS, text), settings=settings)

@@ -1,4 +1,4 @@
-"""Scalars inside the laws of columns, as a record gives them (`runtime.estimators.projection`).
+"""Scalars inside the laws of columns, as a record gives them (`runtime.laws.projection`).
 
 Minima that differ are told. Deviations are joint ones: those of the linear problem with the columns
 [W, (dW/da) X], by blocks of time. Whether a law earns its scalars is asked of blocks of time that
@@ -9,22 +9,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.problem import Note, Problem
+from runtime.errors import InputError
 from runtime.estimators.block_covariance import block_covariance
 from runtime.estimators.linear import percent
-from runtime.estimators.projection import LawProblem, Projection, basis
 from runtime.identification.residuals import correlation_time, p_value, residual_correlation
+from runtime.laws.projection import LawProblem, Projection, basis
+from runtime.laws.transmitted import transmitted_torque
 from runtime.markup import number
+from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel
+from runtime.progress import at
 from runtime.rows.observation import split_rows
 from runtime.rows.prepared import Prepared
 from runtime.table import Table
 
 Array = np.ndarray
 
+KIND = "laws"
+"""Kind of the note that holds the FittedLaws of a problem."""
 SURE = 0.01  # p of the F-test above which a record does not show a law
 LOOSE = 0.5  # deviation of log(a), or share of the bounds, above which a is not determined
 
@@ -144,6 +151,28 @@ class FittedLaws:
     def summary(self) -> dict[str, Any]:
         """For JSON."""
         return {"scalars": self.scalars, "tests": self.tests}
+
+
+def fitted_scalars(problem: Problem) -> Problem:
+    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself where it has none.
+
+    Raises
+    ------
+    InputError
+        A method that simulates the loop with the scalars of the file.
+    """
+    if not hasattr(problem.model, "FIT"):
+        return problem
+    estimate = problem.settings.estimate
+    if problem.method.observe is not None:
+        raise InputError(
+            f"scalars of laws are not fitted by {estimate.method}, which simulates the loop with those of the file; fit them by ols, then fix them: fit: {{vs: 0.08}}"
+        )
+    at("scalars of laws")
+    columns = None if estimate.columns == "all" else tuple(estimate.columns)
+    laws = fit_laws(problem.model, problem.prepared, columns, weights=estimate.weights != "none")
+    model = cast(GeneratedModel, BoundModel(problem.model, laws.constants))
+    return transmitted_torque(problem.changed(Note(KIND, "", result=laws), model=model))
 
 
 def fit_laws(

@@ -1,4 +1,4 @@
-"""What is to be found of the law whose torque stands for a measured one: `controller.law` with
+"""What is to be estimate of the law whose torque stands for a measured one: `controller.law` with
 kd: fit, delay: fit.
 
     W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
@@ -14,21 +14,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from runtime.controller.law import late, torque_law
+from runtime.core.problem import Note, Problem
 from runtime.estimators.estimate import Estimate
 from runtime.estimators.method import linear_estimate
 from runtime.json_documents import Result
 from runtime.limits import LIMIT
 from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.records.law import late, torque_law
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.observe import observe, with_torques
-from runtime.rows.prepared import Prepared
+from runtime.rows.prepared import Prepared, stacked, with_torques
 from runtime.settings.controller import Law
-from runtime.settings.study import EstimateSettings, Study
+from runtime.settings.study import EstimateSettings
 
 Array = np.ndarray
 
@@ -48,7 +49,7 @@ class LawEstimate(Result):
     text : str
         The same in words.
     error : float, %
-        Of the torque, with what was found.
+        Of the torque, with what was estimate.
     """
 
     joints: tuple[str, ...]
@@ -60,71 +61,64 @@ class LawEstimate(Result):
     error: float
 
 
-def completed(
-    model: GeneratedModel,
-    study: Study,
-    fitted: Sequence[Prepared],
-    further: Sequence[Record],
-) -> tuple[tuple[Prepared, ...], list[Record], LawEstimate | None]:
-    """The records with the torque of the completed law, and its estimate; as they are where nothing is to be found."""
-    laws = [r.controller.law for r in study.record if r.by_law and r.controller is not None]
-    asked = [law for law in laws if "fit" in (law.kd, law.delay)]
-    if not asked:
-        return tuple(fitted), list(further), None
-    settings = next(r.controller for r in study.record if r.by_law and r.controller is not None)
-    saturation = torque_law(settings, fitted[0].record.n, model.LIMITS).saturation
-    estimate = law_estimate(model, fitted, study, asked[0], saturation)
-    bound = np.where(np.isfinite(estimate.kd) | (asked[0].kd != "fit"), saturation, np.inf)
+KIND = "law"
+
+
+def law_of_controller(problem: Problem) -> Problem:
+    """The step: records with the torque of the completed law, where the settings ask for kd or the delay of a law; the problem itself where they do not."""
+    settings: Any = problem.settings
+    controllers = [r.controller for r in settings.record if r.by_law and r.controller is not None]
+    asked = [c for c in controllers if "fit" in (c.law.kd, c.law.delay)]
+    if not asked or not any("law_v" in record.channels for record in problem.records):
+        return problem
+    law = asked[0].law
+    saturation = torque_law(controllers[0], problem.records[0].n, problem.model.LIMITS).saturation
+    estimate = law_estimate(problem, law, saturation)
+    bound = np.where(np.isfinite(estimate.kd) | (law.kd != "fit"), saturation, np.inf)
 
     def with_torque(record: Record) -> Record:
         channels = {key: x for key, x in record.channels.items() if key != "law_v"}
         tau = torque_of(record, np.nan_to_num(estimate.kd), estimate.delay, bound)
         return replace(record, tau=tau, channels=channels)
 
-    changed = tuple(replace(prepared, record=with_torque(prepared.record)) for prepared in fitted)
-    return changed, [with_torque(record) for record in further], estimate
+    return problem.changed(
+        Note(KIND, estimate.text, {KIND: estimate.summary()}, estimate),
+        records=tuple(map(with_torque, problem.records)),
+        unseen=tuple(map(with_torque, problem.unseen)),
+    )
 
 
-def gain_doubt(
-    model: GeneratedModel, study: Study, records: Sequence[Prepared], error: float
-) -> str:
-    """Whether another kd than the stated one explains the records, a sentence; "" where it does not.
-
-    error : float, %
-        Of the stated kd.
-    """
-    by_law = [prepared for prepared in records if "law_v" in prepared.record.channels]
-    laws = [r.controller.law for r in study.record if r.controller is not None]
-    if error < LIMIT.LAW_DOUBT or len(by_law) < len(records) or not laws or laws[0].kd == "fit":
+def gain_doubt(problem: Problem, error: float) -> str:
+    """Whether another kd than the stated one explains the records, a sentence; "" where it does not, or they hold none. error : of the stated one, %."""
+    settings: Any = problem.settings
+    by_law = ["law_v" in record.channels for record in problem.records]
+    laws = [r.controller.law for r in settings.record if r.controller is not None]
+    if error < LIMIT.LAW_DOUBT or not all(by_law) or not laws or laws[0].kd == "fit":
         return ""
-    n = by_law[0].record.n
-    uncut = np.full(n, np.inf)
-    estimate = law_estimate(model, by_law, study, Law(kp=laws[0].kp, kd="fit"), uncut)
+    uncut = np.full(problem.records[0].n, np.inf)
+    estimate = law_estimate(problem, Law(kp=laws[0].kp, kd="fit"), uncut)
     if not estimate.error < error / 2:
         return ""
-    stated = laws[0].gains(n)["Vm"]
+    stated = laws[0].gains(problem.records[0].n)["Vm"]
     each = ", ".join(
         f"{x + dx:.4g} in place of {x:g} of joint {j}"
         for j, x, dx in zip(estimate.joints, stated, estimate.kd, strict=True)
         if np.isfinite(dx)
     )
-    return (
-        f"With kd {each} the law leaves {estimate.error:.1f} % unexplained in place of {error:.1f} %: "
-        "are the gains in other units, or of the motor side?"
-    )
+    return f"With kd {each} the law leaves {estimate.error:.1f} % unexplained in place of {error:.1f} %: are the gains in other units, or of the motor side?"
 
 
-def law_estimate(
-    model: GeneratedModel, records: Sequence[Prepared], study: Study, law: Law, saturation: Array
-) -> LawEstimate:
+def law_estimate(problem: Problem, law: Law, saturation: Array) -> LawEstimate:
     """kd of every joint and the delay, as far as `law` asks for them.
 
     saturation : ndarray, shape (n,), N m or N
         Largest torque of the drives; inf where they do not cut.
     """
-    n = records[0].record.n
+    model = problem.model
+    n = problem.records[0].n
     labels = joint_labels(model)
-    torques = TorquesOfLaw(model, records, observe(model, records, study), saturation)
+    rows = stacked(model, problem.prepared)
+    torques = TorquesOfLaw(model, problem.prepared, rows, saturation)
     asked = [f"KD{j}" for j in labels] if law.kd == "fit" else []
     cuts = bool(asked) and bool(np.isfinite(saturation).any())
     starts = LIMIT.LAW_STARTS if cuts else (0.0,)

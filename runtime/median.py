@@ -11,9 +11,14 @@ Spikes, for which a median is there, and noise go with no motion. Measured: docs
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from runtime.core.problem import SIGNALS, Note, Problem
 from runtime.limits import LIMIT
+from runtime.rows.selection import excerpt
+from runtime.settings.study import Study
 from runtime.signals.filters import median_filtered
 
 Array = np.ndarray
@@ -40,3 +45,25 @@ def taken(tau: Array, q: Array, rate: float, window: int) -> Array:
         part, whole, size = (np.linalg.norm(x) for x in (with_motion, d[:, j], torque[:, j]))
         share[j] = part / size if 2 * part**2 > whole**2 else 0.0
     return share
+
+
+def torque_median(problem: Problem) -> Problem:
+    """The step: torques without a median where signals.torque_median is auto and it would take torque that goes with the motion."""
+    signals = problem.settings.signals
+    if signals.torque_median != "auto":
+        return problem
+    shares = []
+    for record in problem.records:
+        samples = excerpt(record, problem.settings.rows)
+        shares.append(taken(record.tau[samples], record.q[samples], record.rate, signals.median))
+    if np.max(shares, initial=0.0) <= LIMIT.MEDIAN_TAKES:
+        return problem.changed(settings=_with_window(problem, signals.median))
+    worst = np.max(shares, axis=0)
+    text = f"Torques without a median (torque_median: auto): it would take {100 * worst.max():.2g} % of the torque of joint {1 + worst.argmax()} in time with the motion, as from a controller that answers every count of its encoder."
+    return problem.changed(Note(SIGNALS, text), settings=_with_window(problem, 1))
+
+
+def _with_window(problem: Problem, window: int) -> Study:
+    """The settings with that window of the median on torques."""
+    settings = problem.settings
+    return replace(settings, signals=replace(settings.signals, torque_median=window))

@@ -5,12 +5,12 @@ reference and the gains alone.
 
 P, Vr, Vm of `runtime.settings.controller.Law`, joint side, SI; qd as recorded, else differences
 q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is cut yet: kd
-is found with the parameters, under the saturation (`runtime.identification.torque_law`).
+is found with the parameters, under the saturation (`runtime.controller.fitted`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,6 @@ from scipy.interpolate import CubicSpline
 
 from runtime.errors import SettingsError
 from runtime.settings.controller import Controller
-from runtime.settings.record import RecordSettings
 
 Array = np.ndarray
 
@@ -87,17 +86,6 @@ def late(t: Array, x: Array, delay: float) -> Array:
     if not delay:
         return x
     return np.asarray(CubicSpline(t, x)(np.clip(t - delay, t[0], t[-1])))
-
-
-def require_found(settings: Sequence[RecordSettings], records: Iterable[frozenset[str]]) -> None:
-    """SettingsError where a law is to be found that is not yet; records : names of the channels of
-    each, in which law_v stands until then.
-    """
-    laws = [one.controller.law for one in settings if one.controller is not None]
-    if any("fit" in (law.kd, law.delay) for law in laws) and any("law_v" in x for x in records):
-        raise SettingsError(
-            "fit; identify finds it: say here the number that it gives", path=("controller", "law")
-        )
 
 
 def torque_law(controller: Controller | None, n: int, limits: Mapping[str, Any]) -> TorqueLaw:

@@ -22,19 +22,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.model.bound import BoundModel
 from runtime.model.generated import GeneratedModel, channels_of, elements_of, joint_units
 from runtime.model.inertia import INERTIAL, physical_model
 from runtime.records.record import JOINT_CHANNELS, Record
-from runtime.rows.prepared import Source, record_of
 from runtime.rows.selection import UNMEASURED, per_joint
 from runtime.settings.record import WRENCH
-from runtime.settings.study import SIMULATING, Study
 
 Array = np.ndarray
 
@@ -44,64 +43,51 @@ PROBED_STATES = 64  # random ones that tell columns apart
 LEFT_OF_COLUMN = 1e-8  # of the norm of a column: less is left of it beside those before
 
 
-S = TypeVar("S", bound=Source)
+READ_SAMPLE_BY_SAMPLE = ("lowpass", "static")
+"""Readers that take positions as they are, so that a joint at rest is one."""
 
 
-def with_wrench(
-    model: GeneratedModel,
-    records: Sequence[S],
-    study: Study,
-    further: Sequence[S] = (),
-) -> tuple[GeneratedModel, Sequence[S | Record], Study, Sequence[S | Record]]:
-    """Model, records and study with six joints more for each sensor; as they are without sensors.
+def force_sensors(problem: Problem) -> Problem:
+    """The step: model and records with six joints more for each force sensor; the problem itself without sensors.
 
-    Parameters
-    ----------
-    model : GeneratedModel
-        Emitted with the function base_wrench_regressor.
-    records, further : sequence of Record
-        With the channels wrench0, wrench7 ..., shape (N, 6), N and N m: of sensors below the robot,
-        ahead of link 7. Joint torques that are zero throughout, in all records, were not measured:
-        they are no rows.
-    study : Study
-        Signals and rows; rows of each joint and axis get a weight of their own where it says ols.
+    Sensors are the channels wrench0, wrench7 ..., shape (N, 6), N and N m: below the robot, ahead of link 7. Joint torques that are zero throughout, in all records that are fitted, were not measured: they are no rows. Rows of each joint and axis get a weight of their own where the settings say ols.
 
     Raises
     ------
     InputError
-        A module without the function or the frame, a robot with loops and a sensor that is not
-        below it, records without or with other sensors, what simulates a loop or a load, and
-        `signals.reader: counts`.
+        A module without the function base_wrench_regressor or the frame, a robot with loops and a sensor that is not below it, records without or with other sensors, and a reader of encoders.
     """
-    own = [record_of(one) for one in (*records, *further)]
-    channels = sorted({c for r in own for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
+    records = (*problem.records, *problem.unseen)
+    channels = sorted({c for r in records for c in r.measured if re.fullmatch(rf"{WRENCH}\d+", c)})
     if not channels:
-        return model, records, study, further
-    for record in own:
+        return problem
+    for record in records:
         for c in channels:
             if record.channels.get(c, np.empty((0, 0))).shape[1] != 6:
                 raise InputError(
-                    f"no {c} of three forces and three moments; name its six columns in every "
-                    "record that is fitted or predicted, record.columns: {wrench: "
-                    f"{{{c.removeprefix(WRENCH)}: [...]}}}}",
+                    f"no {c} of three forces and three moments; name its six columns in every record that is fitted or predicted, record.columns: {{wrench: {{{c.removeprefix(WRENCH)}: [...]}}}}",
                     file=record.file,
                 )
-    for what, asked in (
-        ("signals.reader: counts", study.signals.reader == "counts"),
-        (f"estimate.method: {study.estimate.method}", study.estimate.method in SIMULATING),
-        ("payload", study.payload is not None),
-    ):
-        if asked:
-            raise InputError(f"{what} does not read wrenches; leave it out, or the wrench")
-    n, torques = len(model.JOINTS), any(record.tau.any() for record in own)
-    slow = per_joint(study.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
-    rows = replace(study.rows, low_speed=(*map(float, slow), *[0.0] * 6 * len(channels)))
-    wide = WrenchModel(model, [int(c.removeprefix(WRENCH)) for c in channels], torques)
-    padded, count = [_record(record, channels) for record in own], len(records)
-    if study.estimate.method == "ols":  # N and N m in one sum
-        study = replace(study, estimate=replace(study.estimate, method="wls", weights="joint"))
-    study = replace(study, rows=rows)
-    return cast(GeneratedModel, wide), padded[:count], study, padded[count:]
+    settings = problem.settings
+    if settings.signals.reader not in READ_SAMPLE_BY_SAMPLE:
+        raise InputError(
+            f"signals.reader: {settings.signals.reader} does not read wrenches; leave it out, or the wrench"
+        )
+    n = len(problem.model.JOINTS)
+    torques = any(record.tau.any() for record in problem.records)
+    slow = per_joint(settings.rows.low_speed, n, "rows.low_speed") if torques else [UNMEASURED] * n
+    low_speed = (*map(float, slow), *[0.0] * 6 * len(channels))
+    settings = replace(settings, rows=replace(settings.rows, low_speed=low_speed))
+    if settings.estimate.method == "ols":  # N and N m in one sum
+        weighted = replace(settings.estimate, method="wls", weights="joint")
+        settings = replace(settings, estimate=weighted)
+    frames = [int(c.removeprefix(WRENCH)) for c in channels]
+    return problem.changed(
+        model=WrenchModel(problem.model, frames, torques),
+        records=tuple(_record(record, channels) for record in problem.records),
+        unseen=tuple(_record(record, channels) for record in problem.unseen),
+        settings=settings,
+    )
 
 
 def _record(record: Record, channels: Sequence[str]) -> Record:

@@ -16,65 +16,56 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.problem import Note, Problem
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.generated import TRANSMITTED, GeneratedModel, channels_of
-from runtime.records.record import Record
 from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, prepared
+from runtime.rows.prepared import Prepared
 
 Array = np.ndarray
 
+KIND = "transmitted"
 PASSES = 50
 SAME_TORQUE = 1e-6  # of the rms of tau_m, between two passes
 
 
-def transmitted(
-    model: GeneratedModel,
-    fitted: Sequence[Prepared],
-    further: Sequence[Record],
-    weights: bool,
-) -> tuple[tuple[Prepared, ...], list[Record], str]:
-    """The records with the torque of the model where laws read it, and what was done, a sentence;
-    as they are, and "", where none does.
+def transmitted_torque(problem: Problem) -> Problem:
+    """The step: records with the torque that each joint transmits, where laws of the model read it; the problem itself where none does.
 
     Raises
     ------
     InputError
         A torque that does not settle.
     """
-    channels = channels_of(model)
-    read = {c: names for c, names in channels.items() if c.startswith(TRANSMITTED)}
+    model = problem.model
+    read = {c: names for c, names in channels_of(model).items() if c.startswith(TRANSMITTED)}
     if not read:
-        return tuple(fitted), list(further), ""
-    names = ", ".join(sorted({name for laws in read.values() for name in laws}))
-    torque = _Torque(model, read)
-    X = np.zeros(len(model.BASE_PARAMETERS))
-    records = [torque.given(r, None) for r in fitted]
+        return problem
+    parameters = ", ".join(sorted({name for names in read.values() for name in names}))
+    weighted = problem.settings.estimate.weights != "none"
+    torque = TransmittedTorque(model, read)
+    records = [torque.given(record, None) for record in problem.prepared]
     before = np.zeros(0)
     for k in range(PASSES):
-        X = _solved([r.observation(model) for r in records], weights)
-        records = [torque.given(r, X) for r in records]
+        X = _solved([record.observation(model) for record in records], weighted)
+        records = [torque.given(record, X) for record in records]
         tau = np.concatenate([r.record.channels[c] for r in records for c in read])[:, 0]
         if k and np.linalg.norm(tau - before) <= SAME_TORQUE * np.linalg.norm(tau):
             break
         before = tau
     else:
         raise InputError(
-            f"{names}: the torque of the model does not settle in {PASSES} passes; is the friction "
-            "larger than the torque that causes it?"
+            f"{parameters}: the torque of the model does not settle in {PASSES} passes; is the friction larger than the torque that causes it?"
         )
-    text = (
-        f"{names}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, "
-        f"not the measured one; it settled in {k + 1} passes."
+    text = f"{parameters}: {TRANSMITTED} is the torque of the other parameters at the states of the rows, not the measured one; it settled in {k + 1} passes."
+    unseen = [torque.given(record, X) for record in problem.prepared_unseen]
+    others = tuple(note for note in problem.notes if note.kind != KIND)
+    return replace(problem, notes=others).changed(
+        Note(KIND, text),
+        records=tuple(record.record for record in records),
+        unseen=tuple(record.record for record in unseen),
     )
-    study = records[0].study
-    drives = records[0].drives
-    unseen = []
-    for record in further:
-        others = replace(prepared(model, record, study), drives=drives)
-        unseen.append(torque.given(others, X).record)
-    return tuple(records), unseen, text
 
 
 def _solved(observations: Sequence[Observation], weights: bool) -> Array:
@@ -93,7 +84,7 @@ def _solved(observations: Sequence[Observation], weights: bool) -> Array:
     return np.asarray(X)
 
 
-class _Torque:
+class TransmittedTorque:
     """The torque of the columns that do not read it; `read` : {channel: parameters that do}."""
 
     def __init__(self, model: GeneratedModel, read: dict[str, tuple[str, ...]]) -> None:
@@ -114,6 +105,5 @@ class _Torque:
         transmitted = {c: tau[:, [k]] for c, k in self.place.items()}
         channels = {**record.record.channels, **transmitted}
         changed = replace(record, record=replace(record.record, channels=channels))
-        states = replace(record.states, channels=changed.channels)
-        vars(changed).update(states=states, selection=record.selection, torque=record.torque)
+        changed.take_states(record)
         return changed

@@ -1,0 +1,520 @@
+"""What the package is made of, in four lists, and the calls of its users.
+
+    STEPS      Problem -> Problem: what changes a problem before rows are made of it, in this order
+    READERS    Record, Signals -> States: signals.reader of a study
+    METHODS    Observation -> Estimate: estimate.method of a study
+    EXTRAS     Identification -> Part: what else is asked of the records
+
+Each call builds a Problem of model, records and study, prepares it by STEPS and hands it to one function of the package. A feature is one file and one line of a list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from runtime.blas import single_threaded
+from runtime.controller.fitted import law_of_controller
+from runtime.core import estimation
+from runtime.core.automatic import automatic_cutoff
+from runtime.core.problem import Problem, Step, prepared
+from runtime.errors import InputError, SettingsError
+from runtime.estimators import feasible, irls
+from runtime.estimators.essential import Essential
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.linear import ordinary
+from runtime.estimators.method import LINEAR, Method
+from runtime.estimators.wls import by_weights, weighted
+from runtime.laws.scalars import fitted_scalars
+from runtime.laws.transmitted import transmitted_torque
+from runtime.link_side import torques_of_links
+from runtime.loop import didim, iv
+from runtime.loop.closed_loop import observed_loop
+from runtime.loop.fixed_point import FixedPointOptions
+from runtime.loop.simulated_motion import beside_record
+from runtime.median import torque_median
+from runtime.model.generated import GeneratedModel
+from runtime.reading.records import read_records
+from runtime.records.record import Record
+from runtime.rest import at_rest, poses_at_rest
+from runtime.rows.observation import Observation
+from runtime.settings.record import RecordSettings
+from runtime.settings.study import EstimateSettings, Study
+from runtime.signals.states import Reader, counted, lowpassed
+from runtime.speeds import recorded_speeds
+from runtime.wrench import force_sensors
+
+if TYPE_CHECKING:
+    from runtime.excitation.poses import StaticPoses
+    from runtime.excitation.result import Excitation
+    from runtime.identification.compare import Ranking
+    from runtime.identification.payload_study import PayloadStudy
+    from runtime.identification.result import Identification
+    from runtime.loop.simulation import Simulator
+    from runtime.plausible.delay import Delay
+    from runtime.plausible.plausibility import Plausibility
+    from runtime.resolution.advice import Advice
+    from runtime.resolution.result import Cestac
+
+STEPS: list[Step] = [
+    force_sensors,
+    torques_of_links,
+    torque_median,
+    recorded_speeds,
+    automatic_cutoff,
+    poses_at_rest,
+    transmitted_torque,
+    fitted_scalars,
+    law_of_controller,
+]
+READERS: dict[str, Reader] = {"lowpass": lowpassed, "counts": counted, "static": at_rest}
+METHODS: dict[str, Method] = {
+    **LINEAR,
+    # robust least squares, Huber or Tukey
+    "irls": Method(irls.IrlsOptions, weighted, irls.fit, weights=("none",)),
+    # instrumental variables of the simulated closed loop
+    "iv": Method(
+        FixedPointOptions, ordinary, partial(beside_record, iv.fit), observe=observed_loop
+    ),
+    # torques on the regressor of the simulated motion
+    "didim": Method(
+        FixedPointOptions, ordinary, partial(beside_record, didim.fit), observe=observed_loop
+    ),
+    # least squares among physical robots
+    "feasible": Method(
+        feasible.FeasibleOptions,
+        by_weights,
+        feasible.fit,
+        brief={"explain": False},
+        any_rank=True,
+    ),
+}
+
+Records = Record | Sequence[Record]
+
+
+def stated(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    unseen: Sequence[Record] = (),
+    simulator: Simulator | None = None,
+) -> Problem:
+    """The problem of model, records and study as it is stated, before any step."""
+    study = study or Study()
+    methods: Mapping[str, Method] = METHODS
+    if study.estimate.method not in methods:
+        raise SettingsError(
+            f"{study.estimate.method!r}; expected {' or '.join(methods)}",
+            path=("estimate", "method"),
+        )
+    if study.signals.reader not in READERS:
+        raise SettingsError(
+            f"{study.signals.reader!r}; expected {' or '.join(READERS)}",
+            path=("signals", "reader"),
+        )
+    if simulator is not None:
+        observe = partial(observed_loop, simulator=simulator)
+        methods = {
+            name: method if method.observe is None else replace(method, observe=observe)
+            for name, method in METHODS.items()
+        }
+    several = (records,) if isinstance(records, Record) else tuple(records)
+    return Problem(model, several, tuple(unseen), study, READERS[study.signals.reader], methods)
+
+
+def problem(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    unseen: Sequence[Record] = (),
+    simulator: Simulator | None = None,
+) -> Problem:
+    """The problem of model, records and study, prepared by all steps.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        An emitted module.
+    records : Record, or a sequence of them
+        Joint side, SI, fitted together.
+    study : Study, optional
+        Settings; default: Study().
+    unseen : sequence of Record, optional
+        Records that the parameters predict.
+    simulator : Simulator, optional
+        The closed loop that iv and didim simulate; default: that of study.controller.
+
+    Raises
+    ------
+    InputError
+        A record, model or setting that a step cannot work with.
+    """
+    return prepared(stated(model, records, study, unseen, simulator), STEPS)
+
+
+def recorded(
+    settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
+) -> list[Record]:
+    """Records of a study, read from their files."""
+    return read_records(settings, model, missing=study.signals.admits_missing)
+
+
+@single_threaded
+def observe(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    simulator: Simulator | None = None,
+) -> Observation:
+    """Y = W X + rho, eqs. (6) and (14), of one record or several: filtered, differentiated, decimated, rows left out."""
+    return estimation.observed(problem(model, records, study, simulator=simulator))
+
+
+@single_threaded
+def estimate(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    simulator: Simulator | None = None,
+) -> Estimate:
+    """All parameters of one record or several by the method of the study, eqs. (7) to (11).
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted module.
+    records : Record, or a sequence of them
+        Joint side, SI.
+    study : Study, optional
+        Settings; default: Study().
+    simulator : Simulator, optional
+        As for `identify`.
+
+    Returns
+    -------
+    Estimate
+        X, deviations, rank and fit by joint, in SI units.
+
+    Raises
+    ------
+    InputError
+        Records that give no row.
+    SettingsError
+        A method that needs what the study or the records lack.
+    """
+    return estimation.estimate(problem(model, records, study, simulator=simulator))
+
+
+def estimate_of(
+    observation: Observation,
+    settings: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """Parameters of rows Y = W X + rho that are there, by the method that `settings` names; default: ols."""
+    settings = settings or EstimateSettings()
+    return estimation.estimate_of(
+        observation, settings, METHODS, model=model, provenance=provenance
+    )
+
+
+@single_threaded
+def essential(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    simulator: Simulator | None = None,
+) -> Essential:
+    """Essential parameters (section 4.1.1) of one record or several, by the method of the study or its linear companion."""
+    return estimation.essential(problem(model, records, study, simulator=simulator))
+
+
+@single_threaded
+def identify(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    further: Sequence[Record] | None = None,
+    loaded: Sequence[Record] | None = None,
+    simulator: Simulator | None = None,
+    physical: bool = False,
+    friction: bool = False,
+    variants: GeneratedModel | None = None,
+    plausible: bool | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Identification:
+    """Parameters of a robot from its records, and how far to trust them.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        An emitted module.
+    records : Record, or a sequence of them
+        Joint side, SI, fitted together.
+    study : Study, optional
+        Settings; default: Study().
+    further : sequence of Record, optional
+        Records that the parameters predict; default: those of study.validate.record, read from their files.
+    loaded : sequence of Record, optional
+        Records with the load of study.payload; default: those of study.payload.record.
+    simulator : Simulator, optional
+        The closed loop, which iv and didim need; default: that of study.controller.
+    physical : bool
+        Whether a physical robot can have the parameters.
+    friction : bool
+        Curves of friction against velocity, joint by joint.
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: other tables of frames and directions of gravity are tried on the records.
+    plausible : bool, optional
+        Whether record, study and robot file suit each other (`runtime.plausibility`); default: where `variants` is given.
+    provenance : mapping, optional
+        What else reproduces the result; names of the records, hashes and versions are added.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    InputError
+        A record, setting or extra that does not suit what is asked for.
+    """
+    from runtime.identification import identification
+
+    whole, with_load = _with_loaded(model, records, study, further, loaded, simulator)
+    return identification.identify(
+        whole,
+        loaded=with_load,
+        physical=physical,
+        friction=friction,
+        variants=variants,
+        plausible=variants is not None if plausible is None else plausible,
+        provenance=provenance,
+    )
+
+
+@single_threaded
+def assess(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    encoder: Sequence[float] = (),
+    variants: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    progress: Callable[[str], None] = lambda part: None,
+) -> Identification:
+    """The identification with friction, physical consistency and encoder resolution, as far as records, study and installed extras allow (`symgen report`).
+
+    encoder : steps of the encoders in use, rad or m.
+    progress : called with the name of each part before it is computed.
+    """
+    from runtime.identification import identification
+
+    whole, with_load = _with_loaded(model, records, study, None, None, None)
+    return identification.assess(
+        whole,
+        loaded=with_load,
+        encoder=encoder,
+        variants=variants,
+        provenance=provenance,
+        progress=progress,
+    )
+
+
+@single_threaded
+def compare(
+    model: GeneratedModel,
+    candidates: Study
+    | tuple[Study, Records, Records]
+    | Mapping[str, Study | tuple[Study, Records, Records]],
+    *,
+    variants: GeneratedModel | None = None,
+) -> Ranking:
+    """Identify with each of several treatments, and order them by what they predict.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        Emitted module.
+    candidates : Study, (study, records, validation records), or mapping of str to them
+        By name of the treatment; a Study names its records. The validation records are the same instants. Of one alone the treatments that suggest themselves are compared.
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: the plausibility of the best treatment is then judged.
+
+    Raises
+    ------
+    InputError
+        A candidate without validation records, or with others than the first; none that can be identified.
+    """
+    from runtime.identification import compare as comparing
+
+    if isinstance(candidates, Mapping):
+        problems = {
+            name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()
+        }
+    else:
+        problems = comparing.treatments(_candidate(model, candidates), STEPS)
+    return comparing.compare(problems, variants=variants)
+
+
+@single_threaded
+def cestac(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    simulator: Simulator | None = None,
+    **options: Any,
+) -> Cestac:
+    """Change of the estimate under coarser encoders and torque sensors, eqs. (15) to (22), (28).
+
+    options : columns, map, progress, checkpoint, provenance, as of `runtime.resolution.cestac.cestac`.
+    """
+    from runtime.resolution import cestac as resolution
+
+    return resolution.cestac(
+        problem(model, records, study, simulator=simulator), simulator=simulator, **options
+    )
+
+
+@single_threaded
+def advise(
+    model: GeneratedModel, records: Records, study: Study | None = None, **options: Any
+) -> Advice:
+    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted.
+
+    options : columns, asked, encoders, confirm, progress, provenance, readers, as of `runtime.resolution.advisor.advise`.
+    """
+    from runtime.resolution import advisor
+
+    return advisor.advise(problem(model, records, study), **options)
+
+
+@single_threaded
+def plausibility(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None = None,
+    *,
+    variants: GeneratedModel | None = None,
+) -> Plausibility:
+    """Whether record, study and robot file suit each other, and what explains the record better where they do not."""
+    from runtime.plausible import plausibility as checks
+
+    return checks.plausibility(problem(model, records, study), variants=variants)
+
+
+@single_threaded
+def delay(
+    model: GeneratedModel, record: Record, study: Study | None = None, **options: Any
+) -> Delay:
+    """The time shift between positions and torques of a record, by joint.
+
+    options : longest, s, the largest delay looked for.
+    """
+    from runtime.plausible import delay as delays
+
+    return delays.delay(problem(model, record, study), **options)
+
+
+@single_threaded
+def payload(
+    model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
+) -> PayloadStudy:
+    """The load of study.payload; loaded : records with it, default: those of study.payload.record."""
+    from runtime.identification import payload_study
+
+    whole, with_load = _with_loaded(model, records, study, (), loaded, None)
+    return payload_study.payload_study(whole, with_load)
+
+
+@single_threaded
+def excite(
+    model: GeneratedModel,
+    records: Records = (),
+    study: Study | None = None,
+    *,
+    map: Callable[..., Iterable[Any]] = map,
+    progress: Callable[[int, int], None] | None = None,
+) -> Excitation:
+    """The motion of smallest criterion over all starts of study.excitation, within the limits at the controller rate.
+
+    Without records, the values of the robot file serve as parameters.
+    """
+    from runtime.excitation import search
+
+    whole = problem(model, records, study)
+    return search.excite(whole, map=map, progress=progress)
+
+
+@single_threaded
+def static_poses(
+    model: GeneratedModel, records: Records = (), study: Study | None = None
+) -> StaticPoses:
+    """study.excitation.poses poses, default 20, within the limits of q that tell the parameters of gravity best, beside those that were recorded."""
+    from runtime.excitation import poses
+
+    return poses.static_poses(problem(model, records, study))
+
+
+def _with_loaded(
+    model: GeneratedModel,
+    records: Records,
+    study: Study | None,
+    unseen: Sequence[Record] | None,
+    loaded: Sequence[Record] | None,
+    simulator: Simulator | None,
+) -> tuple[Problem, tuple[Record, ...]]:
+    """The prepared problem, and the records with the load of study.payload, prepared by the same steps."""
+    study = study or Study()
+    if unseen is None:
+        unseen = recorded(study.validate.record, model, study)
+    if loaded is None:
+        loaded = () if study.payload is None else recorded(study.payload.record, model, study)
+    count = len(unseen)
+    whole = problem(model, records, study, unseen=(*unseen, *loaded), simulator=simulator)
+    return whole.changed(unseen=whole.unseen[:count]), whole.unseen[count:]
+
+
+def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
+    """The problem of a treatment, as stated."""
+    if isinstance(candidate, Study):
+        fitted = recorded(candidate.record, model, candidate)
+        predicted = recorded(candidate.validate.record, model, candidate)
+        return stated(model, fitted, candidate, predicted)
+    study, records, unseen = candidate
+    several = (unseen,) if isinstance(unseen, Record) else tuple(unseen)
+    return stated(model, records, study, several)
+
+
+__all__ = [
+    "METHODS",
+    "READERS",
+    "STEPS",
+    "InputError",
+    "advise",
+    "assess",
+    "cestac",
+    "compare",
+    "delay",
+    "essential",
+    "estimate",
+    "estimate_of",
+    "excite",
+    "identify",
+    "observe",
+    "payload",
+    "plausibility",
+    "problem",
+    "static_poses",
+]

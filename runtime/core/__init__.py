@@ -1,0 +1,1 @@
+"""What the chapter needs: a problem, its rows, least squares, essential parameters, CESTAC."""

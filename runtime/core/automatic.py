@@ -1,0 +1,29 @@
+"""The step that gives signals.lowpass.cutoff: auto its number."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.core.problem import SIGNALS, Note, Problem
+from runtime.rows.selection import excerpt
+from runtime.signals.cutoff import cutoff
+
+
+def automatic_cutoff(problem: Problem) -> Problem:
+    """The cut-off of least bias by motion and noise, one for all fitted records (`runtime.signals.cutoff`)."""
+    signals = problem.settings.signals
+    low = signals.lowpass
+    if low is None or low.cutoff != "auto":
+        return problem
+    positions = []
+    for record in problem.records:
+        positions.append((record.q[excerpt(record, problem.settings.rows)], record.rate))
+    crossing = np.inf if isinstance(signals.velocity, str) else signals.velocity
+    hertz, why = cutoff(positions, signals, crossing)
+    text = f"Low-pass at {hertz:g} Hz (cutoff: auto): {why}."
+    settings = replace(
+        problem.settings, signals=replace(signals, lowpass=replace(low, cutoff=hertz))
+    )
+    return problem.changed(Note(SIGNALS, text), settings=settings)

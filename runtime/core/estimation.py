@@ -1,0 +1,145 @@
+"""From a prepared problem to its rows Y = W X + rho and to X: eqs. (6) to (11), essential parameters (section 4.1.1).
+
+rows = observed(problem)
+fit  = estimated(problem, rows)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from runtime.core.problem import Problem
+from runtime.errors import SettingsError
+from runtime.estimators.essential import Essential, essential_of
+from runtime.estimators.estimate import Estimate
+from runtime.estimators.linear import assemble
+from runtime.estimators.method import Beginning, Method, linear_companion
+from runtime.model.generated import GeneratedModel
+from runtime.rows.observation import Observation
+from runtime.rows.prepared import stacked
+from runtime.settings.study import EstimateSettings
+
+Array = np.ndarray
+
+
+def observed(problem: Problem) -> Observation:
+    """Rows of the fitted records, as the method of the settings needs them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Prepared.
+
+    Returns
+    -------
+    Observation
+        Y = W X + rho, eqs. (6) and (14), rows joint-major.
+
+    Raises
+    ------
+    InputError
+        No record, or one of which no row is left.
+    """
+    method = problem.method
+    return (
+        stacked(problem.model, problem.prepared)
+        if method.observe is None
+        else method.observe(problem)
+    )
+
+
+def observed_unseen(problem: Problem, k: int) -> Observation:
+    """The same of the k-th record that is predicted, k from 0."""
+    alone = problem.changed(records=(problem.unseen[k],), unseen=())
+    if "prepared_unseen" in vars(problem):
+        alone.prepared[0].take_states(problem.prepared_unseen[k])
+    return observed(alone)
+
+
+def estimated(
+    problem: Problem,
+    rows: Observation,
+    settings: EstimateSettings | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """Parameters of rows of a problem by `settings`, by default those of the problem."""
+    settings = settings or problem.settings.estimate
+    return estimate_of(rows, settings, problem.methods, model=problem.model, provenance=provenance)
+
+
+def estimate(problem: Problem) -> Estimate:
+    """All parameters of a prepared problem by the method of its settings."""
+    return estimated(problem, observed(problem), provenance=problem.provenance)
+
+
+def essential(problem: Problem) -> Essential:
+    """Essential parameters of a prepared problem, by its method or the linear companion of that method."""
+    settings = problem.settings
+    return essential_of(
+        observed(problem),
+        settings.essential,
+        linear_companion(settings.estimate),
+        model=problem.model,
+        provenance=problem.provenance,
+    )
+
+
+def estimate_of(
+    observation: Observation,
+    settings: EstimateSettings,
+    methods: Mapping[str, Method],
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """Parameters of Y = W X + rho by the method that `settings` names.
+
+    Parameters
+    ----------
+    observation : Observation
+        Rows of the records.
+    settings : EstimateSettings
+        Method, weights, columns, options.
+    methods : mapping of str to Method
+    model : GeneratedModel, optional
+        Gives units, joint numbers and the hash of the robot file.
+    provenance : mapping, optional
+        Further entries for Estimate.provenance (a seed, the study file).
+    """
+    method = method_of(settings, methods)
+    system = method.system(observation, settings)
+    solution = system.solve()
+    if method.fit is None or (solution.rank < len(system.names) and not method.any_rank):
+        return assemble(system, solution, model=model, provenance=provenance)
+    rows, options = observation.columns(system.names), method.checked(settings)
+    fitted = method.fit(Beginning(rows, settings, options, system, solution, model))
+    estimate = assemble(fitted.system, fitted.solution, model=model, provenance=provenance)
+    C = estimate.covariance if fitted.covariance is None else fitted.covariance
+    return replace(
+        estimate,
+        covariance=C,
+        sigma=estimate.sigma if fitted.covariance is None else np.sqrt(np.diag(C)),
+        sigma_corrected=estimate.sigma_corrected if fitted.corrected is None else fitted.corrected,
+        status=fitted.status if estimate.status == "ok" else estimate.status,
+        message=" ".join(note for note in (estimate.message, fitted.message) if note),
+        details=fitted.details,
+    )
+
+
+def method_of(settings: EstimateSettings, methods: Mapping[str, Method]) -> Method:
+    """The method that `settings` names."""
+    if settings.method not in methods:
+        raise SettingsError(
+            f"{settings.method!r}; expected {' or '.join(methods)}", path=("estimate", "method")
+        )
+    return methods[settings.method]
+
+
+def point_estimate(settings: EstimateSettings, methods: Mapping[str, Method]) -> EstimateSettings:
+    """The settings of an estimate whose deviations and explanations nobody reads."""
+    brief = method_of(settings, methods).brief
+    return replace(settings, options={**settings.options, **brief}) if brief else settings

@@ -1,0 +1,141 @@
+"""What is identified: a model, records and settings. A Step changes the problem before rows are made of it.
+
+    problem = prepared(Problem(model, records, unseen, settings, reader), steps)
+
+Every entry point works on a prepared problem, so that all of them use the model, the rows and the torques of one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeAlias
+
+from runtime.errors import InputError
+from runtime.estimators.method import Method
+from runtime.model.generated import GeneratedModel, drives_of
+from runtime.records.provenance import origin
+from runtime.records.record import Record
+from runtime.rows.prepared import Prepared
+from runtime.settings.study import Study
+from runtime.signals.states import Reader
+
+SIGNALS = "signals"
+"""Kind of the notes on settings of signals that were automatic."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """What a step has to say of a problem.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the step, by which code asks for the note; no code reads the text.
+    text : str
+        Sentences for people; "" where there are data alone.
+    data : mapping
+        Entries of the provenance, JSON values.
+    result : object
+        What the step found, for the part that reports it.
+    """
+
+    kind: str
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+    result: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is identified.
+
+    Attributes
+    ----------
+    model : GeneratedModel
+        n joints, b base parameters.
+    records : tuple of Record
+        Joint side, SI; fitted together.
+    unseen : tuple of Record
+        Records that the parameters predict.
+    settings : Study
+    reader : Reader
+        States q, qd, qdd of a record; that of settings.signals.reader.
+    methods : mapping of str to Method
+        Methods of estimation by name, that of settings.estimate.method among them.
+    notes : tuple of Note
+        What the steps have to say.
+    """
+
+    model: GeneratedModel
+    records: tuple[Record, ...]
+    unseen: tuple[Record, ...]
+    settings: Study
+    reader: Reader
+    methods: Mapping[str, Method]
+    notes: tuple[Note, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.model.JOINTS)
+        for record in (*self.records, *self.unseen):
+            if record.n != n:
+                raise InputError(
+                    f"{record.n} joints; {self.model.NAME} has {n}: a record of another robot, or of some of its joints",
+                    file=record.file,
+                )
+
+    @cached_property
+    def prepared(self) -> tuple[Prepared, ...]:
+        """The fitted records as the settings read them; states are made once."""
+        return tuple(self.reading(record) for record in self.records)
+
+    @cached_property
+    def prepared_unseen(self) -> tuple[Prepared, ...]:
+        """The same of the records that are predicted."""
+        return tuple(self.reading(record) for record in self.unseen)
+
+    def reading(self, record: Record) -> Prepared:
+        """A record as the settings read it."""
+        drives = drives_of(self.model)
+        if record.origin.drives is None and drives is not None:
+            record = replace(record, origin=replace(record.origin, drives=drives))
+        return Prepared(record, self.settings, self.reader)
+
+    @property
+    def method(self) -> Method:
+        """The method of settings.estimate."""
+        return self.methods[self.settings.estimate.method]
+
+    def noted(self, kind: str) -> Note | None:
+        """The note of that kind; None where there is none."""
+        return next((note for note in self.notes if note.kind == kind), None)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Names, hashes and clocks of the records, and the data of the notes, for JSON."""
+        automatic = " ".join(note.text for note in self.notes if note.kind == SIGNALS)
+        entries = {**origin(self.records), **({"lowpass": automatic} if automatic else {})}
+        for note in self.notes:
+            entries |= note.data
+        return entries
+
+    def changed(self, *notes: Note, **changes: Any) -> Problem:
+        """The problem with other fields and further notes. States that were made go with records whose positions and signals stay."""
+        other = replace(self, **changes, notes=(*self.notes, *notes))
+        for made in ("prepared", "prepared_unseen"):
+            if made in vars(self):
+                pairs = zip(getattr(other, made), vars(self)[made], strict=False)
+                for after, before in pairs:
+                    after.take_states(before)
+        return other
+
+
+Step: TypeAlias = Callable[[Problem], Problem]
+
+
+def prepared(problem: Problem, steps: Iterable[Step]) -> Problem:
+    """The problem after all steps."""
+    for step in steps:
+        problem = step(problem)
+    return problem

@@ -1,0 +1,57 @@
+"""Poses at rest: each sample is a pose, qd = qdd = 0, with the mean of its torques.
+
+Inertias and friction have no torque in such rows; the step leaves their columns out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.core.problem import Note, Problem
+from runtime.errors import InputError
+from runtime.records.missing import COUNTS, require_positions
+from runtime.records.record import Record
+from runtime.rows.prepared import stacked
+from runtime.settings.study import Signals
+from runtime.signals.filters import States
+from runtime.signals.states import require_motion
+
+ROUNDING = 1e-9  # of the largest entry of W: a column below it is zero
+TEXT = "others (inertias, friction) are left out. Dry friction holds a joint with a torque of unknown sign: approach every pose from both sides and record the mean, or both as poses."
+
+
+def at_rest(record: Record, signals: Signals) -> States:
+    """Reader `static`: q as it is, qd = qdd = 0."""
+    require_positions(record.missing, "reader: static", record.name, COUNTS)
+    rest = np.zeros_like(record.q)
+    return States(record.q, rest, rest)
+
+
+def poses_at_rest(problem: Problem) -> Problem:
+    """The step: the columns that act in poses at rest; the problem itself where its records are of a motion.
+
+    Raises
+    ------
+    InputError
+        Every column vanishes.
+    SettingsError
+        A method that makes rows of its own, which needs a motion.
+    """
+    settings = problem.settings
+    if settings.signals.reader != "static":
+        return problem
+    if problem.method.observe is not None:
+        require_motion(settings.signals, "a method that simulates the loop,")
+    W, names = stacked(problem.model, problem.prepared).W, problem.model.BASE_PARAMETERS
+    acting = np.abs(W).max(axis=0) > ROUNDING * np.abs(W).max()
+    asked = names if settings.estimate.columns == "all" else settings.estimate.columns
+    columns = tuple(name for name in asked if acting[names.index(name)])
+    if not columns:
+        raise InputError(
+            f"poses at rest show no parameter of {problem.model.NAME}: gravity acts along none of its joints, and there is no offset or spring; record a motion, or correct gravity in the robot file"
+        )
+    text = f"Poses at rest: {len(columns)} of {len(asked)} base parameters have a torque in them, the {TEXT}"
+    estimate = replace(settings.estimate, columns=columns)
+    return problem.changed(Note("rest", text), settings=replace(settings, estimate=estimate))

@@ -1,0 +1,40 @@
+"""Settings that steps find of records alone, and states of bare positions, for tests that have no robot."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from runtime.compose import READERS, problem, stated
+from runtime.core.automatic import automatic_cutoff
+from runtime.core.problem import prepared
+from runtime.loop.closed_loop import closed_loop
+from runtime.median import torque_median
+from runtime.records.record import Origin, Record
+from runtime.speeds import recorded_speeds
+
+
+def resolved(study, records):
+    """The settings after the automatic ones have their numbers, and what the steps say."""
+    model = SimpleNamespace(JOINTS=range(records[0].n), NAME="none", DRIVES=None)
+    steps = (torque_median, recorded_speeds, automatic_cutoff)
+    problem = prepared(stated(model, records, study), steps)
+    return problem.settings, " ".join(note.text for note in problem.notes)
+
+
+def observed_states(q, rate, signals, drives=None, *, missing=None):
+    """States of joint positions q, shape (N, n), by the reader of the signals."""
+    record = Record(
+        np.arange(len(q)) / rate,
+        q,
+        np.zeros_like(q),
+        rate=rate,
+        missing=missing,
+        origin=Origin(drives=drives),
+    )
+    return READERS[signals.reader](record, signals)
+
+
+def loop_of_records(model, records, study, simulator, **options):
+    """The closed loop of records, as a study reads them."""
+    whole = problem(model, records, study)
+    return closed_loop(whole, whole.prepared, simulator, **options)
