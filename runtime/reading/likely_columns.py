@@ -46,26 +46,31 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
 
     def ranked(key: str) -> list[tuple[bool, int, int, str]]:
         return sorted(
-            (bool(NOT_MEASURED & _words(stem)), QUANTITY_WORDS[key].index(word), -len(own), stem)
-            for stem, own in stems.items()
+            (bool(NOT_MEASURED & _words(stem)), QUANTITY_WORDS[key].index(word), -len(alike), stem)
+            for stem, alike in stems.items()
             for word in _words(stem) & {*QUANTITY_WORDS[key]}
         )
 
-    positions = [stem for *_, stem in ranked("q")][:1]
-    alike = [
-        one
-        for one in ranked("tau")
-        if positions and one[-1] != positions[0] and one[2] == -len(stems[positions[0]])
-    ]
-    if not alike:
+    positions = next((stem for *_, stem in ranked("q")), None)
+    if positions is None:
         return {}
-    _, word, _, torques = alike[0]
+    n = len(stems[positions])
+    torques, word = next(
+        (
+            (stem, word)
+            for _, word, count, stem in ranked("tau")
+            if stem != positions and count == -n
+        ),
+        ("", 0),
+    )
+    if not torques:
+        return {}
     time = next((name for name in names if _words(name) & TIME), "")
-    columns = {"q": stems[positions[0]], "tau": stems[torques], **({"t": time} if time else {})}
+    columns = {"q": stems[positions], "tau": stems[torques], **({"t": time} if time else {})}
     units = {"tau": "A"} if QUANTITY_WORDS["tau"][word].startswith("cur") else {}
     for key, name, read in (
         ("t", time, time_unit),
-        ("q", positions[0], position_unit),
+        ("q", positions, position_unit),
         ("tau", torques, torque_unit),
     ):
         words = re.split(r"[\W\d_]+", name.lower())

@@ -123,43 +123,44 @@ def resampled(
 ) -> tuple[list[Stretch], float, str]:
     """Stretches at a uniform rate, that rate in Hz, and what was done, as a sentence.
 
-    t, shape (N,), s; signals and masks, each of shape (N, n).
-    stamps : those of t.
-    rate : of the record, where it is stated.
+    Parameters
+    ----------
+    t : ndarray, shape (N,), s
+        Stamps.
+    signals : sequence of ndarray, shape (N, n)
+        Signals, and masks of bool.
+    stamps : TimeStamps
+        What the stamps are like.
+    rate : float or None, Hz
+        Of the record, where it is stated.
     """
     if settings.gaps == "refuse" and (stamps.gaps or stamps.resets):
         raise InputError(
-            (
-                "time has gaps or goes back; set record.resample.gaps: split to cut the record "
-                "there, "
-                "or record.resample.longest to bridge longer gaps"
-            ),
+            "time has gaps or goes back; set record.resample.gaps: split to cut the record there, or record.resample.longest to bridge longer gaps",
             file=file,
         )
     step = np.diff(t)
     counted = settings.method == "count"
     regular = step[(step >= 0 if counted else step > 0) & (step <= stamps.longest)]
-    own = len(regular) / float(regular.sum())
-    wanted = settings.rate or rate or own
-    if wanted < LOWEST * own:
+    mean_rate = len(regular) / float(regular.sum())
+    wanted = settings.rate or rate or mean_rate
+    if wanted < LOWEST * mean_rate:
         raise InputError(
-            f"record.resample.rate {wanted:g} Hz, below the {own:g} Hz of the record: what is "
-            f"faster than {wanted / 2:g} Hz would be folded; "
-            "resample at its rate or above, signals.decimate lowers it afterwards",
+            f"record.resample.rate {wanted:g} Hz, below the {mean_rate:g} Hz of the record: what is faster than {wanted / 2:g} Hz would be folded; resample at its rate or above, signals.decimate lowers it afterwards",
             file=file,
         )
     cuts = [0, *sorted(s.sample for s in (*stamps.gaps, *stamps.resets)), len(t)]
-    stretches, short = [], 0
+    stretches = []
+    short = 0
     for a, b in pairwise(cuts):
         keep = np.concatenate([[True], (step[a : b - 1] != 0) | counted])
+        piece = [x[a:b][keep] for x in signals]
         if np.count_nonzero(keep) < LIMIT.FEWEST_SAMPLES or t[b - 1] - t[a] < settings.shortest:
             short += 1
         elif counted:
-            stretches.append(_counted(t[a:b], [x[a:b] for x in signals], wanted, file))
+            stretches.append(_counted(t[a:b], piece, wanted, file))
         else:
-            stretches.append(
-                _uniform(t[a:b][keep], [x[a:b][keep] for x in signals], wanted, settings.method)
-            )
+            stretches.append(_uniform(t[a:b][keep], piece, wanted, settings.method))
     if not stretches:
         raise InputError(
             f"no stretch of {settings.shortest:g} s without a gap; lower record.resample.shortest",
@@ -167,29 +168,24 @@ def resampled(
         )
     samples = sum(len(stretch.t) for stretch in stretches)
     done = "taken as uniform" if counted else "resampled"
-    text = (
-        f"{done} at {wanted:.6g} Hz ({settings.method}): {samples} samples in {len(stretches)} "
-        f"stretch{'es' if len(stretches) > 1 else ''}"
-    )
-    left = [
-        f"{short} shorter than {settings.shortest:g} s left out" if short else "",
-        f"{len(stamps.repeats)} samples of repeated stamps left out"
-        if stamps.repeats and not counted
-        else "",
+    plural = "es" if len(stretches) > 1 else ""
+    parts = [
+        f"{done} at {wanted:.6g} Hz ({settings.method}): {samples} samples in {len(stretches)} stretch{plural}"
     ]
-    return stretches, wanted, ", ".join([text, *(part for part in left if part)])
+    if short:
+        parts.append(f"{short} shorter than {settings.shortest:g} s left out")
+    if stamps.repeats and not counted:
+        parts.append(f"{len(stamps.repeats)} samples of repeated stamps left out")
+    return stretches, wanted, ", ".join(parts)
 
 
 def _counted(t: Array, signals: Sequence[Array], rate: float, file: str) -> Stretch:
-    """The signals as they are, at t[0] + k/rate. Raises InputError where the stamps last longer or
-    shorter than so many samples.
-    """
-    N, last = len(t), float(t[-1] - t[0])
+    """The signals as they are, at t[0] + k/rate. Raises InputError where the stamps last longer or shorter than so many samples."""
+    N = len(t)
+    last = float(t[-1] - t[0])
     if abs(last * rate - (N - 1)) > 1 + DRIFT * N:
         raise InputError(
-            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, "
-            f"their stamps {last:.6g} s: the rate is another, or samples are "
-            "missing; state record.rate, or cut at shorter gaps by record.resample.longest",
+            f"{N} samples from t = {t[0]:g} s on last {(N - 1) / rate:.6g} s at {rate:.6g} Hz, their stamps {last:.6g} s: the rate is another, or samples are missing; state record.rate, or cut at shorter gaps by record.resample.longest",
             file=file,
         )
     return Stretch(t[0] + np.arange(N) / rate, tuple(signals))

@@ -1,7 +1,7 @@
 """A study whose records can be read: what refuses to read them says what would cure it, and that is
 put into the study, until nothing refuses.
 
-    study, told = suggested(study, model)
+    study, sentences = suggested(study, model)
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ from runtime.settings.yaml import yaml_text
 
 
 def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
-    """The study with the remedy of each refusal in its records, and sentences that tell them. They
-    are likely, by names and time stamps, not known: a person looks at them.
+    """The study with the remedy of each refusal in its records, and a sentence on each. Remedies are likely, by names and time stamps, not known: a person looks at them.
 
     Raises
     ------
     InputError
         A refusal that has no remedy, or whose remedy does not help.
     """
-    told: list[str] = []
+    sentences: list[str] = []
     while True:
         try:
             read_records(study.record, model, missing=study.signals.admits_missing)
         except InputError as e:
             text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
-            if not e.remedy or text in told:
+            if not e.remedy or text in sentences:
                 raise
-            told.append(text)
+            sentences.append(text)
             mapping = to_mapping(study)
             for record in mapping["record"]:
                 for key, value in e.remedy.items():
-                    own = record[key] if isinstance(value, Mapping) else None
-                    record[key] = {**(own or {}), **value} if isinstance(value, Mapping) else value
+                    if isinstance(value, Mapping):
+                        value = {**(record[key] or {}), **value}
+                    record[key] = value
             study = study_from_mapping(mapping)
         else:
-            return study, told
+            return study, sentences
