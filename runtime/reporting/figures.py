@@ -16,7 +16,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import LayoutEngine
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from runtime.identification.friction import FrictionCurve
@@ -24,7 +23,6 @@ from runtime.identification.residuals import Whiteness
 from runtime.identification.validation import JointComparison
 from runtime.limits import LIMIT
 from runtime.reporting.page import Image
-from runtime.reporting.panels import PanelLayout
 from runtime.reporting.series import Series, series
 from runtime.resolution.result import Cestac
 
@@ -46,7 +44,6 @@ STYLE: Any = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.titlesize": 9.0,
-    "axes.titley": 1.0,  # not sought
     "grid.color": "#DDDDDD",
     "grid.linewidth": 0.5,
     "legend.frameon": False,
@@ -93,7 +90,7 @@ def joint_overlay(joint: JointComparison, unit: str = "N m", source: str = "meas
     source : "measured" or "simulated".
     """
     with mpl.rc_context(STYLE):
-        figure = empty_figure((5.4, 3.4), layout=PanelLayout())
+        figure = empty_figure((5.4, 3.4))
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         _torques(upper, lower, joint, source)
         upper.set_ylabel(f"torque, {unit}")
@@ -153,7 +150,7 @@ def spectra_figure(
         ax.set(title=f"joint {w.joint}", xlabel="frequency, Hz")
 
     figure = panels(joints, draw, 3, cell=(3.2, 2.0), extra=0.6, least=5.4, legend=2, letters=8)
-    figure.supylabel(f"density, ({unit})²/Hz", fontsize=9, x=0.005)
+    figure.supylabel(f"density, ({unit})²/Hz", fontsize=9)
     return figure
 
 
@@ -223,8 +220,7 @@ def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figur
         ax.set_ylabel("%e: change of the estimate, %")
 
     limits = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)
-    room = PanelLayout(right=0.45, below=0.25)
-    return panels([limits], draw, 1, cell=(6.4, 4.0), legend=4, letters=8, layout=room)
+    return panels([limits], draw, 1, cell=(6.4, 4.0), legend=4, letters=8)
 
 
 def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
@@ -251,7 +247,6 @@ def panels(
     least: float = 0.0,
     legend: int = 0,
     letters: float = STYLE["font.size"],
-    layout: LayoutEngine | None = None,
 ) -> Figure:
     """A figure with a panel for each item, row by row.
 
@@ -267,14 +262,12 @@ def panels(
     legend : int
         Columns of the one legend above the figure, every label once, in letters of `letters`
         points; 0: none.
-    layout : LayoutEngine, optional
-        Room around the panels.
     """
     columns = max(1, min(columns, len(items)))
     rows = -(-len(items) // columns)
     with mpl.rc_context(STYLE):
         size = (max(least, cell[0] * columns), cell[1] * rows + extra)
-        figure = empty_figure(size, layout or PanelLayout())
+        figure = empty_figure(size)
         grid = figure.add_gridspec(rows, columns)
         for k, item in enumerate(items):
             draw(figure.add_subplot(grid[k]), item)
@@ -282,9 +275,8 @@ def panels(
             labelled = [ax.get_legend_handles_labels() for ax in figure.axes]
             entries = {name: handle for own in labelled for handle, name in zip(*own, strict=True)}
             handles = list(entries.values())
-            figure.legend(
-                handles, list(entries), ncols=legend, loc="upper center", fontsize=letters
-            )
+            place: Any = "outside upper center"
+            figure.legend(handles, list(entries), ncols=legend, loc=place, fontsize=letters)
     return figure
 
 
@@ -307,21 +299,16 @@ def _power(x: float, _: int) -> str:
     return f"{x:g}" if 1e-3 < x < 1e4 else "10" + str(round(np.log10(x))).translate(RAISED)
 
 
-def empty_figure(size: tuple[float, float], layout: LayoutEngine) -> Figure:
-    figure = Figure(figsize=size, layout=layout)
+def empty_figure(size: tuple[float, float]) -> Figure:
+    figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def _rendered(figure: Figure, form: str) -> bytes:
-    """The figure in one form. Panels get their places once: matplotlib alone would seek them twice
-    for each form.
-    """
+    """The figure in one form."""
     stream = BytesIO()
     with mpl.rc_context(STYLE):
-        if (engine := figure.get_layout_engine()) is not None:
-            engine.execute(figure)
-            figure.set_layout_engine(None)
         figure.savefig(
             stream,
             format=form,

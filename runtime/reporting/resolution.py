@@ -91,7 +91,7 @@ def advice_figure(advice: Advice) -> Figure:
         outer: Any = {"labelleft": k % columns == 0, "labelbottom": k + columns >= len(names)}
         ax.tick_params(labelsize=7, **outer)
     figure.supxlabel(f"resolution Δ of every encoder, {advice.unit}", fontsize=9)
-    figure.supylabel("%e: change of the estimate, %", fontsize=9, x=0.005)
+    figure.supylabel("%e: change of the estimate, %", fontsize=9)
     return figure
 
 
