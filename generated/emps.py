@@ -48,8 +48,8 @@ CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
-inverse_dynamics_derivatives at random states, parameters and random constants agree with
-Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
+with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
 sha256 of all but these lines: eb5de657e24108089a07427d2e5a15afb25bcd65c7b5f0b34b42f1ca9b085bf7
 """

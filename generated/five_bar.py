@@ -73,9 +73,9 @@ Arrays      NumPy's, float64: joints that only the closure equations tie are fou
 
 Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-states, parameters and random constants agree with Lagrange's equations and products of frames to
-1e-09, on NumPy's arrays.
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
+at random states, parameters and random constants agree with Lagrange's equations and products of
+frames to 1e-09, on NumPy's arrays.
 sha256 of all but these lines: fef20350bb8db526b7f52ddda15ee548ec96919f3898061ca0b2cbeb4f8d3d98
 """
 

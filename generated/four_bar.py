@@ -71,9 +71,9 @@ Arrays      NumPy's, float64: joints that only the closure equations tie are fou
 
 Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 6e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
-inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints at random
-states, parameters and random constants agree with Lagrange's equations and products of frames to
-1e-09, on NumPy's arrays.
+inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
+at random states, parameters and random constants agree with Lagrange's equations and products of
+frames to 1e-09, on NumPy's arrays.
 sha256 of all but these lines: df375c80f8720a91a7936607ced16b1caef28fb677cbd371af1cab4306984196
 """
 

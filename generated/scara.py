@@ -70,8 +70,8 @@ CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 4e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
-inverse_dynamics_derivatives at random states, parameters and random constants agree with
-Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
+with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
 sha256 of all but these lines: 1ab122b47eb677bedf3d03fae90625d4337ca18f2af1817653310f3f00ff0037
 """

@@ -77,8 +77,8 @@ CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
-inverse_dynamics_derivatives at random states, parameters and random constants agree with
-Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
+inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
+with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
 sha256 of all but these lines: da3950feb1ad2233c118252c65cd1832bfdfa1f72ef2c7ec47c3073e50cad2c1
 """

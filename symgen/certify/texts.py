@@ -28,6 +28,7 @@ import numpy as np
 from symgen.certify import call_c
 from symgen.certify.importing import END, HEAD, imported, without_certificate
 from symgen.certify.witness import STATES, Check, Witness
+from symgen.derive.columns import acting, element_names
 from symgen.derive.exact import Array
 from symgen.derive.models import MODELS
 from symgen.emit.generate import EMITTERS
@@ -38,7 +39,7 @@ TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, 
 C_FLAGS = ("-std=c11", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
 WITHOUT_AVX512 = "-D__builtin_cpu_supports(x)=0"  # another way past the caches
 LONGEST_RUN = 300  # s, of the compiler and of the functions
-HELPERS = {"store", "elements", "casadi"}
+HELPERS = {"store", "casadi"}
 """Public names that are no models."""
 NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
 DERIVATIVES = "inverse_dynamics_derivatives"
@@ -188,6 +189,13 @@ def module_errors(
             errors[DERIVATIVES] = _derivative_error(module, witness)
         except Exception as error:  # a text may fail in any way
             errors[DERIVATIVES], raised[DERIVATIVES] = float("inf"), repr(error)
+    try:
+        right = same_elements(
+            module.elements(**witness.keywords), witness.constants, witness
+        ) and same_elements(module.elements(), witness.robot.constants, witness)
+    except Exception as error:  # a text may fail in any way
+        right, raised["elements"] = False, repr(error)
+    errors["elements"] = 0.0 if right else float("inf")
     public = {n for n, value in vars(module).items() if isinstance(value, FunctionType)}
     known = {*errors, *HELPERS, *witness.left_out}
     for name in public - known:
@@ -282,6 +290,21 @@ def _derivative_error(module: ModuleType, witness: Witness) -> float:
         difference(A, witness.A[0], np.abs(witness.A).max()),
         difference(D, witness.own[0], np.abs(witness.own).max()),
     )
+
+
+def same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
+    """Whether every element has its kind, its direction of motion, its row or its form."""
+    expected = element_names(witness.robot)
+    if list(table) != [name for name in witness.robot.parameters if name in expected]:
+        return False
+    for name, (e, j) in expected.items():
+        kind, when, row = table[name]
+        right = {i: c.value(constants) for i, c in acting(e, j).items()}
+        if (kind, when) != (e.acts_as, e.when or "both") or {*row} != {*right}:
+            return False
+        if any(abs(row[i] - c) > TOLERANCE * abs(c) for i, c in right.items()):
+            return False
+    return True
 
 
 # --- C ---

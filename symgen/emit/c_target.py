@@ -15,10 +15,11 @@ from typing import Any
 from symgen.derive.graph import Scalar
 from symgen.derive.model import Model
 from symgen.description.namespace import Namespace
+from symgen.emit.blocks import label
 from symgen.emit.c_printer import CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
-from symgen.emit.python_target import label, signature
+from symgen.emit.python_target import signature
 from symgen.emit.render import WIDTH, laid_out
 from symgen.emit.spec import STATES, Function, ModuleSpec, signals
 from symgen.version import VERSION

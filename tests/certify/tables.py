@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from certify.printed import definitions, evaluated
 
+from symgen.certify.texts import same_elements
 from symgen.certify.witness import Witness
-from symgen.derive.columns import acting, element_names, unit
+from symgen.derive.columns import unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
 from symgen.emit.header import channels, scalars
@@ -51,7 +52,7 @@ def _right(module: ModuleType, name: str, witness: Witness) -> bool:
             return all(constants[c] == x for c, x in defaults if c in constants)
         case "ELEMENTS":
             drawn = module.elements(**witness.keywords)
-            return _same_elements(value, constants, witness) and _same_elements(
+            return same_elements(value, constants, witness) and same_elements(
                 drawn, witness.constants, witness
             )
         case "STRUCTURE":
@@ -121,18 +122,3 @@ def formulas_hold(formulas: Any, witness: Witness) -> bool:
     size = EVALUATED_TWICE * np.abs(witness.X).max(initial=1e-300)
     found = evaluated(formulas, {**chi, **witness.constants})
     return all(abs(found[name] - X[name]) < size for name in found if name in X)
-
-
-def _same_elements(table: Any, constants: Mapping[str, float], witness: Witness) -> bool:
-    """Whether every element has its kind, its direction of motion, its row or its form."""
-    expected = element_names(witness.robot)
-    if list(table) != [name for name in witness.robot.parameters if name in expected]:
-        return False
-    for name, (e, j) in expected.items():
-        kind, when, row = table[name]
-        right = {i: c.value(constants) for i, c in acting(e, j).items()}
-        if (kind, when) != (e.acts_as, e.when or "both") or {*row} != {*right}:
-            return False
-        if any(abs(row[i] - c) > EVALUATED_TWICE * abs(c) for i, c in right.items()):
-            return False
-    return True

@@ -46,7 +46,7 @@ elements:
 """
 FUNCTIONS = ("regressor", "inverse_dynamics", "inertia_matrix", "gravity")
 ALL = {
-    *FUNCTIONS, "bias", "base_parameters", "observation_matrix", "forward_dynamics", "frame_poses",
+    *FUNCTIONS, "bias", "elements", "base_parameters", "observation_matrix", "forward_dynamics", "frame_poses",
     "jacobian",
 }  # fmt: skip
 

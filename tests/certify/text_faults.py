@@ -1,9 +1,9 @@
-"""Random faults in emitted texts: a sign, an index, two exchanged names, a term or a row that is
-dropped, a wrong shape; in any function of any text.
+"""Random faults in emitted texts: a sign, an index, a constant, an operator, two exchanged names, a
+term or a row that is dropped, a wrong shape; in any function of any text.
 
     python tests/certify/text_faults.py [COUNT] [SEED]      a table of faults and survivors
 
-A fault is one changed line of a function, or of a table. Lines that compute nothing (comments,
+A fault is one changed line of a function; tables are read back by `test_tables.py`. Lines that compute nothing (comments,
 docstrings, messages of errors, hints) are left alone. A fault that changes no value at all, shown
 in EQUIVALENT by a reason, may survive; any other has to be refused.
 """
@@ -105,7 +105,7 @@ def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
                 inside = found[1]
         else:
             quoted ^= line.count('"""') % 2 == 1
-            if (found := start.match(line)) or (found := re.match(r"^([A-Z_]+) = ", line)):
+            if found := start.match(line):
                 inside = found[1]
             elif line[:1].isalpha():
                 inside = ""
@@ -138,6 +138,27 @@ def other_index(line: str, rng: random.Random) -> str:
         + str(int(m[0]) + rng.choice((1, -1)) if int(m[0]) else 1)
         + line[m.end() :]
     )
+
+
+def other_constant(line: str, rng: random.Random) -> str:
+    """2 becomes 3, 0.5 becomes 1.5, a default by 0.1."""
+    code, _, value = line.partition(" = ")
+    places = list(re.finditer(r"(?<![\w.\[])\d+(\.\d+)?(?![\w.\]])", value))
+    if not places:
+        return line
+    m = rng.choice(places)
+    changed = f"{float(m[0]) + 1.0}" if "." in m[0] else str(int(m[0]) + 1)
+    return f"{code} = {value[: m.start()]}{changed}{value[m.end() :]}"
+
+
+def other_operator(line: str, rng: random.Random) -> str:
+    """A product becomes a sum, a square a cube, cos sin."""
+    places = list(re.finditer(r"(?<=[\w)])\*\*2|(?<=[\w)])\*(?=[\w(])|\b(cos|sin)(?=\()", line))
+    if not places or "**{" in line or "(*" in line:
+        return line
+    m = rng.choice(places)
+    new = {"**2": "**3", "*": " + ", "cos": "sin", "sin": "cos"}[m[0]]
+    return line[: m.start()] + new + line[m.end() :]
 
 
 def exchanged(line: str, rng: random.Random) -> str:
@@ -178,7 +199,8 @@ def wrong_shape(line: str, rng: random.Random) -> str:
 
 
 KINDS: tuple[Callable[[str, random.Random], str], ...] = (
-    turned_sign, other_index, exchanged, dropped_term, dropped_row, wrong_shape,
+    turned_sign, other_index, other_constant, other_operator, exchanged, dropped_term, dropped_row,
+    wrong_shape,
 )  # fmt: skip
 
 

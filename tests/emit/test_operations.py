@@ -13,9 +13,9 @@ from campaign import sampled
 from symgen.derive.graph import ADD, CONST, INV, MUL, POS, SYM
 from symgen.derive.models import OPTIONS
 from symgen.description import load_robot, packaged_robots
+from symgen.emit.blocks import blocks_of
 from symgen.emit.generate import generate_module
 from symgen.emit.printers import PYTHON
-from symgen.emit.python_target import blocks_of
 from symgen.emit.spec import (
     SHARING,
     Function,
