@@ -229,19 +229,19 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
     assert errors["fit"] == pytest.approx(errors[str(KD.tolist())], rel=0.02)
 
 
-def test_what_identify_has_to_find_first_is_not_taken_for_a_torque(tmp_path):
-    """cestac and compare read records of their own."""
-    from runtime import cestac, compare
+def test_every_entry_point_has_the_torque_of_the_found_law(tmp_path):
+    """Estimate and cestac took the torque without kd, or refused."""
+    from runtime import cestac, estimate
+    from runtime.settings.study import CestacSettings
 
-    study = logged_early(tmp_path, kd="fit")
+    settings = CestacSettings(delta=(1e-6,), runs=2, columns="all")
+    study = replace(logged_early(tmp_path, kd="fit"), cestac=settings)
     records = read_records(study.record)
-    with pytest.raises(SettingsError, match="identify finds it"):
-        cestac(planar, records, study)
-    validated = replace(study, validate=replace(study.validate, record=study.record))
-    with pytest.raises(SettingsError, match="identify finds it"):
-        compare(planar, {"a": validated, "b": validated})
     known = identified(study)
     assert "law_v" not in known.records[0].channels
+    np.testing.assert_allclose(estimate(planar, records, study).X, known.estimate.X, rtol=1e-9)
+    reference = cestac(planar, records, study).reference
+    np.testing.assert_allclose(reference.X, known.estimate.X, rtol=0.02, atol=0.01)
 
 
 def test_coverage_of_the_stated_deviation(tmp_path):
