@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from runtime.errors import InputError, instant
-from runtime.settings.yaml import yaml_text
 
 Array = np.ndarray
 
@@ -135,9 +134,9 @@ def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
         does.append("makes a record of each piece between gaps")
     if "longest" in settings:
         does.append(f"bridges gaps of up to {settings['longest']:g} periods by interpolation")
-    written = yaml_text({"resample": settings}).removeprefix("resample:").strip()
+    written = ", ".join(f"{key}: {value}" for key, value in settings.items())
     uniform = "{gaps: split, method: count}" if "gaps" in settings else "{method: count}"
-    return f"{count} record.resample: {written} {' and '.join(does) or 'interpolates at the stamps'}. Where samples are uniform and their stamps alone are not: record.resample: {uniform}, or record.rate: {rate:.6g} without columns.t"
+    return f"{count} record.resample: {{{written}}} {' and '.join(does) or 'interpolates at the stamps'}. Where samples are uniform and their stamps alone are not: record.resample: {uniform}, or record.rate: {rate:.6g} without columns.t"
 
 
 @dataclass(frozen=True)

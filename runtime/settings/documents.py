@@ -115,7 +115,10 @@ def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
     try:
         result: T = TypeAdapter(kind).validate_python(data)
     except ValidationError as e:
-        raise InputError(f"{settings_error(e, data)}; the file was changed", file=file) from e
+        raise InputError(
+            f"{settings_error(e, data)}; the file was changed, or another version of symgen wrote it",
+            file=file,
+        ) from e
     return result
 
 
