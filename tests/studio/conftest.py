@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from runtime.parallel import OtherProcess
 from symgen.studio import folder, server, serving
+from symgen.studio.child import ViewProcess
 
 COMMAND = "from symgen.cli.main import main; main()"
 PROGRAMS = {
@@ -49,20 +49,20 @@ class Studio:
 
 
 @pytest.fixture(scope="module")
-def process() -> Iterator[OtherProcess]:
+def process() -> Iterator[ViewProcess]:
     """The process of views, one for all tests of a file."""
-    own = OtherProcess()
+    own = ViewProcess()
     yield own
     own.end()
 
 
 @pytest.fixture
-def studio(tmp_path: Path, process: OtherProcess) -> Iterator[Studio]:
+def studio(tmp_path: Path, process: ViewProcess) -> Iterator[Studio]:
     own = Studio(tmp_path / "work")
     own.server.process = process
     with own.client:
         yield own
-        own.server.process = OtherProcess()
+        own.server.process = ViewProcess()
 
 
 class Running:
