@@ -40,7 +40,7 @@ from runtime.reading.records import read_records  # noqa: E402
 from runtime.resolution.advice import LIMITS, crossing  # noqa: E402
 from runtime.resolution.coarse_encoders import CoarseEncoders  # noqa: E402
 from runtime.settings.study import study_from_mapping  # noqa: E402
-from symgen.demo.tx40_tables import MAIN  # noqa: E402
+from symgen.demo import MAIN  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 

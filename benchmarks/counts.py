@@ -49,7 +49,7 @@ from runtime.signals.counts.lattice import lattice
 from runtime.signals.counts.reading import read_counts
 from runtime.signals.filters import filtered_states
 from runtime.table import aligned
-from symgen.demo.tx40_tables import MAIN
+from symgen.demo import MAIN
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 

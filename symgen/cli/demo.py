@@ -20,7 +20,7 @@ def demo(
     be had, and judge its encoder resolution, beside the published tables.
     """
     with session.results_in(output) as results:
-        from symgen.demo.tx40 import demonstrate, prepare
+        from symgen.demo import demonstrate, prepare
 
         prepared = prepare(quick=quick)
         if prepared.note:

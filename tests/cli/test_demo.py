@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 import symgen
 from runtime.loop.reference import point_to_point
 from runtime.settings.controller import Points
+from symgen import demo as simulated
+from symgen import demo as tx40
 from symgen.cli.demo import demo
-from symgen.demo import simulated_record as simulated
-from symgen.demo import tx40, tx40_tables
-from symgen.demo.tx40_page import differences
+from symgen.demo import differences
 
 
 def run(*arguments):
@@ -73,7 +73,7 @@ def test_offline_recovers_what_was_put_in(offline):
     estimate = json.loads((out / "estimate.json").read_text())
     found = dict(zip(estimate["names"], estimate["X"], strict=True))
     for name in ("ZZ1R", "FV1", "MX2R", "FV2", "FS2", "FS3"):
-        assert found[name] == pytest.approx(tx40_tables.TABLE_2[name], rel=0.1)
+        assert found[name] == pytest.approx(tx40.TABLE_2[name], rel=0.1)
 
 
 def test_simulated_trajectory_keeps_the_limits():
@@ -114,9 +114,9 @@ def check_table_2(shown):
 def check_table_3(shown):
     i = shown.resolution.names.index("ZZ1R")
     assert [level.mean[i] for level in shown.resolution.levels] == pytest.approx(
-        tx40_tables.TABLE_3["ZZ1R"], abs=0.07
+        tx40.TABLE_3["ZZ1R"], abs=0.07
     )
-    assert len(shown.torque.levels) == 1 + 2 * len(tx40_tables.PHI)
+    assert len(shown.torque.levels) == 1 + 2 * len(tx40.PHI)
 
 
 def check_report(shown, folder):

@@ -3,7 +3,7 @@
 import couplings
 from campaign import campaign
 
-from symgen.demo import tx40
+from symgen import demo as tx40
 
 
 @campaign

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from campaign import campaign
 
-from symgen.demo import simulated_record as simulated
+from symgen import demo as simulated
 from symgen.description import load_robot
 
 # chapter, Tables 6 and 7: the fourteen parameters in the order printed, fC as FS

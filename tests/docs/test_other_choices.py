@@ -5,7 +5,7 @@ from campaign import campaign
 
 import runtime
 from runtime.settings.study import CestacSettings
-from symgen.demo import tx40, tx40_tables
+from symgen import demo as tx40
 
 
 @campaign
@@ -26,7 +26,7 @@ def test_slow_rows_and_other_choices(tx40_data):
     choices = other_choices.choices(study, len(base.names))
     assert len(choices) == 8
     other, settings = choices["true quantisation"]
-    study = tx40.changed(other, "cestac", delta=tx40_tables.DELTA, runs=2, **settings)
+    study = tx40.changed(other, "cestac", delta=tx40.DELTA, runs=2, **settings)
     assert study.cestac != CestacSettings()
     result = runtime.cestac(prepared.model, record, study, columns=fits[labels[0]].names)
     text = other_choices.choices_table({"true quantisation": result}).to_text()

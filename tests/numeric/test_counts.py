@@ -31,7 +31,7 @@ from runtime.signals.counts.reading import MARGIN, STRETCH, read_counts, stretch
 from runtime.signals.counts.spline import Basis, Factor, next_density
 from runtime.signals.encoder_advice import encoder_sentences
 from runtime.signals.filters import filtered_states
-from symgen.demo.tx40_tables import MAIN
+from symgen.demo import MAIN
 
 GENERATED = Path(__file__).parents[2] / "generated"
 

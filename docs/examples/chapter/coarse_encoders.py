@@ -27,8 +27,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import runtime
-from symgen.demo.tx40 import changed, prepare
-from symgen.demo.tx40_tables import MAIN
+from symgen.demo import MAIN, changed, prepare
 
 COUNTS = (5000, 2000, 1000, 500, 250, 100)  # steps a turn, at the joints
 KEY = "ZZ1R"

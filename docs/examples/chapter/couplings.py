@@ -15,8 +15,7 @@ from runtime import Estimate, Record
 from runtime.markup import number
 from runtime.model.drives import Coupling, Drives
 from runtime.table import Table
-from symgen.demo.simulated_record import Prepared
-from symgen.demo.tx40 import prepare
+from symgen.demo import Prepared, prepare
 
 COUPLINGS: dict[Coupling, str] = {
     "both": "position and torque (used where the settings say so)",

@@ -24,7 +24,7 @@ import numpy as np
 
 import runtime
 from runtime.loop.reference import Reference
-from symgen.demo.simulated_record import Prepared, simulated_record
+from symgen.demo import Prepared, simulated_record
 
 Array = np.ndarray
 Jet = Array  # shape (3, N): a function of time, its first and its second derivative

@@ -31,8 +31,7 @@ from runtime.markup import number
 from runtime.model.drives import Drives
 from runtime.settings.study import CestacSettings, Lowpass, Signals
 from runtime.table import Table
-from symgen.demo.tx40 import changed, prepare
-from symgen.demo.tx40_tables import DELTA, TABLE_2, TABLE_3
+from symgen.demo import DELTA, TABLE_2, TABLE_3, changed, prepare
 
 FASTER = 100.0  # Hz, the other cut-off
 SLOW = 0.01  # of the top speed of each joint: rows below it are left out

@@ -1,1 +1,0 @@
-"""The main job of the chapter end to end: the Staubli TX40 beside its published tables."""
