@@ -30,7 +30,7 @@ def main(which: list[str]) -> None:
         usual = (
             set()
             if isinstance(result, str)
-            else {c.question for c in result.checks if c.state in ("no", "doubtful")}
+            else {c.question for c in result.checks() if c.state in ("no", "doubtful")}
         )
         print(f"== {name}: right study told of {sorted(usual) or 'nothing'}", flush=True)
         counts = dict.fromkeys(("named", "wrong", "silent", "equivalent"), 0)

@@ -478,7 +478,7 @@ def causes(k: int, seed: int, seeds: str) -> list[Row]:
     model, variants = emitted(robot.name)
     record = runtime.Record(np.arange(len(q)) / world.RATE, q, tau)
     found = runtime.plausibility(model, record, study(robot, motion), variants=variants)
-    told = [c for c in found.checks if c.state in ("doubtful", "no")]
+    told = [c for c in found.checks() if c.state in ("doubtful", "no")]
     named = [one["cause"] for one in found.named_causes]
     texts = [*(f"{c.question} {c.finding}" for c in told), *named]
     texts, named = ([re.sub(r"(\d+) joint\1\b", r"\1", x) for x in own] for own in (texts, named))

@@ -32,7 +32,7 @@ def fit(job):
     if result.plausibility:
         for trial in result.plausibility.named:
             print(trial.cause.says)
-        for check in result.plausibility.checks:
+        for check in result.plausibility.checks():
             if check.state in ("no", "doubtful"):
                 print(check.finding)
     return answer(model, result.model_estimate)

@@ -243,18 +243,16 @@ class Program:
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
-            try:
-                solution = clarabel.DefaultSolver(
-                    sparse.csc_matrix(np.triu(Q)),
-                    self.linear,
-                    sparse.csc_matrix(-whole),
-                    np.concatenate(b),
-                    list(cones),
-                    settings,
-                ).solve()
-            except BaseException as e:  # a panic of Rust is no Exception
-                if type(e).__name__ != "PanicException":
-                    raise
+            solver = clarabel.DefaultSolver(
+                sparse.csc_matrix(np.triu(Q)),
+                self.linear,
+                sparse.csc_matrix(-whole),
+                np.concatenate(b),
+                list(cones),
+                settings,
+            )
+            solution = _solution(solver)
+            if solution is None:
                 status = "Clarabel stopped by an error of its own"
                 continue
             status = STATUS.get(str(solution.status), f"Clarabel: {solution.status}")
@@ -344,10 +342,11 @@ class Quadratic:
             self.solver = self._solver(squares, linear, scaled=True)
         else:
             self.solver.update(P=squares, q=linear)
-        solution = self.solver.solve()
-        if STATUS.get(str(solution.status)) not in SOLVED:
-            solution = self._solver(squares, linear, scaled=False).solve()
-        x = np.array(solution.x)
+        solution = _solution(self.solver)
+        if solution is None or STATUS.get(str(solution.status)) not in SOLVED:
+            self.solver = None
+            solution = _solution(self._solver(squares, linear, scaled=False))
+        x = np.zeros(len(g)) if solution is None else np.array(solution.x)
         return self.scale * np.where(np.isfinite(x), x, 0.0)
 
     def _solver(self, squares: Array, linear: Array, *, scaled: bool) -> Any:
@@ -360,11 +359,21 @@ class Quadratic:
         settings.chordal_decomposition_enable = False
         settings.input_sparse_dropzeros = False
         settings.equilibrate_enable = not scaled
-        settings.iterative_refinement_enable = not scaled
+        settings.iterative_refinement_abstol = settings.iterative_refinement_reltol = 1e-8
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-7
         p, b = len(linear), np.zeros(self.A.shape[0])
         Q = sparse.csc_matrix((squares, self.upper[0], self.starts), shape=(p, p))
         return clarabel.DefaultSolver(Q, linear, self.A, b, self.cones, settings)
+
+
+def _solution(solver: Any) -> Any:
+    """What Clarabel gives; None where it stops by an error of its own."""
+    try:
+        return solver.solve()
+    except BaseException as e:  # a panic of Rust is no Exception
+        if type(e).__name__ != "PanicException":
+            raise
+        return None
 
 
 def _cone(n: int) -> Any:

@@ -342,7 +342,7 @@ class Identification:
             expected=self.expected,
             single=self.study.validate.values,
             advice=self.advice,
-            plausible=self.plausibility.checks if self.plausibility is not None else (),
+            plausible=self.plausibility.checks() if self.plausibility is not None else (),
         )
 
     @property

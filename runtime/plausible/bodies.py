@@ -58,13 +58,13 @@ class Grams:
         """Of a regressor (K, n, b), torques (K, n) and the rows used, bool (K, n). tau : measured
         torques; default: Y.
         """
+        columns = np.concatenate([D.T, Y.T[None]])
         grams = []
         for j in range(Y.shape[1]):
-            A = np.column_stack([D[:, j], Y[:, j]])[mask[:, j]]
-            grams.append(A.T @ A)
-        return cls(
-            np.array(grams), mask.sum(axis=0), ((Y if tau is None else tau) ** 2 * mask).sum(axis=0)
-        )
+            A = columns[:, j, mask[:, j]]
+            grams.append(A @ A.T)
+        measured = ((Y if tau is None else tau) ** 2 * mask).sum(axis=0)
+        return cls(np.array(grams), mask.sum(axis=0), measured)
 
     def mapped(self, K: Array) -> Grams:
         """With the columns W K, K of shape (b, p)."""
@@ -75,7 +75,7 @@ class Grams:
     def squares(self, X: Array) -> Array:
         """||Y_j - W_j X||^2, shape (n,)."""
         v = np.append(X, -1.0)
-        return np.asarray(np.maximum(np.einsum("i,jik,k->j", v, self.of_joints, v), 0.0))
+        return np.asarray(np.maximum(self.of_joints @ v @ v, 0.0))
 
     def sigma(self, X: Array) -> Array:
         """Root mean square residual of each joint, at least LIMIT.RESIDUAL_FLOOR of its torque,
@@ -87,7 +87,7 @@ class Grams:
 
     def weighted(self, sigma: Array) -> tuple[Array, Array]:
         """A = sum_j W_j'W_j / sigma_j^2 and g = sum_j W_j'Y_j / sigma_j^2."""
-        G = np.einsum("j,jik->ik", sigma**-2.0, self.of_joints)
+        G = np.tensordot(sigma**-2.0, self.of_joints, axes=1)
         return G[:-1, :-1], G[:-1, -1]
 
 

@@ -15,7 +15,7 @@ from runtime.model.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
 from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
-from runtime.plausible.samples import Samples
+from runtime.plausible.samples import Filtered, Samples
 from runtime.plausible.trials import Baseline, baseline_of
 from runtime.records.record import Record
 from runtime.rows.observation import Observation
@@ -37,6 +37,8 @@ class Case:
     straight : sequence of Prepared
         The same, counts that start anew unwrapped.
     study : Study
+    through : sequence of Filtered
+        The records through a low-pass of their motion.
     samples : Samples
         Of all records.
     D : ndarray, shape (K, n, b)
@@ -49,6 +51,7 @@ class Case:
     given: Sequence[Prepared]
     straight: Sequence[Prepared]
     study: Study
+    through: Sequence[Filtered]
     samples: Samples
     D: Array
     variants: GeneratedModel | None
@@ -155,10 +158,9 @@ class Case:
     @cached_property
     def late(self) -> Delay | None:
         """Delay of the torques of the longest record; None where it is too short."""
-        record = max(self.straight, key=lambda one: len(one.record))
-        duration = float(record.record.t[-1] - record.record.t[0])
-        longest = min(LIMIT.LONGEST_DELAY, duration / 20)
+        through = max(self.through, key=lambda one: len(one.record))
+        t = through.record.t
         try:
-            return delay_of(self.model, record, longest)
+            return delay_of(self.model, through, min(LIMIT.LONGEST_DELAY, float(t[-1] - t[0]) / 20))
         except (InputError, ValueError):
             return None

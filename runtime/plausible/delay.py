@@ -27,9 +27,7 @@ from runtime.limits import LIMIT
 from runtime.markup import number
 from runtime.model.generated import GeneratedModel, joint_labels
 from runtime.plausible.bodies import Grams, solved
-from runtime.plausible.samples import lowpassed, usable
-from runtime.rows.prepared import Prepared
-from runtime.settings.study import Study
+from runtime.plausible.samples import Filtered, filtered, usable
 from runtime.signals.states import require_motion
 from runtime.table import Table
 
@@ -99,20 +97,21 @@ def delay(problem: Problem, *, longest: float = LIMIT.LONGEST_DELAY) -> Delay:
     InputError
         `longest` beyond a tenth of the record, or fewer rows than unknowns.
     """
-    return delay_of(problem.model, problem.prepared[0], longest)
+    require_motion(problem.settings.signals, "a delay")
+    reading = problem.prepared[0]
+    return delay_of(problem.model, filtered(reading, reading.study), longest)
 
 
-def delay_of(model: GeneratedModel, own: Prepared, longest: float) -> Delay:
-    """The same of one reading of a record."""
-    study, record = own.study, own.record
-    require_motion(study.signals, "a delay")
+def delay_of(model: GeneratedModel, through: Filtered, longest: float) -> Delay:
+    """The same of a filtered record."""
+    record = through.record
     duration = float(record.t[-1] - record.t[0])
     if not 0 < longest <= duration / 10:
         raise InputError(
             f"delays up to {longest:g} s in a record of {duration:g} s; expected at most a tenth of it",
             file=record.name,
         )
-    shifts = Shifts(model, own, study, longest)
+    shifts = Shifts(model, through, longest)
     sigmas = [shifts.fit(np.full(record.n, d))[1] for d in shifts.grid]
     start = shifts.grid[int(np.argmin(np.log(sigmas).sum(axis=1)))]
     shift = np.full(record.n, start)
@@ -148,12 +147,11 @@ def _mean(shift: Array, sigma: Array) -> tuple[float, float]:
 class Shifts:
     """W and its rate at some instants, and torques that can be shifted."""
 
-    def __init__(self, model: GeneratedModel, own: Prepared, study: Study, longest: float) -> None:
-        record = own.record
-        cutoff, states, torque = lowpassed(own, study)
-        tau = torque(record.torque)
+    def __init__(self, model: GeneratedModel, through: Filtered, longest: float) -> None:
+        record, states, cutoff = through.record, through.states, through.low.hertz
+        tau = through.torque(record.torque)
         margin = int(np.ceil((longest + 1 / cutoff) * record.rate)) + 2
-        inside = usable(record, study, margin // 10, margin)
+        inside = usable(record, through.study, margin // 10, margin)
         inside[:margin] = inside[-margin:] = False
         kept = np.flatnonzero(inside)
         step = max(1, int(0.8 * record.rate / (2 * cutoff)), -(-len(kept) // LIMIT.DELAY_INSTANTS))

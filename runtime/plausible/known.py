@@ -119,9 +119,9 @@ def known_values(baseline: Baseline) -> KnownValues | None:
     X = physical.K @ chi
     at_rest = np.zeros_like(s.q)
     gravity = baseline.model.regressor(s.q, at_rest, at_rest) @ X
-    whole = baseline.model.regressor(s.q, s.qd, s.qdd) @ X
+    whole = baseline.D @ X
     Y, mask = s.tau - s.tau_known, s.moving()
-    columns = baseline.model.regressor(s.q, s.qd, s.qdd) @ physical.K
+    columns = baseline.D @ physical.K
     beside = [
         k
         for k, name in enumerate(physical.standard)

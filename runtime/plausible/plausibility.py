@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from runtime.checks.check import WORST, Check, worst_of
 from runtime.core.problem import Problem
@@ -36,7 +36,7 @@ from runtime.plausible.physics import (
     size,
     values,
 )
-from runtime.plausible.samples import excerpts, samples_of
+from runtime.plausible.samples import excerpts, filtered, samples_of
 from runtime.plausible.sizes import (
     accelerations,
     inertias,
@@ -77,13 +77,13 @@ EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Plausibility(
-    Result, keys="checks named:named_causes equivalent delay known_values:robot_values"
+    Result, keys="checks:answers named:named_causes equivalent delay known_values:robot_values"
 ):
-    """Checks of a record, a study and a robot file.
+    """Checks of a record, a study and a robot file, and the causes that explain it better.
 
     Attributes
     ----------
-    checks : tuple of Check
+    answers : tuple of Check
     trials : tuple of Trial
         Alternatives, the best first; empty where none were tried.
     named : tuple of Trial
@@ -94,17 +94,19 @@ class Plausibility(
     robot_values : KnownValues or None
     """
 
-    checks: tuple[Check, ...]
+    answers: tuple[Check, ...]
     trials: tuple[Trial, ...] = ()
     named: tuple[Trial, ...] = ()
     equivalent: tuple[str, ...] = ()
     delay: Delay | None = None
     robot_values: KnownValues | None = None
 
+    title: ClassVar[str] = "Record, study and robot file"
+
     @property
     def worst(self) -> Check | None:
         """The first finding that is not good."""
-        return worst_of(self.checks)
+        return worst_of(self.answers)
 
     @property
     def named_causes(self) -> list[dict[str, Any]]:
@@ -118,13 +120,23 @@ class Plausibility(
         """The worst finding in one line; "" where there is none."""
         return "" if self.worst is None else self.worst.sentence
 
+    def checks(self) -> tuple[Check, ...]:
+        """The questions with their answers."""
+        return self.answers
+
+    def text(self) -> str:
+        """What stands beside the checks: what no record can tell."""
+        return "\n".join(f"No record can tell: {change}." for change in self.equivalent)
+
     def to_text(self) -> str:
-        """Findings that are not good, then what was found besides."""
-        lines = [f"{c.state}: {c.sentence}" for c in self.checks if c.state in WORST[:2]]
-        lines += [f"no record can tell: {text}" for text in self.equivalent]
-        return "\n".join(
-            lines or ["Record, study and robot file suit each other, as far as judged."]
-        )
+        """Findings that are not good, then what no record can tell."""
+        lines = [f"{c.state}: {c.sentence}" for c in self.answers if c.state in WORST[:2]]
+        told = "\n".join(filter(None, [*lines, self.text()]))
+        return told or "Record, study and robot file suit each other, as far as judged."
+
+    def figures(self) -> tuple[()]:
+        """None."""
+        return ()
 
     def tables(self) -> list[Table]:
         """Alternatives, delays and values of the robot file, as far as they were judged."""
@@ -207,7 +219,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
 def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
     """What the checks read; the finding where there is nothing to read."""
     model, study = problem.model, problem.settings
-    own = [part for reading in problem.prepared for part in excerpts(problem, reading)]
+    own = [part for reading in problem.prepared for part in excerpts(reading)]
     try:
         require_no_channels(model, "a trial of another reading")
         whole = [unwrapped(one.record, study.signals, one.drives) for one in own]
@@ -215,7 +227,8 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
             one if record is one.record else replace(one, record=record)
             for one, record in zip(own, whole, strict=True)
         ]
-        samples = samples_of(straight, study)
+        through = [filtered(one, study) for one in straight]
+        samples = samples_of(through, study)
     except InputError as e:
         question = "Do record and robot file suit each other?"
         return Check(question, "open", f"Not asked: {e.message}")
@@ -230,7 +243,7 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
             "look at sign, zero and order of the positions, at their unit, and at the lengths and "
             "the start of the loop",
         )
-    return Case(model, own, straight, study, samples, D, variants)
+    return Case(model, own, straight, study, through, samples, D, variants)
 
 
 __all__ = ["Plausibility", "plausibility"]

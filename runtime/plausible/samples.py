@@ -7,12 +7,11 @@ at these instants and nothing else, and none where it leaves the positions as th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.core.problem import Problem
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.records.record import Record
@@ -99,10 +98,10 @@ def moving(qd: Array) -> Array:
     return np.asarray(np.abs(qd) > np.maximum(LIMIT.STANDING * np.abs(qd).max(axis=0), 1e-12))
 
 
-def excerpts(problem: Problem, reading: Prepared) -> list[Prepared]:
+def excerpts(reading: Prepared) -> list[Prepared]:
     """EXCERPTS of a long record, evenly spread over the window; one that is not longer as it is."""
     record = reading.record
-    start, stop = window_of(record.t, problem.settings.rows.window, record.name)
+    start, stop = window_of(record.t, reading.study.rows.window, record.name)
     number, length = LIMIT.EXCERPTS
     if stop - start <= number * length:
         return [reading]
@@ -119,22 +118,55 @@ def excerpts(problem: Problem, reading: Prepared) -> list[Prepared]:
             missing=None if missing is None else replace(missing, samples=missing.samples[samples]),
             channels={name: x[samples] for name, x in record.channels.items()},
         )
-        parts.append(problem.reading(part))
+        parts.append(replace(reading, record=part))
     return parts
 
 
-def samples_of(records: Sequence[Prepared], study: Study) -> Samples:
-    """Filtered instants of all records, in their windows, at most LIMIT.INSTANTS_KEPT.
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """A record through a low-pass of its motion.
 
-    The cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where that
-    is lower.
+    Attributes
+    ----------
+    record : Record
+    study : Study
+    low : Lowpass
+        Its cut-off is that of the study, or LIMIT.DYNAMIC times the frequency of the motion where
+        that is lower.
+    states : States
+        q, qd, qdd of the positions as they are, shape (N, n) each.
+    """
+
+    record: Record
+    study: Study
+    low: Lowpass
+    states: States
+
+    def torque(self, tau: Array) -> Array:
+        """Torques through the same low-pass, shape (N, n)."""
+        smooth = median_filtered(tau, self.study.signals.window_of_torques)
+        return lowpass_filtered(smooth, self.record.rate, self.low)
+
+
+def filtered(reading: Prepared, study: Study) -> Filtered:
+    """A record through a low-pass of its motion."""
+    record = reading.record
+    low = Lowpass(cutoff=motion_cutoff(record, reading.study))
+    signals = replace(study.signals, lowpass=low)
+    states = filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
+    return Filtered(record, study, low, replace(states, channels=reading.channels))
+
+
+def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
+    """Filtered instants of all records, in their windows, at most LIMIT.INSTANTS_KEPT.
 
     Raises
     ------
     InputError
         Records too short for the filters.
     """
-    parts = [_filtered(record, study, number) for number, record in enumerate(records)]
+    through = [x if isinstance(x, Filtered) else filtered(x, study) for x in records]
+    parts = [_instants(record, number) for number, record in enumerate(through)]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SIGNALS}
     every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
     return every.thinned(LIMIT.INSTANTS_KEPT)
@@ -157,23 +189,6 @@ def motion_cutoff(record: Record, study: Study) -> float:
     return float(min(most, max(LIMIT.DYNAMIC * frequency, 20 * record.rate / len(record))))
 
 
-def lowpassed(own: Prepared, study: Study) -> tuple[float, States, Callable[[Array], Array]]:
-    """Cut-off of the motion, Hz, the states of the positions as they are through a low-pass of it,
-    shape (N, n) each, and the function that filters torques alike.
-    """
-    low = Lowpass(cutoff=motion_cutoff(own.record, own.study))
-    record, signals = own.record, replace(study.signals, lowpass=low)
-    states = filtered_states(record.q, record.rate, signals, record.channels.get("qd"))
-    states = replace(states, channels=own.channels)
-
-    def torque(tau: Array) -> Array:
-        return lowpass_filtered(
-            median_filtered(tau, study.signals.window_of_torques), own.record.rate, low
-        )
-
-    return low.hertz, states, torque
-
-
 def usable(record: Record, study: Study, before: int, after: int) -> Array:
     """Samples in the window, and at least so many before and after a gap, bool (N,)."""
     t0, t1 = study.rows.window
@@ -185,18 +200,19 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
     return inside
 
 
-def _filtered(own: Prepared, study: Study, number: int) -> Samples:
+def _instants(through: Filtered, number: int) -> Samples:
     """One record, one sample in about 0.8 rate/(2 cutoff), without 2/cutoff at each end."""
-    record = own.record
-    cutoff, states, torque = lowpassed(own, study)
+    record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
     step = max(1, int(0.8 * record.rate / (2 * cutoff)))
-    kept = np.flatnonzero(usable(record, study, step, 3 * step))[5 * step : -5 * step : step]
+    kept = np.flatnonzero(usable(record, through.study, step, 3 * step))[
+        5 * step : -5 * step : step
+    ]
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)
     steady = np.stack([_steady(qd, record.rate / cutoff) for qd in states.qd.T], axis=1)
     motion = (record.t, states.q, states.qd, states.qdd)
-    signals = (*motion, torque(record.tau), torque(known), steady)
+    signals = (*motion, through.torque(record.tau), through.torque(known), steady)
     used = {name: x[kept] for name, x in zip(SIGNALS, signals, strict=False)}
     return Samples(**used, record=np.full(len(kept), number), cutoff=cutoff)
 

@@ -61,8 +61,6 @@ class Trial:
     Attributes
     ----------
     cause : Cause
-    bound : float, nats
-        Score of least squares.
     fit : Fit or None
         Under the conditions of a physical robot; None where the bound already loses.
     gain : float, nats
@@ -72,7 +70,6 @@ class Trial:
     """
 
     cause: Cause
-    bound: float
     fit: Fit | None
     gain: float
     equivalent: bool = False
@@ -140,7 +137,7 @@ class Baseline:
         still |= ~self.samples.steady @ (np.abs(cause.P.T) > 1e-12)
         known = cause.subtracted(self.samples) @ back.T
         if not np.array_equal(back, np.eye(len(back))):
-            D = back @ D
+            D = (back @ D.T).T
         return D, self.tau - known, still @ (np.abs(back) > 1e-12).T == 0
 
     @cached_property
@@ -190,20 +187,20 @@ class Baseline:
         sigma = self.bound(grams).sigma if sigma is None else sigma
         return how(self.standard(grams), self.bodies, self.N, sigma)
 
-    def trial(self, cause: Cause, bound: float = -np.inf, sigma: Array | None = None) -> Trial:
+    def trial(self, cause: Cause, sigma: Array | None = None) -> Trial:
         """A cause under the conditions of a physical robot. Rows count as much as they do for the
         residuals of the study, or for its own: what it explains makes those of the study alike.
         sigma : first weights.
         """
         rows = self.rows(cause)
         if rows is None:
-            return Trial(cause, bound, None, -np.inf)
+            return Trial(cause, None, -np.inf)
         fit = self.fit(Grams.of(*rows, self.tau), sigma=sigma)
         D = rows[0] if cause.constants else rows[0] @ self.physical.K
         N = max(self.N, counting_rows(D, *rows[1:], fit.X))
         nearer = self.given.penalty - fit.penalty
         gain = (self.given.score - fit.score - nearer) * N / self.N + nearer
-        return Trial(cause, bound, fit, gain)
+        return Trial(cause, fit, gain)
 
     def unseen(self, cause: Cause) -> float:
         """Score of a cause in nats, each of two parts of the rows by the parameters of the other;
@@ -401,34 +398,32 @@ def _of_causes(baseline: Baseline, which: Sequence[Cause]) -> list[Trial]:
     """
     given, least = baseline.given, baseline.samples.moving().sum(axis=0) // 2
     trials: list[Trial] = []
-    bounds: list[tuple[float, Cause, Grams]] = []
+    bounds: list[tuple[Fit, Cause, Grams]] = []
     unchanged_bound = baseline.bound(Grams.of(*baseline.as_given, baseline.tau)).score
     for cause in which:
         grams = baseline.grams(cause)
         if grams is None or (grams.rows < least).any():
             continue
-        bound = baseline.bound(grams).score
-        if abs(bound - unchanged_bound) < LIMIT.SAME_SCORE and baseline.hides(cause):
-            trials.append(Trial(cause, bound, None, -np.inf, equivalent=True))
+        bound = baseline.bound(grams)
+        if abs(bound.score - unchanged_bound) < LIMIT.SAME_SCORE and baseline.hides(cause):
+            trials.append(Trial(cause, None, -np.inf, equivalent=True))
         else:
             bounds.append((bound, cause, grams))
-    bounds.sort(key=lambda item: item[0])
-    quick: list[tuple[Fit, float, Cause]] = []
+    bounds.sort(key=lambda item: item[0].score)
+    quick: list[tuple[Fit, Cause]] = []
     best = given.score - LIMIT.DECISIVE
     for bound, cause, grams in bounds:
-        promising = bound < best + LIMIT.GAIN_ALIKE * (given.score - best)
+        promising = bound.score < best + LIMIT.GAIN_ALIKE * (given.score - best)
         if not promising or len(quick) == LIMIT.ALTERNATIVES_FITTED:
             break
-        fit = baseline.fit(grams, quick_fit)
+        fit = baseline.fit(grams, quick_fit, bound.sigma)
         best = min(best, fit.score)
-        quick.append((fit, bound, cause))
+        quick.append((fit, cause))
     quick.sort(key=lambda item: item[0].score)
     refined = quick[: LIMIT.ALTERNATIVES_REFINED]
-    trials += [baseline.trial(cause, bound, fit.sigma) for fit, bound, cause in refined]
-    chosen = {id(cause) for _, _, cause in refined}
-    trials += [
-        Trial(cause, bound, None, -np.inf) for bound, cause, _ in bounds if id(cause) not in chosen
-    ]
+    trials += [baseline.trial(cause, fit.sigma) for fit, cause in refined]
+    chosen = {id(cause) for _, cause in refined}
+    trials += [Trial(cause, None, -np.inf) for _, cause, _ in bounds if id(cause) not in chosen]
     return trials
 
 
@@ -447,7 +442,7 @@ def _of_numbers(baseline: Baseline, robot: Robot) -> list[Trial]:
                 small = change(LIMIT.SMALLEST_CHANGE[row.kind])
                 # a model may have the column of a constant torque
                 if row.kind != "offset" and baseline.hides(small):
-                    trials.append(Trial(small, -np.inf, None, -np.inf, equivalent=True))
+                    trials.append(Trial(small, None, -np.inf, equivalent=True))
                 continue
             step = baseline.first_step(J[None])
             if step is None:
@@ -485,7 +480,7 @@ def _searched(baseline: Baseline, row: Row, change: Change, first: float) -> Tri
         score(xi, sigma)
     while score(far, sigma) <= min(scores.values(), default=-np.inf) and abs(far) < row.span:
         far = float(np.clip(1.6 * far, -row.span, row.span))
-    enough = baseline.given.score - 0.5 * LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
+    enough = baseline.given.score - LIMIT.WORTH_SEARCHING * LIMIT.DECISIVE
     if min(scores.values(), default=np.inf) > enough:
         return None
     best = min(scores, key=scores.__getitem__)

@@ -248,8 +248,7 @@ def plausibility_section(found: Plausibility) -> Section:
     """Whether record, study and robot file suit each other. The checks stand with the others at the
     top; here is what they rest on.
     """
-    text = [f"No record can tell: {change}." for change in found.equivalent]
-    return Section("Record, study and robot file", tuple(text), tables=found.tables())
+    return Section(found.title, tuple(found.text().splitlines()), tables=found.tables())
 
 
 def friction_section(curves: Sequence[FrictionCurve], unit: str = "N m") -> Section:

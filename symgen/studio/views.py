@@ -222,7 +222,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
         shares = unexcited_shares(rows, study.signals, records[0].rate)
     return {
         "of": digest_of(Path(robot_file), Path(study_file)),
-        "checks": [asdict(check) for check in judged.checks],
+        "checks": [asdict(check) for check in judged.checks()],
         "named": judged.named_causes,
         "deviations": dict(sorted(shares.items(), key=lambda item: -item[1])),
         "rank": rank,

@@ -20,6 +20,7 @@ import numpy as np
 
 import runtime
 import symgen
+from runtime.compose import problem
 from runtime.errors import InputError
 from runtime.limits import LIMIT
 from runtime.model.drives import Drives
@@ -86,7 +87,8 @@ class Case:
         """What is fitted; None where an error stops the study."""
         try:
             model, record, study, _ = self.parts()
-            samples = samples_of([record], study)
+            whole = problem(model, record, study)
+            samples = samples_of(whole.prepared, whole.settings)
             D = regressor(model, (samples.q, samples.qd, samples.qdd))
             return baseline_of(model, samples, D, torque_side=self.torque_side)
         except (InputError, SymgenError):
@@ -115,7 +117,9 @@ def told(right: Case, case: Case, slip: Slip, usual: set[str]) -> tuple[str, str
         [result]
         if isinstance(result, str)
         else [
-            f"{c.finding}. {c.remedy}" for c in result.checks if _bad(c) and c.question not in usual
+            f"{c.finding}. {c.remedy}"
+            for c in result.checks()
+            if _bad(c) and c.question not in usual
         ]
     )
     text = " | ".join(findings)

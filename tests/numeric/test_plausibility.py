@@ -23,7 +23,9 @@ from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
 from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.reading.records import read_records
+from runtime.rows.prepared import Prepared
 from runtime.settings.study import Rows, Study, study_from_mapping
+from runtime.signals.states import lowpassed
 from symgen.description.yaml import parse_robot
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -200,10 +202,10 @@ def test_excerpts_of_a_long_record_are_spread_over_its_window(
 ) -> None:
     t = np.arange(5000) / 500
     study = study_from_mapping({"rows": {"window": [1.0, 9.0]}})
-    record = runtime.Record(t, t, t**2, tau_known=t)
-    assert excerpts(record, study) == [record]
+    reading = Prepared(runtime.Record(t, t, t**2, tau_known=t), study, lowpassed)
+    assert excerpts(reading) == [reading]
     monkeypatch.setattr(LIMIT, "EXCERPTS", (3, 400))
-    parts = excerpts(record, study)
+    parts = [part.record for part in excerpts(reading)]
     assert [len(part) for part in parts] == [400] * 3
     assert parts[0].t[0] == pytest.approx(1.0) and parts[2].t[-1] == pytest.approx(9.0)
     for part in parts:
@@ -231,7 +233,7 @@ def test_too_few_samples_are_not_judged(right: slips.Case) -> None:
     short = replace(right, t=right.t[:400], q=right.q[:400], tau=right.tau[:400])
     found = short.judged()
     assert not found.named and any(
-        check.state == "open" and "Not asked" in check.finding for check in found.checks
+        check.state == "open" and "Not asked" in check.finding for check in found.checks()
     ), found.to_text()
 
 
@@ -335,7 +337,7 @@ def kr300_folder() -> Path:
 
 def test_samples_hold_the_motion_and_the_known_torque(right: slips.Case) -> None:
     record = runtime.Record(right.t, right.q, right.tau, tau_known=np.full_like(right.q, 2.0))
-    samples = samples_of([record], Study())
+    samples = samples_of([Prepared(record, Study(), lowpassed)], Study())
     assert np.allclose(samples.tau_known, 2.0) and np.allclose(
         samples.tau - 2.0, samples.tau - samples.tau_known
     )

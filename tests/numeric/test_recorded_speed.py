@@ -74,7 +74,7 @@ def test_parameters_are_nearer_to_the_truth():
 def test_what_disagrees_is_told_and_not_used(gain, lag):
     given = record(gain=gain, lag=lag)
     told = plausibility(planar, given, STUDY)
-    (check,) = (c for c in told.checks if "recorded velocities" in c.question)
+    (check,) = (c for c in told.checks() if "recorded velocities" in c.question)
     assert check.state == "doubtful"
     study, text = resolved(STUDY, [given])
     assert "of joint 1, 2 disagree" in text and study.signals.velocity == (RATE / 2, RATE / 2)
@@ -84,7 +84,7 @@ def test_what_disagrees_is_told_and_not_used(gain, lag):
 
 def test_good_velocities_are_told_so():
     told = plausibility(planar, record(), STUDY)
-    (check,) = (c for c in told.checks if "recorded velocities" in c.question)
+    (check,) = (c for c in told.checks() if "recorded velocities" in c.question)
     assert check.state == "good" and "1.000 of that" in check.finding
 
 

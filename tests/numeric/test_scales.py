@@ -66,12 +66,12 @@ def test_two_columns_that_are_one_are_named(
     case = arm.right if side == "joint" else right
     found = replace(case, q=case.q[:, [0, 2, 2, *range(3, case.q.shape[1])]]).judged()
     assert not found.named
-    assert "Positions of joints 2 and 3 are the same" in [one.finding for one in found.checks]
+    assert "Positions of joints 2 and 3 are the same" in [one.finding for one in found.checks()]
 
 
 def test_torques_with_the_wrong_sign_have_friction(right: slips.Case) -> None:
     """The best physical robot of these has none: it cannot be negative."""
-    checks = {one.question: one.state for one in replace(right, tau=-right.tau).judged().checks}
+    checks = {one.question: one.state for one in replace(right, tau=-right.tau).judged().checks()}
     assert checks["Were the torques measured?"] == "good"
 
 

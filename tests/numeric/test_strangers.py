@@ -84,7 +84,7 @@ def motion(model, seconds=20.0, rate=200.0, seed=0, noise=0.02, values=1.0, low=
 def judged(model, t, q, tau, **record) -> dict[str, Check]:
     """Checks of a record by their questions."""
     own = runtime.Record(t, q, tau, name="run", **record)
-    return {check.question: check for check in runtime.plausibility(model, own).checks}
+    return {check.question: check for check in runtime.plausibility(model, own).checks()}
 
 
 def written(folder, t, q, tau, **extra) -> None:
@@ -210,7 +210,7 @@ def test_a_wrap_is_a_wrap_with_resample_too(tmp_path, resample) -> None:
     settings = {"files": "run.csv", "resample": {} if resample else None}
     record = runtime.read_record(runtime.Study(record=settings).record[0], folder=tmp_path)
     (check,) = (
-        c for c in runtime.plausibility(model, record).checks if "those of a motion" in c.question
+        c for c in runtime.plausibility(model, record).checks() if "those of a motion" in c.question
     )
     assert check.state == "no" and check.remedy.startswith("it wraps"), check
 
@@ -555,7 +555,7 @@ def test_friction_that_the_model_lacks_is_no_slip() -> None:
     slow = np.sign(qd) * np.exp(-((qd / (0.1 * np.abs(qd).max(axis=0))) ** 2))
     tau += np.array([0.0, 0.1]) * tau.std(axis=0) * slow
     found = runtime.plausibility(model, runtime.Record(t, q, tau, name="run"), variants=free)
-    (check,) = (c for c in found.checks if c.question.startswith("Is the study the best"))
+    (check,) = (c for c in found.checks() if c.question.startswith("Is the study the best"))
     assert found.named == () and found.trials[0].cause.kind == "friction"
     assert check.state == "good"
     assert check.finding.startswith("Friction alone: the friction of joint 2 at low speed is not")

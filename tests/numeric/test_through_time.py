@@ -63,7 +63,7 @@ def test_a_right_record_and_one_of_coarse_counts_are_left_alone(right: runtime.R
     assert judged(right).worst is None
     assert not any(
         "motion" in check.question
-        for check in judged(replace(right, q=np.round(right.q / 0.06) * 0.06)).checks
+        for check in judged(replace(right, q=np.round(right.q / 0.06) * 0.06)).checks()
         if check.state == "no"
     )
 
@@ -113,7 +113,7 @@ def test_a_drive_at_its_limit_is_not_accused() -> None:
         symgen.model(parse_robot(robot, "slide")), runtime.Record(t, q, force)
     )
     assert (
-        any("largest or smallest value in" in check.finding for check in found.checks)
+        any("largest or smallest value in" in check.finding for check in found.checks())
         and found.worst is None
     ), found.to_text()
 
@@ -133,4 +133,4 @@ def test_a_torque_that_never_changes_ends_the_questions(
 ) -> None:
     found = judged(replace(right, tau=right.tau * [1.0, 0.0]))
     assert found.worst is not None and found.worst.finding == "The torque of joint 2 is constant"
-    assert found.checks[-1].finding == "Not asked: a torque never changes" and not recwarn.list
+    assert found.checks()[-1].finding == "Not asked: a torque never changes" and not recwarn.list

@@ -214,7 +214,7 @@ def test_a_slow_right_study_is_told_no_cause(k: int) -> None:
     judged = runtime.plausibility(
         model, record_of(move, tau), study(robot, "slow"), variants=variants
     )
-    assert not judged.named_causes and all(check.state != "no" for check in judged.checks)
+    assert not judged.named_causes and all(check.state != "no" for check in judged.checks())
 
 
 def test_time_stamps_off_by_a_twentieth_of_a_period_are_told() -> None:
