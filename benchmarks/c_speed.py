@@ -29,7 +29,7 @@ from rounds import interleave, processor, ratio
 from runtime import load_model
 from runtime.compiled.cache import FallbackWarning, compiler
 from runtime.compiled.model import compiled_model
-from runtime.model.generated import GeneratedModel
+from runtime.core.model import GeneratedModel
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

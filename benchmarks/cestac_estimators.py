@@ -29,9 +29,9 @@ from estimators import AROUND, AWAY, METHODS, STEPS, UNIT, bench, determined
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from runtime.settings.study import to_mapping
-from runtime.settings.yaml import yaml_text
-from runtime.table import aligned
+from runtime.core.study import to_mapping
+from runtime.core.table import aligned
+from runtime.yaml_text import yaml_text
 
 Array = np.ndarray
 RECORDED = ("ols", "iv", "didim")  # also with recorded positions alone rounded

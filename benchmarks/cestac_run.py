@@ -44,17 +44,17 @@ from runtime import Record, Study, load_model
 from runtime.compiled.cache import FallbackWarning, compiler
 from runtime.compiled.model import compiled_model
 from runtime.compose import cestac, observe, problem
-from runtime.estimators.essential import essential_of
-from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel
-from runtime.parallel import processes
+from runtime.core.cestac.cestac import levels_of
+from runtime.core.cestac.perturbed import Task, perturbed_position, prepared_record
+from runtime.core.cestac.run import one_run
+from runtime.core.drives import Drives
+from runtime.core.essential import essential_of
+from runtime.core.model import GeneratedModel
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import study_from_mapping
+from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.resolution.cestac import levels_of
-from runtime.resolution.perturbed import Task, perturbed_position, prepared_record
-from runtime.resolution.run import one_run
-from runtime.settings.study import study_from_mapping
-from runtime.signals.filters import filtered_states
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -37,16 +37,16 @@ import numpy as np
 from c_speed import processor
 
 from runtime import Record, Study, load_model, observe
-from runtime.cluster import cluster as mapped
 from runtime.compiled.model import compiled_model
 from runtime.compose import cestac
-from runtime.estimators.essential import essential_of
-from runtime.model.generated import GeneratedModel
-from runtime.parallel import processes
+from runtime.core.cestac.cestac import Cestac
+from runtime.core.essential import essential_of
+from runtime.core.model import GeneratedModel
+from runtime.core.study import study_from_mapping
+from runtime.parallel.cluster import cluster as mapped
+from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.resolution.cestac import Cestac
-from runtime.settings.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

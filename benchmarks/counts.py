@@ -37,18 +37,18 @@ from scipy.io import loadmat
 import symgen
 from runtime import InputError, load_model
 from runtime.compose import cestac, estimate_of, observe
-from runtime.estimators.essential import essential_of
+from runtime.core.essential import essential_of
+from runtime.core.record import Record
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import certain_rows, select_rows
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import Study, study_from_mapping
+from runtime.core.table import aligned
+from runtime.counts.coarse_encoders import READERS
+from runtime.counts.lattice import lattice
+from runtime.counts.reading import read_counts
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.records.record import Record
-from runtime.resolution.coarse_encoders import READERS
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import certain_rows, select_rows
-from runtime.settings.study import Study, study_from_mapping
-from runtime.signals.counts.lattice import lattice
-from runtime.signals.counts.reading import read_counts
-from runtime.signals.filters import filtered_states
-from runtime.table import aligned
 from symgen.demo import MAIN
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))

@@ -33,14 +33,14 @@ from estimators import AROUND, bench, determined, with_encoder
 
 from runtime import InputError
 from runtime.compose import estimate_of, problem
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import decimated_torque
+from runtime.core.signals.filters import lowpass_filtered
+from runtime.core.study import EstimateSettings, Lowpass, Study
+from runtime.core.table import aligned
+from runtime.counts.reading import read_counts
 from runtime.loop.closed_loop import ClosedLoop
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import decimated_torque
-from runtime.settings.study import EstimateSettings, Lowpass, Study
-from runtime.signals.counts.reading import read_counts
-from runtime.signals.filters import lowpass_filtered
-from runtime.table import aligned
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import loop_of_records

@@ -44,19 +44,19 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.special import erf
 from simulation import LAW
 
+from runtime.advisor.sign_errors import switches
 from runtime.compose import estimate_of
-from runtime.estimators.essential import essential_of
+from runtime.core.essential import essential_of
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import certain_rows, select_rows
+from runtime.core.signals.filters import States, filtered_states
+from runtime.core.study import Study, study_from_mapping
+from runtime.core.table import aligned
+from runtime.counts.reading import read_counts
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import certain_rows, select_rows
-from runtime.rows.sign_errors import switches
-from runtime.settings.study import Study, study_from_mapping
-from runtime.signals.counts.reading import read_counts
-from runtime.signals.filters import States, filtered_states
-from runtime.table import aligned
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import observed_states

@@ -38,18 +38,18 @@ from simulation import LAW
 import symgen
 from runtime import InputError, load_model
 from runtime.compose import estimate_of
-from runtime.estimators.estimate import Estimate
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import GeneratedModel
+from runtime.core.record import Record
+from runtime.core.study import EstimateSettings, Study, study_from_mapping
+from runtime.core.table import aligned
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
-from runtime.model.generated import GeneratedModel
-from runtime.parallel import processes
+from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.records.record import Record
-from runtime.settings.study import EstimateSettings, Study, study_from_mapping
-from runtime.table import aligned
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 

@@ -29,15 +29,15 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.compose import estimate_of
-from runtime.errors import InputError
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel
+from runtime.core.rows.observation import Observation
+from runtime.core.study import EstimateSettings, Study, study_from_mapping
+from runtime.core.table import aligned
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
-from runtime.model.generated import GeneratedModel
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
-from runtime.rows.observation import Observation
-from runtime.settings.study import EstimateSettings, Study, study_from_mapping
-from runtime.table import aligned
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import loop_of_records

@@ -27,17 +27,17 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.compose import estimate_of, excite, observe
+from runtime.core.settings import structure
+from runtime.core.signals.filters import decimated, decimation_factor
 from runtime.excitation.criteria import excesses, kept_correlation, planned, weights_of
+from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference
+from runtime.loop.settings import Controller
 from runtime.loop.simulation import Simulator
-from runtime.parallel import processes
+from runtime.parallel.processes import processes
 from runtime.reading.names import study_of
 from runtime.reading.records import read_records
-from runtime.settings.controller import Controller
-from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.schema import structure
-from runtime.signals.filters import decimated, decimation_factor
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 RATE = 5000.0

@@ -46,13 +46,13 @@ import numpy as np
 
 from runtime.compiled.model import compiled_model
 from runtime.compose import estimate_of, observe
-from runtime.estimators.estimate import Estimate
-from runtime.files import read_bytes
-from runtime.model.generated import GeneratedModel, load_model
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import GeneratedModel, load_model
+from runtime.core.rows.observation import Observation
+from runtime.core.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.files import read_bytes
 from runtime.reading.records import read_records
-from runtime.rows.observation import Observation
-from runtime.settings.study import Decimate, Lowpass, Rows, Signals, Study, study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -41,13 +41,13 @@ from rounds import Clock, Times, interleave, user_time
 from runtime import identify, load_model
 from runtime.compiled.model import compiled_model, target_of
 from runtime.compose import observe
-from runtime.estimators.essential import essential_of
-from runtime.files import read_bytes
-from runtime.model.generated import GeneratedModel
+from runtime.core.cestac.run import one_run
+from runtime.core.essential import essential_of
+from runtime.core.model import GeneratedModel
+from runtime.core.study import Study, study_from_mapping
 from runtime.reading.datasets import dataset_study, fetch
+from runtime.reading.files import read_bytes
 from runtime.reading.records import read_records
-from runtime.resolution.run import one_run
-from runtime.settings.study import Study, study_from_mapping
 from symgen.derive.derivation import derive
 from symgen.description import load_robot
 from symgen.description.robot import Robot

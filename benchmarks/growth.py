@@ -40,12 +40,12 @@ from matplotlib.ticker import NullFormatter
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
 from runtime.compose import cestac
-from runtime.model.generated import GeneratedModel, load_model
-from runtime.parallel import processes
-from runtime.records.record import Record
-from runtime.rows.regressor import Columns
-from runtime.settings.study import CestacSettings, Decimate, Study
-from runtime.signals.filters import States, decimation_plan
+from runtime.core.model import GeneratedModel, load_model
+from runtime.core.record import Record
+from runtime.core.rows.regressor import Columns
+from runtime.core.signals.filters import States, decimation_plan
+from runtime.core.study import CestacSettings, Decimate, Study
+from runtime.parallel.processes import processes
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files, generate_module
 

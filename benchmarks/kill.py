@@ -40,14 +40,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from runtime import load_model
-from runtime.resolution.checkpoint import FILE
-from runtime.result_files import FINISHED, UNFINISHED
+from runtime.parallel.checkpoint import FILE
+from runtime.reporting.result_files import FINISHED, UNFINISHED
 from symgen import load_robot
 from symgen.emit.generate import generate_module
 
 MAIN = "from symgen.cli.main import main; main()"
 OFTEN = (
-    "from runtime.resolution.checkpoint import Checkpoint; "
+    "from runtime.parallel.checkpoint import Checkpoint; "
     "Checkpoint.__init__.__kwdefaults__['every'] = 0.02; "
 ) + MAIN
 ROBOT = "planar_2r"

@@ -33,8 +33,8 @@ import sys
 import numpy as np
 
 from runtime import load_model
-from runtime.settings.study import Signals, study_from_mapping
-from runtime.signals.filters import decimated, derivative
+from runtime.core.signals.filters import decimated, derivative
+from runtime.core.study import Signals, study_from_mapping
 from symgen import load_robot
 from symgen.certify.witness import bodies
 from symgen.emit.generate import generate_files

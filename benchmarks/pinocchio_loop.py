@@ -58,7 +58,7 @@ from oracles.random_robots import random_state
 from runtime import load_model
 from runtime.compiled.cache import FallbackWarning, compiler
 from runtime.compiled.model import compiled_model
-from runtime.model.generated import GeneratedModel
+from runtime.core.model import GeneratedModel
 from symgen.description import load_robot
 from symgen.description.robot import PRISMATIC, Robot
 from symgen.emit.generate import generate_files

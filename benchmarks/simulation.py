@@ -30,11 +30,11 @@ from rounds import interleave, processor, ratio
 
 from runtime import load_model
 from runtime.compiled.cache import FallbackWarning, compiler
+from runtime.core.settings import structure
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import reference_of
+from runtime.loop.settings import Controller
 from runtime.loop.simulation import Simulator
-from runtime.settings.controller import Controller
-from runtime.settings.schema import structure
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 LAW = {

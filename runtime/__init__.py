@@ -18,6 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from runtime.advisor.advice import Advice
     from runtime.compose import (
         advise,
         cestac,
@@ -32,21 +33,20 @@ if TYPE_CHECKING:
         problem,
         static_poses,
     )
+    from runtime.core.cestac.result import Cestac
+    from runtime.core.errors import InputError
+    from runtime.core.least_squares.estimate import Estimate
+    from runtime.core.model import load_model
     from runtime.core.problem import Problem
-    from runtime.errors import InputError
-    from runtime.estimators.estimate import Estimate
-    from runtime.identification.result import Identification
+    from runtime.core.record import Record
+    from runtime.core.result import Identification
+    from runtime.core.rows.observation import Observation
+    from runtime.core.study import Study
     from runtime.loop.simulation import simulate
-    from runtime.model.generated import load_model
     from runtime.reading.records import read_record
     from runtime.reading.resampling import resample
-    from runtime.records.record import Record
     from runtime.reporting.files import report
-    from runtime.resolution.advice import Advice
-    from runtime.resolution.result import Cestac
-    from runtime.rows.observation import Observation
-    from runtime.settings.files import load_study
-    from runtime.settings.study import Study
+    from runtime.study_files import load_study
 
 __all__ = [
     "Advice",
@@ -94,20 +94,20 @@ _MODULES = {
         "static_poses",
     ),
     "runtime.core.problem": ("Problem",),
-    "runtime.errors": ("InputError",),
-    "runtime.estimators.estimate": ("Estimate",),
-    "runtime.identification.result": ("Identification",),
+    "runtime.core.errors": ("InputError",),
+    "runtime.core.least_squares.estimate": ("Estimate",),
+    "runtime.core.result": ("Identification",),
     "runtime.loop.simulation": ("simulate",),
-    "runtime.model.generated": ("load_model",),
+    "runtime.core.model": ("load_model",),
     "runtime.reading.records": ("read_record",),
-    "runtime.records.record": ("Record",),
+    "runtime.core.record": ("Record",),
     "runtime.reading.resampling": ("resample",),
     "runtime.reporting.files": ("report",),
-    "runtime.resolution.advice": ("Advice",),
-    "runtime.resolution.result": ("Cestac",),
-    "runtime.rows.observation": ("Observation",),
-    "runtime.settings.files": ("load_study",),
-    "runtime.settings.study": ("Study",),
+    "runtime.advisor.advice": ("Advice",),
+    "runtime.core.cestac.result": ("Cestac",),
+    "runtime.core.rows.observation": ("Observation",),
+    "runtime.study_files": ("load_study",),
+    "runtime.core.study": ("Study",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -15,18 +15,22 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from runtime.blas import single_threaded
+from runtime import robust as irls
 from runtime.controller.fitted import law_of_controller
 from runtime.core import estimation
 from runtime.core.automatic import automatic_cutoff
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.essential import Essential
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import ordinary
+from runtime.core.least_squares.method import LINEAR, Method
+from runtime.core.least_squares.wls import by_weights, weighted
+from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem, Step, prepared
-from runtime.errors import InputError, SettingsError
-from runtime.estimators import feasible, irls
-from runtime.estimators.essential import Essential
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import ordinary
-from runtime.estimators.method import LINEAR, Method
-from runtime.estimators.wls import by_weights, weighted
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.signals.states import Reader, counted, lowpassed
+from runtime.core.study import EstimateSettings, Study
 from runtime.laws.scalars import fitted_scalars
 from runtime.laws.transmitted import transmitted_torque
 from runtime.link_side import torques_of_links
@@ -35,28 +39,25 @@ from runtime.loop.closed_loop import observed_loop
 from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.simulated_motion import beside_record
 from runtime.median import torque_median
-from runtime.model.generated import GeneratedModel
+from runtime.physical import feasible
 from runtime.reading.records import read_records
-from runtime.records.record import Record
+from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
-from runtime.rows.observation import Observation
-from runtime.settings.record import RecordSettings
-from runtime.settings.study import EstimateSettings, Study
-from runtime.signals.states import Reader, counted, lowpassed
 from runtime.speeds import recorded_speeds
+from runtime.threads import single_threaded
 from runtime.wrench import force_sensors
 
 if TYPE_CHECKING:
+    from runtime.advisor.advice import Advice
+    from runtime.core.cestac.result import Cestac
+    from runtime.core.result import Identification
     from runtime.excitation.poses import StaticPoses
     from runtime.excitation.result import Excitation
-    from runtime.identification.compare import Ranking
-    from runtime.identification.payload_study import PayloadStudy
-    from runtime.identification.result import Identification
     from runtime.loop.simulation import Simulator
+    from runtime.payload.study import PayloadStudy
     from runtime.plausible.delay import Delay
     from runtime.plausible.plausibility import Plausibility
-    from runtime.resolution.advice import Advice
-    from runtime.resolution.result import Cestac
+    from runtime.treatments import Ranking
 
 STEPS: list[Step] = [
     force_sensors,
@@ -288,7 +289,7 @@ def identify(
     InputError
         A record, setting or extra that does not suit what is asked for.
     """
-    from runtime.identification import identification
+    from runtime.core import identify as identification
 
     whole, with_load = _with_loaded(model, records, study, further, loaded, simulator)
     return identification.identify(
@@ -318,7 +319,7 @@ def assess(
     encoder : steps of the encoders in use, rad or m.
     progress : called with the name of each part before it is computed.
     """
-    from runtime.identification import identification
+    from runtime.core import identify as identification
 
     whole, with_load = _with_loaded(model, records, study, None, None, None)
     return identification.assess(
@@ -356,7 +357,7 @@ def compare(
     InputError
         A candidate without validation records, or with others than the first; none that can be identified.
     """
-    from runtime.identification import compare as comparing
+    from runtime import treatments as comparing
 
     if isinstance(candidates, Mapping):
         problems = {
@@ -378,9 +379,9 @@ def cestac(
 ) -> Cestac:
     """Change of the estimate under coarser encoders and torque sensors, eqs. (15) to (22), (28).
 
-    options : columns, map, progress, checkpoint, provenance, as of `runtime.resolution.cestac.cestac`.
+    options : columns, map, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
-    from runtime.resolution import cestac as resolution
+    from runtime.core.cestac import cestac as resolution
 
     return resolution.cestac(
         problem(model, records, study, simulator=simulator), simulator=simulator, **options
@@ -393,9 +394,9 @@ def advise(
 ) -> Advice:
     """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted.
 
-    options : columns, asked, encoders, confirm, progress, provenance, readers, as of `runtime.resolution.advisor.advise`.
+    options : columns, asked, encoders, confirm, progress, provenance, readers, as of `runtime.advisor.advisor.advise`.
     """
-    from runtime.resolution import advisor
+    from runtime.advisor import advisor
 
     return advisor.advise(problem(model, records, study), **options)
 
@@ -432,7 +433,7 @@ def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
     """The load of study.payload; loaded : records with it, default: those of study.payload.record."""
-    from runtime.identification import payload_study
+    from runtime.payload import study as payload_study
 
     whole, with_load = _with_loaded(model, records, study, (), loaded, None)
     return payload_study.payload_study(whole, with_load)

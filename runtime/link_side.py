@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from runtime.core.model import elements_of
 from runtime.core.problem import Problem
-from runtime.model.generated import elements_of
-from runtime.settings.record import behind_gears
+from runtime.reading.settings import behind_gears
 
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""

@@ -15,11 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from runtime.core.limits import LIMIT
 from runtime.core.problem import SIGNALS, Note, Problem
-from runtime.limits import LIMIT
-from runtime.rows.selection import excerpt
-from runtime.settings.study import Study
-from runtime.signals.filters import median_filtered
+from runtime.core.rows.selection import excerpt
+from runtime.core.signals.filters import median_filtered
+from runtime.core.study import Study
 
 Array = np.ndarray
 

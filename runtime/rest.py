@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from runtime.core.errors import InputError
+from runtime.core.missing import COUNTS, require_positions
 from runtime.core.problem import Note, Problem
-from runtime.errors import InputError
-from runtime.records.missing import COUNTS, require_positions
-from runtime.records.record import Record
-from runtime.rows.prepared import stacked
-from runtime.settings.study import Signals
-from runtime.signals.filters import States
-from runtime.signals.states import require_motion
+from runtime.core.record import Record
+from runtime.core.rows.prepared import stacked
+from runtime.core.signals.filters import States
+from runtime.core.signals.states import require_motion
+from runtime.core.study import Signals
 
 ROUNDING = 1e-9  # of the largest entry of W: a column below it is zero
 TEXT = "others (inertias, friction) are left out. Dry friction holds a joint with a torque of unknown sign: approach every pose from both sides and record the mean, or both as poses."

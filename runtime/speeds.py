@@ -21,12 +21,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime.core.limits import LIMIT
 from runtime.core.problem import SIGNALS, Note, Problem
-from runtime.limits import LIMIT
-from runtime.rows.selection import excerpt
-from runtime.settings.study import Signals
-from runtime.signals.cutoff import cutoff, white_noise
-from runtime.signals.filters import filtered_states, lowpass_filtered, median_filtered
+from runtime.core.rows.selection import excerpt
+from runtime.core.signals.cutoff import cutoff, white_noise
+from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
+from runtime.core.study import Signals
 
 Array = np.ndarray
 

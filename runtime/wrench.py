@@ -26,14 +26,14 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.bound import BoundModel
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
-from runtime.errors import InputError
-from runtime.model.bound import BoundModel
-from runtime.model.generated import GeneratedModel, channels_of, elements_of, joint_units
-from runtime.model.inertia import INERTIAL, physical_model
-from runtime.records.record import JOINT_CHANNELS, Record
-from runtime.rows.selection import UNMEASURED, per_joint
-from runtime.settings.record import WRENCH
+from runtime.core.record import JOINT_CHANNELS, Record
+from runtime.core.rows.selection import UNMEASURED, per_joint
+from runtime.physical.inertia import INERTIAL, physical_model
+from runtime.reading.settings import WRENCH
 
 Array = np.ndarray
 

@@ -30,19 +30,19 @@ import numpy as np
 import runtime
 import symgen
 from runtime import Cestac, Estimate, Identification, Record, Study
-from runtime.errors import DataUnavailableError
+from runtime.core.cestac.result import LevelResult
+from runtime.core.drives import Drives
+from runtime.core.errors import DataUnavailableError
+from runtime.core.markup import number
+from runtime.core.study import CestacSettings, Columns, RecordSettings, study_from_mapping
+from runtime.core.table import Table
 from runtime.loop.reference import Reference, point_to_point
-from runtime.markup import number
-from runtime.model.drives import Drives
+from runtime.loop.settings import Points
 from runtime.reading.datasets import dataset_study
+from runtime.reading.location import located
 from runtime.reporting.files import Files, identification_files, resolution_files
 from runtime.reporting.page import Section
 from runtime.reporting.resolution import resolution_section
-from runtime.resolution.result import LevelResult
-from runtime.settings.controller import Points
-from runtime.settings.location import located
-from runtime.settings.study import CestacSettings, Columns, RecordSettings, study_from_mapping
-from runtime.table import Table
 
 # Table 2 with its %sigma; Table 3 at Delta 1 ... 4; Table 4 at Phi 1 ... 4, each five times the one
 # before: their values are not given.

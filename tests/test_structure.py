@@ -1,6 +1,7 @@
 """Who may import whom: the table of the layout, read from the syntax trees of every module."""
 
 import ast
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -30,23 +31,69 @@ ROOMS = {
         "studio",
         "cli",
     ),
-    "runtime": (
-        "settings",
-        "model",
-        "records",
-        "reading",
+}
+CORE = {"numpy", "scipy", "pydantic", "pydantic_core"}
+"""Libraries of runtime/core, beside the standard library and itself."""
+EDGES = {  # of runtime: a feature imports core and itself; what else it uses, and why
+    "advisor": {"counts": "a real encoder may be read as counts"},
+    "assumptions": {"physical": "an assumption is about the bodies of the robot"},
+    "expected": {"physical": "predictions are those of bodies that exist"},
+    "friction": {"physical": "which base parameters are friction alone follows from the bodies"},
+    "payload": {"physical": "a load is a body"},
+    "plausible": {"physical": "a cause is judged by bodies that exist"},
+    "wrench": {"physical": "a wrench sees parameters of bodies that no joint torque depends on"},
+    "controller": {
+        "loop": "the law of a controller has the settings of the loop that simulates it"
+    },
+    "excitation": {"loop": "the control law, its parameters and dry friction"},
+    "loop": {"counts": "a missing count is knowledge, not a gap"},
+}
+MENDING: dict[str, set[str]] = {  # edges that are to go
+    "advisor": {"loop"},
+    "core": {
+        "advisor",
+        "agreement",
         "compiled",
-        "signals",
-        "rows",
-        "estimators",
-        "loop",
+        "controller",
+        "counts",
+        "elastic",
         "excitation",
-        "resolution",
-        "checks",
+        "expected",
+        "friction",
+        "json_files",
+        "laws",
+        "loop",
+        "parallel",
+        "payload",
+        "physical",
         "plausible",
-        "identification",
+        "reading",
         "reporting",
-    ),
+        "yaml_text",
+    },
+    "counts": {"advisor"},
+    "estimate_files": {"json_files"},
+    "excitation": {"advisor"},
+    "json_files": {"reading"},
+    "link_side": {"reading"},
+    "loop": {"compiled", "excitation", "reading"},
+    "parallel": {"threads"},
+    "plausible": {"excitation", "reading", "speeds"},
+    "reading": {"controller", "loop", "study_files", "yaml_text"},
+    "reporting": {
+        "advisor",
+        "excitation",
+        "friction",
+        "loop",
+        "payload",
+        "plausible",
+        "reading",
+        "treatments",
+        "yaml_text",
+    },
+    "study_files": {"reading", "yaml_text"},
+    "treatments": {"plausible"},
+    "wrench": {"reading"},
 }
 ONLY_IN = {  # library: files and folders that may import it
     "jinja2": (
@@ -62,10 +109,19 @@ ONLY_IN = {  # library: files and folders that may import it
     "rich": ("symgen/cli/",),
     "pydantic": (
         "symgen/description/",
+<<<<<<< /tmp/ts.py
+        "runtime/core/",
+        "runtime/estimate_files.py",
+        "runtime/json_files.py",
+        "runtime/reading/settings.py",
+        "runtime/loop/settings.py",
+        "runtime/excitation/",
+=======
         "runtime/settings/",
-        "runtime/identification/schemas.py",
+        "runtime/estimate_files.py",
+>>>>>>> /tmp/ts_now.py
     ),
-    "ruamel": ("symgen/description/", "symgen/cli/", "runtime/settings/yaml.py"),
+    "ruamel": ("symgen/description/", "symgen/cli/", "runtime/yaml_text.py"),
     "sympy": ("symgen/regroup/formula.py", "symgen/symbols/"),
     "casadi": (
         "symgen/derive/lagrange.py",
@@ -74,16 +130,16 @@ ONLY_IN = {  # library: files and folders that may import it
         "generated/",
     ),
     "pooch": ("runtime/reading/datasets.py",),
-    "pint": ("runtime/settings/units.py",),
+    "pint": ("runtime/reading/units.py",),
     "mujoco": ("symgen/description/mjcf_model.py",),
     "polars": ("runtime/reading/parquet.py",),
     "h5py": ("runtime/reading/mat.py",),
     "rosbags": ("runtime/reading/bags.py",),
-    "clarabel": ("runtime/estimators/semidefinite.py",),
+    "clarabel": ("runtime/physical/semidefinite.py",),
     "array_api_compat": ("generated/",),
-    "dask": ("runtime/cluster.py",),
-    "distributed": ("runtime/cluster.py",),
-    "threadpoolctl": ("runtime/blas.py",),
+    "dask": ("runtime/parallel/cluster.py",),
+    "distributed": ("runtime/parallel/cluster.py",),
+    "threadpoolctl": ("runtime/threads.py",),
     "scipy": ("runtime/",),
 }
 LAZY: dict[str, set[str]] = {  # imports against the order of the rooms: to be mended, then empty
@@ -151,6 +207,30 @@ def room(module: str) -> float:
         )
     first = rest.partition(".")[0]
     return ROOMS[package].index(first) + 1 if first in ROOMS[package] else 0
+
+
+def feature(module: str) -> str:
+    """The part of runtime that a module belongs to: core, a folder, or a file; "" for the lists and the package."""
+    first = module.split(".")[1] if "." in module else ""
+    return "" if first == "compose" else first
+
+
+def test_a_feature_of_the_runtime_imports_the_core_and_itself() -> None:
+    """`runtime.compose` and the package itself name features; nobody imports these two."""
+    wrong = set()
+    for name in (n for n in MODULES if n.partition(".")[0] == "runtime" and feature(n)):
+        own = feature(name)
+        allowed = {"core", own, *EDGES.get(own, ()), *MENDING.get(own, ())}
+        users = {m for m in imports(name) if m.partition(".")[0] == "runtime"}
+        wrong |= {f"{name} -> {m}" for m in users if feature(m) not in allowed}
+    assert wrong == set()
+
+
+def test_the_core_needs_three_libraries() -> None:
+    standard = sys.stdlib_module_names
+    for name in (n for n in MODULES if feature(n) == "core" and n.startswith("runtime")):
+        tops = {m.partition(".")[0] for m in imports(name)} - standard - {"runtime"}
+        assert tops <= CORE, (name, tops)
 
 
 @pytest.mark.parametrize("package", ROOMS)

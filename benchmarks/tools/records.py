@@ -28,9 +28,9 @@ from scipy.io import loadmat
 from scipy.signal import butter, sosfiltfilt
 
 import symgen
-from runtime.files import read_bytes
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
 from runtime.reading.datasets import fetch
+from runtime.reading.files import read_bytes
 from symgen.description import Robot, load_robot
 from symgen.description.files import write_robot
 

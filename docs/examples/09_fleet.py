@@ -9,7 +9,7 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.errors import InputError
+from runtime.core.errors import InputError
 
 
 def identified(file: Path) -> str:

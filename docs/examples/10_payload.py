@@ -4,7 +4,7 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.identification.payload import payload
+from runtime.payload.load import payload
 
 model = symgen.model("planar_2r")
 t = np.arange(0, 20, 0.002)

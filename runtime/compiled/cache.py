@@ -20,9 +20,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from runtime.limits import LIMIT
-from runtime.model.loading import is_writable_by_all
-from runtime.records.provenance import cpuinfo
+from runtime.core.limits import LIMIT
+from runtime.core.loading import is_writable_by_all
+from runtime.core.provenance import cpuinfo
 
 FLAGS = (
     "-std=c11",

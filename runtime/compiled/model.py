@@ -6,7 +6,7 @@ The object lies in a cache that is checked (`runtime.compiled.cache`), and its r
 with that of the NumPy module at some states.
 
 A C file is code as a module is: it is compiled where it was emitted here, or where the module
-beside it is trusted (`runtime.model.loading`).
+beside it is trusted (`runtime.core.loading`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import Any, cast
 import numpy as np
 
 from runtime.compiled.cache import FallbackWarning, NotCompiledError, shared_object
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, channels_of, check_states, constants_of
-from runtime.model.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.loading import UNTRUSTED, cache_folder, is_emitted, is_trusted
+from runtime.core.model import GeneratedModel, channels_of, check_states, constants_of
 
 Array = np.ndarray
 

@@ -1,0 +1,1 @@
+"""The law of a controller as the torque of a record that has none."""

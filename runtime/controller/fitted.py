@@ -19,17 +19,17 @@ from typing import Any
 import numpy as np
 
 from runtime.controller.law import late, torque_law
+from runtime.core.documents import Result
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import linear_estimate
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.problem import Note, Problem
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.method import linear_estimate
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, stacked, with_torques
-from runtime.settings.controller import Law
-from runtime.settings.study import EstimateSettings
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared, stacked, with_torques
+from runtime.core.study import EstimateSettings
+from runtime.loop.settings import Law
 
 Array = np.ndarray
 

@@ -3,7 +3,7 @@ reference and the gains alone.
 
     tau = sat(P (q_ref - q) + Vr qd_ref - Vm qd + tau_ff)
 
-P, Vr, Vm of `runtime.settings.controller.Law`, joint side, SI; qd as recorded, else differences
+P, Vr, Vm of `runtime.loop.settings.Law`, joint side, SI; qd as recorded, else differences
 q_k - q_(k-1) over the period. With kd: fit the share of kd is left out and nothing is cut yet: kd
 is found with the parameters, under the saturation (`runtime.controller.fitted`).
 """
@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from runtime.errors import SettingsError
-from runtime.settings.controller import Controller
+from runtime.core.errors import SettingsError
+from runtime.loop.settings import Controller
 
 Array = np.ndarray
 

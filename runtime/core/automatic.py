@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from runtime.core.problem import SIGNALS, Note, Problem
-from runtime.rows.selection import excerpt
-from runtime.signals.cutoff import cutoff
+from runtime.core.rows.selection import excerpt
+from runtime.core.signals.cutoff import cutoff
 
 
 def automatic_cutoff(problem: Problem) -> Problem:
-    """The cut-off of least bias by motion and noise, one for all fitted records (`runtime.signals.cutoff`)."""
+    """The cut-off of least bias by motion and noise, one for all fitted records (`runtime.core.signals.cutoff`)."""
     signals = problem.settings.signals
     low = signals.lowpass
     if low is None or low.cutoff != "auto":

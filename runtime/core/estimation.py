@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.errors import SettingsError
+from runtime.core.essential import Essential, essential_of
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import assemble
+from runtime.core.least_squares.method import Beginning, Method, linear_companion
+from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
-from runtime.errors import SettingsError
-from runtime.estimators.essential import Essential, essential_of
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.linear import assemble
-from runtime.estimators.method import Beginning, Method, linear_companion
-from runtime.model.generated import GeneratedModel
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import stacked
-from runtime.settings.study import EstimateSettings
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import stacked
+from runtime.core.study import EstimateSettings
 
 Array = np.ndarray
 

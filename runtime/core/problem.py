@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
-from runtime.errors import InputError
-from runtime.estimators.method import Method
-from runtime.model.generated import GeneratedModel, drives_of
-from runtime.records.provenance import origin
-from runtime.records.record import Record
-from runtime.rows.prepared import Prepared
-from runtime.settings.study import Study
-from runtime.signals.states import Reader
+from runtime.core.errors import InputError
+from runtime.core.least_squares.method import Method
+from runtime.core.model import GeneratedModel, drives_of
+from runtime.core.provenance import origin
+from runtime.core.record import Record
+from runtime.core.rows.prepared import Prepared
+from runtime.core.signals.states import Reader
+from runtime.core.study import Study
 
 SIGNALS = "signals"
 """Kind of the notes on settings of signals that were automatic."""

@@ -29,18 +29,18 @@ from typing import Any
 
 import numpy as np
 
+from runtime.advisor.noise_gain import bandwidth
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, base_columns, joint_labels, require
 from runtime.core.problem import Problem
-from runtime.errors import InputError, SettingsError
-from runtime.limits import LIMIT
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.signals.filters import decimation_factor
+from runtime.core.study import Signals
+from runtime.excitation.settings import ExcitationSettings
+from runtime.excitation.trajectories import Motion
 from runtime.loop.dry_friction import dry_friction
-from runtime.model.generated import GeneratedModel, base_columns, joint_labels, require
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import Signals
-from runtime.settings.trajectories import Motion
-from runtime.signals.filters import decimation_factor
-from runtime.signals.noise_gain import bandwidth
 
 Array = np.ndarray
 

@@ -21,14 +21,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.errors import InputError
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel
 from runtime.excitation.criteria import MotionLimits, Weights
+from runtime.excitation.families import Fourier
 from runtime.excitation.result import Start
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel
-from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.families import Fourier
-from runtime.settings.trajectories import Motion, Part
+from runtime.excitation.settings import ExcitationSettings
+from runtime.excitation.trajectories import Motion, Part
 
 Array = np.ndarray
 

@@ -20,15 +20,15 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.documents import Result
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.problem import Problem
-from runtime.errors import InputError
+from runtime.core.rows.prepared import stacked
+from runtime.core.rows.selection import per_joint
+from runtime.core.table import Table
 from runtime.excitation.criteria import limits_of
-from runtime.json_documents import Result
-from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.rows.prepared import stacked
-from runtime.rows.selection import per_joint
-from runtime.settings.excitation import ExcitationSettings
-from runtime.table import Table
+from runtime.excitation.settings import ExcitationSettings
 
 Array = np.ndarray
 CANDIDATES = 600  # random poses that are looked at

@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.documents import Result
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.study import to_mapping
+from runtime.core.table import Table
 from runtime.excitation.criteria import MotionLimits, Weights, usage
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
+from runtime.excitation.settings import ExcitationSettings
+from runtime.excitation.trajectories import Motion
 from runtime.loop.result import csv_text
-from runtime.model.generated import GeneratedModel, joint_labels
-from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import to_mapping
-from runtime.settings.trajectories import Motion
-from runtime.table import Table
 
 Array = np.ndarray
 

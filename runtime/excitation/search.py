@@ -18,10 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from runtime.core.errors import InputError
+from runtime.core.essential import essential_of
 from runtime.core.estimation import estimated, observed
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.problem import Problem
-from runtime.errors import InputError
-from runtime.estimators.essential import essential_of
+from runtime.core.signals.states import require_motion
+from runtime.core.study import Study
 from runtime.excitation.criteria import (
     Weights,
     criterion_of,
@@ -33,14 +37,10 @@ from runtime.excitation.criteria import (
 )
 from runtime.excitation.optimiser import Search, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
-from runtime.limits import LIMIT
+from runtime.excitation.settings import ExcitationSettings
+from runtime.excitation.trajectories import Motion, motion_from_mapping
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
-from runtime.model.generated import GeneratedModel, require, require_no_channels
-from runtime.settings.excitation import ExcitationSettings
-from runtime.settings.study import Study
-from runtime.settings.trajectories import Motion, motion_from_mapping
-from runtime.signals.states import require_motion
 
 Array = np.ndarray
 
@@ -59,7 +59,7 @@ def excite(
     problem : Problem
         Prepared. The estimate of its records gives parameters and deviations of the torques; without records, the values of the robot file serve.
     map : callable, optional
-        As the built-in one, such as `runtime.parallel.processes`; results do not depend on it.
+        As the built-in one, such as `runtime.parallel.processes.processes`; results do not depend on it.
     progress : callable, optional
         Called after each start with the number done and their total.
 

@@ -1,0 +1,1 @@
+"""Laws of columns: their scalars fitted, the torque that a joint transmits."""

@@ -18,10 +18,10 @@ from typing import Any, cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from runtime.model.bound import BoundModel
-from runtime.model.generated import GeneratedModel, channels_of
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared
+from runtime.core.bound import BoundModel
+from runtime.core.model import GeneratedModel, channels_of
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared
 
 Array = np.ndarray
 

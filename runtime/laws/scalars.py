@@ -13,20 +13,20 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.bound import BoundModel
+from runtime.core.errors import InputError
+from runtime.core.least_squares.block_covariance import block_covariance
+from runtime.core.least_squares.linear import percent
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel
 from runtime.core.problem import Note, Problem
-from runtime.errors import InputError
-from runtime.estimators.block_covariance import block_covariance
-from runtime.estimators.linear import percent
-from runtime.identification.residuals import correlation_time, p_value, residual_correlation
+from runtime.core.progress import at
+from runtime.core.residuals import correlation_time, p_value, residual_correlation
+from runtime.core.rows.observation import split_rows
+from runtime.core.rows.prepared import Prepared
+from runtime.core.table import Table
 from runtime.laws.projection import LawProblem, Projection, basis
 from runtime.laws.transmitted import transmitted_torque
-from runtime.markup import number
-from runtime.model.bound import BoundModel
-from runtime.model.generated import GeneratedModel
-from runtime.progress import at
-from runtime.rows.observation import split_rows
-from runtime.rows.prepared import Prepared
-from runtime.table import Table
 
 Array = np.ndarray
 

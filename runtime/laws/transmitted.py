@@ -16,12 +16,12 @@ from typing import Any, cast
 
 import numpy as np
 
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import TRANSMITTED, GeneratedModel, channels_of
 from runtime.core.problem import Note, Problem
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.model.generated import TRANSMITTED, GeneratedModel, channels_of
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared
 
 Array = np.ndarray
 

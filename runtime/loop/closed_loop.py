@@ -36,23 +36,23 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
-from runtime.errors import InputError, SettingsError
-from runtime.limits import LIMIT
+from runtime.core.progress import at
+from runtime.core.record import Record
+from runtime.core.rows.observation import LoopRows, Observation, stack
+from runtime.core.rows.prepared import Prepared, decimated_torque, observation_from_states, stacked
+from runtime.core.rows.selection import Selection, certain_rows, select_rows
+from runtime.core.settings import NotNegative, Settings, structure
+from runtime.core.signals.filters import States, decimated, filtered_states
+from runtime.core.study import Study
+from runtime.counts.reading import REACH
 from runtime.loop.law_check import LawFit, law_fits, law_text
 from runtime.loop.reference import Reference, of_record, reference_of, require_rate
 from runtime.loop.result import Simulation
-from runtime.model.generated import GeneratedModel, is_axis, joint_labels
-from runtime.progress import at
-from runtime.records.record import Record
-from runtime.rows.observation import LoopRows, Observation, stack
-from runtime.rows.prepared import Prepared, decimated_torque, observation_from_states, stacked
-from runtime.rows.selection import Selection, certain_rows, select_rows
-from runtime.settings.controller import Controller
-from runtime.settings.schema import NotNegative, Settings, structure
-from runtime.settings.study import Study
-from runtime.signals.counts.reading import REACH
-from runtime.signals.filters import States, decimated, filtered_states
+from runtime.loop.settings import Controller
 
 if TYPE_CHECKING:
     from runtime.loop.simulation import Simulator  # CasADi
@@ -243,9 +243,7 @@ def observed_loop(problem: Problem, simulator: Simulator | None = None) -> Obser
             f"estimate.method: {settings.estimate.method} does not read wrenches; leave it out, or the wrench"
         )
     if simulator is None and settings.controller is not None:
-        from runtime.loop.simulation import (
-            Simulator as FromController,  # CasADi, for these methods alone
-        )
+        from runtime.loop.simulation import Simulator as FromController
 
         simulator = FromController(problem.model, settings.controller)
     if simulator is None:

@@ -17,11 +17,11 @@ from typing import Any, cast
 import numpy as np
 from scipy.signal import cont2discrete
 
-from runtime.errors import InputError, SettingsError
-from runtime.model.drives import Drives
-from runtime.model.generated import GeneratedModel, drives_of
-from runtime.settings.controller import Controller
-from runtime.settings.schema import PerJoint
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.model import GeneratedModel, drives_of
+from runtime.core.settings import PerJoint
+from runtime.loop.settings import Controller
 
 Array = np.ndarray
 

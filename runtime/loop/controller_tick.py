@@ -25,17 +25,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.compiled.cache import (
-    FallbackWarning,
-    NotCompiledError,
-    shared_object,
-)
-from runtime.limits import LIMIT
+from runtime.compiled.cache import FallbackWarning, NotCompiledError, shared_object
+from runtime.core.limits import LIMIT
+from runtime.core.loading import cache_folder
+from runtime.core.model import GeneratedModel
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction
 from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
-from runtime.model.generated import GeneratedModel
-from runtime.model.loading import cache_folder
 
 Array = np.ndarray
 MX = Any  # casadi.MX

@@ -19,14 +19,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from runtime.estimators.linear import LinearOptions, System, standard_deviations
-from runtime.estimators.method import Beginning, Fitted
-from runtime.estimators.wls import weighted
+from runtime.core.least_squares.linear import LinearOptions, System, standard_deviations
+from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.wls import weighted
+from runtime.core.rows.factor import Array
+from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import loop_of
 from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
-from runtime.rows.factor import Array
-from runtime.settings.study import EstimateSettings
 
 
 def fit(start: Beginning) -> Fitted:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel
 
 Array = np.ndarray
 

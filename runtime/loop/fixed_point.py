@@ -22,16 +22,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.errors import InputError, SettingsError
-from runtime.estimators.estimate import Status
-from runtime.estimators.method import Beginning
-from runtime.limits import LIMIT
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.least_squares.estimate import Status
+from runtime.core.least_squares.method import Beginning
+from runtime.core.limits import LIMIT
+from runtime.core.model import joint_labels
+from runtime.core.progress import at
+from runtime.core.settings import Count, Positive, Real
 from runtime.loop.closed_loop import ClosedLoop, LoopOptions
 from runtime.loop.control_law import parameters_of
 from runtime.loop.result import Simulation
-from runtime.model.generated import joint_labels
-from runtime.progress import at
-from runtime.settings.schema import Count, Positive, Real
 
 Array = np.ndarray
 

@@ -28,16 +28,16 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.stats import chi2
 
-from runtime.errors import InputError
-from runtime.estimators.block_covariance import deletions
-from runtime.estimators.method import Beginning, Fitted
-from runtime.estimators.wls import common_scales, floored
-from runtime.limits import LIMIT
+from runtime.core.errors import InputError
+from runtime.core.least_squares.block_covariance import deletions
+from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.least_squares.wls import common_scales, floored
+from runtime.core.limits import LIMIT
+from runtime.core.rows.factor import Array
+from runtime.core.rows.observation import Observation, split_rows
 from runtime.loop.closed_loop import loop_of
 from runtime.loop.fixed_point import Step, iterate, outcome_of
 from runtime.loop.result import Simulation
-from runtime.rows.factor import Array
-from runtime.rows.observation import Observation, split_rows
 
 
 def fit(start: Beginning) -> Fitted:
@@ -137,7 +137,7 @@ def _quality(W: Array, Z: Array) -> dict[str, float]:
 
 
 def _by_block(observation: Observation, Z: Array, residual: Array, A: Array) -> Array:
-    """Change of X = A Z'Y by each block left out (`runtime.estimators.block_covariance`), shape (K,
+    """Change of X = A Z'Y by each block left out (`runtime.core.least_squares.block_covariance`), shape (K,
     b), times sqrt((K - 1)/K); nan for one block.
 
     Z, residual : weighted rows of the instruments, shape (r, b), and Y - W X, shape (r,).

@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from runtime.limits import LIMIT
+from runtime.core.limits import LIMIT
+from runtime.core.record import Record
 from runtime.loop.reference import Reference
-from runtime.records.record import Record
-from runtime.settings.controller import Controller
+from runtime.loop.settings import Controller
 
 Array = np.ndarray
 

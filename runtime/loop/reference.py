@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from runtime.errors import InputError, SettingsError
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_labels
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.record import Record
+from runtime.core.signals.filters import derivative
+from runtime.excitation.trajectories import motion_from_mapping
+from runtime.loop.settings import Controller, Points
 from runtime.reading.formats import read_table
-from runtime.records.record import Record
-from runtime.settings.controller import Controller, Points
-from runtime.settings.trajectories import motion_from_mapping
-from runtime.signals.filters import derivative
 
 Array = np.ndarray
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_labels, joint_units
-from runtime.records.record import Origin, Record
-from runtime.table import Table
+from runtime.core.documents import Result
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels, joint_units
+from runtime.core.record import Origin, Record
+from runtime.core.table import Table
 
 Array = np.ndarray
 

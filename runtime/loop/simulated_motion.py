@@ -19,16 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.estimators.estimate import Status
-from runtime.estimators.linear import percent
-from runtime.estimators.method import Beginning, Fitted
-from runtime.limits import LIMIT
+from runtime.core.errors import InputError
+from runtime.core.least_squares.estimate import Status
+from runtime.core.least_squares.linear import percent
+from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.limits import LIMIT
+from runtime.core.model import joint_labels
+from runtime.core.rows.observation import Observation
 from runtime.loop.closed_loop import ClosedLoop, loop_of
 from runtime.loop.fixed_point import full
 from runtime.loop.law_check import law_text
-from runtime.model.generated import joint_labels
-from runtime.rows.observation import Observation
 
 Array = np.ndarray
 

@@ -23,8 +23,10 @@ import casadi as ca
 import numpy as np
 from scipy.signal import butter, lfilter
 
-from runtime.errors import InputError, SettingsError
-from runtime.limits import LIMIT
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, constants_of, require, require_no_channels
+from runtime.core.study import Study
 from runtime.loop.control_law import (
     ControlLaw,
     continuous_pole,
@@ -36,10 +38,8 @@ from runtime.loop.controller_tick import LoopInputs, blocks, compiled, tick_func
 from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
-from runtime.model.generated import GeneratedModel, constants_of, require, require_no_channels
+from runtime.loop.settings import Controller
 from runtime.reading.records import read_records
-from runtime.settings.controller import Controller
-from runtime.settings.study import Study
 
 Array = np.ndarray
 

@@ -20,9 +20,9 @@ from typing import Any
 
 import casadi as ca
 
-from runtime.limits import LIMIT
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel
 from runtime.loop.dry_friction import DryFriction
-from runtime.model.generated import GeneratedModel
 
 SX = Any  # casadi.SX
 

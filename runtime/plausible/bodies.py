@@ -10,7 +10,7 @@ N the rows of a joint that count (residuals are coloured); a difference of 5 is 
 Rows j are those of a torque as it was measured, whatever map of the torques is tried (`runtime.plausible.trials`).
 
 `Bodies` minimises half the weighted squares and D over the standard parameters of a physical robot
-(`runtime.model.inertia`): every pseudo-inertia P >= 0, motor inertias and frictions c >= 0, and
+(`runtime.physical.inertia`): every pseudo-inertia P >= 0, motor inertias and frictions c >= 0, and
 M R^2 >= tr S, S the second moments of a link and R its largest extent.
 
     D(chi) = sum_links 1/2 ||P0^-1/2 (P - P0) P0^-1/2||^2 / tolerance^2
@@ -29,9 +29,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from runtime.estimators.semidefinite import Quadratic
-from runtime.limits import LIMIT
-from runtime.model.inertia import Condition, PhysicalModel
+from runtime.core.limits import LIMIT
+from runtime.physical.inertia import Condition, PhysicalModel
+from runtime.physical.semidefinite import Quadratic
 
 Array = np.ndarray
 

@@ -8,19 +8,19 @@ from functools import cached_property
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, joint_labels, joint_units
-from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels, joint_units
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared, stacked
+from runtime.core.study import Study
+from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
 from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
 from runtime.plausible.samples import Filtered, Samples
 from runtime.plausible.trials import Baseline, baseline_of
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import Prepared, stacked
-from runtime.settings.study import Study
 
 Array = np.ndarray
 

@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, drives_of, joint_labels, joint_units
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, drives_of, joint_labels, joint_units
 from runtime.plausible.samples import Samples
-from runtime.settings.units import torque_unit
+from runtime.reading.units import torque_unit
 
 Array = np.ndarray
 Item = Mapping[str, Any]

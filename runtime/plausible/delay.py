@@ -20,16 +20,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
+from runtime.core.documents import Result
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.problem import Problem
-from runtime.errors import InputError
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
-from runtime.markup import number
-from runtime.model.generated import GeneratedModel, joint_labels
+from runtime.core.signals.states import require_motion
+from runtime.core.table import Table
 from runtime.plausible.bodies import Grams, solved
 from runtime.plausible.samples import Filtered, filtered, usable
-from runtime.signals.states import require_motion
-from runtime.table import Table
 
 Array = np.ndarray
 

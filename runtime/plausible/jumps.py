@@ -16,14 +16,14 @@ from itertools import combinations
 import numpy as np
 from scipy.ndimage import median_filter
 
-from runtime.checks.check import Answer, Question
-from runtime.errors import instant
-from runtime.limits import LIMIT
-from runtime.model.generated import drives_of
+from runtime.core.check import Answer, Question
+from runtime.core.errors import instant
+from runtime.core.limits import LIMIT
+from runtime.core.model import drives_of
+from runtime.core.signals.filters import median_filtered
 from runtime.plausible.bodies import least_squares
 from runtime.plausible.case import Case
 from runtime.plausible.samples import moving as in_motion
-from runtime.signals.filters import median_filtered
 
 Array = np.ndarray
 

@@ -26,14 +26,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.json_documents import Result
-from runtime.limits import LIMIT
-from runtime.markup import number
-from runtime.model.generated import GeneratedModel, elements_of, is_axis, joint_labels
-from runtime.model.inertia import INERTIAL
+from runtime.core.documents import Result
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
+from runtime.core.rows.observation import Observation
+from runtime.core.table import Table
+from runtime.physical.inertia import INERTIAL
 from runtime.plausible.trials import Baseline
-from runtime.rows.observation import Observation
-from runtime.table import Table
 
 Array = np.ndarray
 

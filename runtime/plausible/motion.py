@@ -17,18 +17,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.checks.check import Answer, Question, State, named
+from runtime.core.check import Answer, Question, State, named
+from runtime.core.errors import InputError
 from runtime.core.estimation import estimate_of
-from runtime.errors import InputError
-from runtime.estimators.method import LINEAR
+from runtime.core.least_squares.method import LINEAR
+from runtime.core.limits import LIMIT
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import stacked
+from runtime.core.rows.selection import per_joint
+from runtime.core.study import EstimateSettings, Signals, Study
 from runtime.excitation.criteria import Weights, kept_correlation
-from runtime.limits import LIMIT
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import stacked
-from runtime.rows.selection import per_joint
-from runtime.settings.study import EstimateSettings, Signals, Study
 from runtime.speeds import agreement
 
 Array = np.ndarray

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from runtime.checks.check import Answer, Question, State
-from runtime.limits import LIMIT
-from runtime.model.generated import elements_of
+from runtime.core.check import Answer, Question, State
+from runtime.core.limits import LIMIT
+from runtime.core.model import elements_of
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.trials import Trial, reach

@@ -15,11 +15,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from runtime.checks.check import WORST, Check, worst_of
+from runtime.core.check import WORST, Check, worst_of
+from runtime.core.documents import Result
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel, is_axis, require_no_channels
 from runtime.core.problem import Problem
-from runtime.errors import InputError
-from runtime.json_documents import Result
-from runtime.model.generated import GeneratedModel, is_axis, require_no_channels
+from runtime.core.progress import at
+from runtime.core.signals.states import require_motion, unwrapped
+from runtime.core.table import Table
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.jumps import cut_torques, jumps
@@ -47,9 +50,6 @@ from runtime.plausible.sizes import (
     torques,
 )
 from runtime.plausible.trials import Trial, decisive, regressor, tried
-from runtime.progress import at
-from runtime.signals.states import require_motion, unwrapped
-from runtime.table import Table
 
 CHECKS: tuple[Callable[[Case], Check | None], ...] = (
     jumps,

@@ -12,19 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.records.record import Record
-from runtime.rows.prepared import Prepared
-from runtime.rows.selection import window_of
-from runtime.settings.study import Study
-from runtime.signals.filters import (
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.record import Record
+from runtime.core.rows.prepared import Prepared
+from runtime.core.rows.selection import window_of
+from runtime.core.signals.filters import (
     Lowpass,
     States,
     filtered_states,
     lowpass_filtered,
     median_filtered,
 )
+from runtime.core.study import Study
 
 Array = np.ndarray
 

@@ -10,13 +10,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from runtime.checks.check import Answer, Question, State
-from runtime.estimators.physical import frame_origins
-from runtime.limits import LIMIT
-from runtime.model.inertia import INERTIAL, PhysicalModel
+from runtime.core.check import Answer, Question, State
+from runtime.core.limits import LIMIT
+from runtime.core.record import Record
+from runtime.physical.inertia import INERTIAL, PhysicalModel
+from runtime.physical.signs import frame_origins
 from runtime.plausible.case import Case
 from runtime.plausible.trials import reach
-from runtime.records.record import Record
 
 Array = np.ndarray
 

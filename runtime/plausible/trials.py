@@ -25,10 +25,10 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import minimize_scalar
 
-from runtime.estimators.physical import frame_origins
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, drives_of
-from runtime.model.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, drives_of
+from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+from runtime.physical.signs import frame_origins
 from runtime.plausible.bodies import (
     Bodies,
     Fit,

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
 from runtime.reading.likely_columns import likely_columns
+from runtime.reading.settings import BY_NAME, Columns, RecordSettings
 from runtime.reading.table import Array, Table
-from runtime.settings.record import BY_NAME, Columns, RecordSettings
-from runtime.settings.units import COMMANDS, position_unit, torque_unit
+from runtime.reading.units import COMMANDS, position_unit, torque_unit
 
 WORDS = {
     "q": ("q", "pos", "position"),

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from runtime.errors import DataUnavailableError, InputError
-from runtime.files import is_file, sha256_of
+from runtime.core.errors import DataUnavailableError, InputError
+from runtime.reading.files import is_file, sha256_of
 
 TIMEOUT = 10.0  # s, for a connection and between two packets
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from runtime.errors import InputError
-from runtime.files import sha256_of
+from runtime.core.errors import InputError
 from runtime.reading.bags import digest_of, read_bag
+from runtime.reading.files import sha256_of
 from runtime.reading.mat import read_mat
 from runtime.reading.numpy_files import read_npy, read_npz
 from runtime.reading.parquet import read_parquet

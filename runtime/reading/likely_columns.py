@@ -15,8 +15,8 @@ from contextlib import suppress
 from itertools import product
 from typing import Any
 
-from runtime.errors import InputError
-from runtime.settings.units import position_unit, time_unit, torque_unit
+from runtime.core.errors import InputError
+from runtime.reading.units import position_unit, time_unit, torque_unit
 
 QUANTITY_WORDS = {  # the first words are taken before the others
     "q": ("q", "pos", "position", "positions", "angle", "angles", "winkel"),

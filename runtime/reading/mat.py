@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.files import opened, unpacked
+from runtime.core.errors import InputError
+from runtime.reading.files import opened, unpacked
 from runtime.reading.table import Options, Table, damage_named, is_numeric
 
 TITLE = "a MATLAB file"

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from runtime.errors import InputError
+from runtime.core.errors import InputError
+from runtime.core.study import Study, study_from_mapping
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured
-from runtime.settings.files import load_study
-from runtime.settings.record import RecordSettings
-from runtime.settings.study import Study, study_from_mapping
+from runtime.reading.settings import RecordSettings
+from runtime.study_files import load_study
 
 
 @dataclass(frozen=True)

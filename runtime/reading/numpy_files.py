@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.files import require_size, unpacked
+from runtime.core.errors import InputError
+from runtime.reading.files import require_size, unpacked
 from runtime.reading.table import WIDEST, Array, Options, Table, damage_named, is_numeric
 
 ARCHIVE = "an archive of plain arrays"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.files import require_size, unpacked
+from runtime.core.errors import InputError
+from runtime.reading.files import require_size, unpacked
 from runtime.reading.table import Options, Table, damage_named
 
 TITLE = "a Parquet file"

@@ -16,20 +16,20 @@ from typing import Any
 import numpy as np
 
 from runtime.controller.law import torque_law
-from runtime.errors import InputError, ModelError
-from runtime.limits import LIMIT
-from runtime.model.generated import GeneratedModel, drives_of, joint_labels
+from runtime.core.clock import Stamps, rate_of, time_stamps
+from runtime.core.errors import InputError, ModelError
+from runtime.core.limits import LIMIT
+from runtime.core.missing import COUNTS, Missing, bridged
+from runtime.core.model import GeneratedModel, drives_of, joint_labels
+from runtime.core.record import JOINT_CHANNELS, Origin, Record, require_finite
 from runtime.reading.columns import Conversion, column_names, conversion, require_alike
 from runtime.reading.datasets import fetch
 from runtime.reading.formats import read_table
 from runtime.reading.names import Label, labels, study_of
 from runtime.reading.resampling import Stretch, resampled
+from runtime.reading.settings import NONE, Columns, RecordSettings, each_record
 from runtime.reading.table import Array, Table
-from runtime.records.clock import Stamps, rate_of, time_stamps
-from runtime.records.missing import COUNTS, Missing, bridged
-from runtime.records.record import JOINT_CHANNELS, Origin, Record, require_finite
-from runtime.settings.record import NONE, Columns, RecordSettings, each_record
-from runtime.settings.units import time_unit
+from runtime.reading.units import time_unit
 
 IRREGULAR = 0.05
 """Between the rate of the settings and the median step of stamps that are resampled."""

@@ -27,11 +27,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.records.clock import GAP, TimeStamps, remedy_text, time_stamps
-from runtime.settings.record import Resample
-from runtime.settings.schema import structure
+from runtime.core.clock import GAP, TimeStamps, remedy_text, time_stamps
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.settings import structure
+from runtime.reading.settings import Resample
 
 Array = np.ndarray
 

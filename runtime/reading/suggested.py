@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from runtime.errors import InputError
-from runtime.model.generated import GeneratedModel
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel
+from runtime.core.study import Study, study_from_mapping, to_mapping
 from runtime.reading.records import read_records
-from runtime.settings.study import Study, study_from_mapping, to_mapping
-from runtime.settings.yaml import yaml_text
+from runtime.yaml_text import yaml_text
 
 
 def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:

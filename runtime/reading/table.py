@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from runtime.errors import InputError, first_line
-from runtime.records.clock import sample
+from runtime.core.clock import sample
+from runtime.core.errors import InputError, first_line
 
 Array = np.ndarray
 

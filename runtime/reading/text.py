@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime.errors import InputError
-from runtime.files import opened
+from runtime.core.errors import InputError
+from runtime.reading.files import opened
 from runtime.reading.table import WIDEST, Array, Options, Table
 
 CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date

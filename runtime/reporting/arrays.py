@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from runtime.errors import encodable
-from runtime.estimators.estimate import Estimate
-from runtime.json_documents import json_text
-from runtime.resolution.result import Cestac
-from runtime.table import csv_text
+from runtime.core.cestac.result import Cestac
+from runtime.core.documents import json_text
+from runtime.core.errors import encodable
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.table import csv_text
 
 Array = np.ndarray
 

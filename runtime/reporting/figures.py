@@ -18,13 +18,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from runtime.identification.friction import FrictionCurve
-from runtime.identification.residuals import Whiteness
-from runtime.identification.validation import JointComparison
-from runtime.limits import LIMIT
+from runtime.core.cestac.result import Cestac
+from runtime.core.limits import LIMIT
+from runtime.core.residuals import Whiteness
+from runtime.core.validation import JointComparison
+from runtime.friction.curves import FrictionCurve
 from runtime.reporting.page import Image
 from runtime.reporting.series import Series, series
-from runtime.resolution.result import Cestac
 
 T = TypeVar("T")
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = (

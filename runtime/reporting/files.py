@@ -12,26 +12,26 @@ from typing import TypeAlias
 
 import numpy as np
 
+from runtime.advisor.advice import Advice
+from runtime.core.cestac.result import Cestac
+from runtime.core.documents import json_text
+from runtime.core.limits import LIMIT
+from runtime.core.model import joint_labels
+from runtime.core.result import Identification
+from runtime.core.study import RecordSettings, Study
 from runtime.excitation.poses import StaticPoses
 from runtime.excitation.result import Excitation
-from runtime.identification.compare import Ranking
-from runtime.identification.result import Identification
-from runtime.json_documents import json_text
-from runtime.limits import LIMIT
 from runtime.loop.result import Simulation, csv_text
-from runtime.model.generated import joint_labels
+from runtime.reading.location import study_text
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
 from runtime.reporting.motions import excitation_page, simulation_figure
 from runtime.reporting.page import Page, Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
 from runtime.reporting.parameters import parameters_csv, standard_csv
-from runtime.resolution.advice import Advice
-from runtime.resolution.result import Cestac
-from runtime.result_files import Results, write_all
-from runtime.settings.location import study_text
-from runtime.settings.study import RecordSettings, Study
-from runtime.settings.yaml import yaml_text
+from runtime.reporting.result_files import Results, write_all
+from runtime.treatments import Ranking
+from runtime.yaml_text import yaml_text
 
 Files: TypeAlias = dict[str, str | bytes]
 
@@ -50,7 +50,7 @@ def report(
     ----------
     result : Identification, Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses
     folder : str, Path or Results
-        Made where it is missing; or one that `runtime.result_files.results_in` gave.
+        Made where it is missing; or one that `runtime.reporting.result_files.results_in` gave.
     study : Study, optional
         Settings of a Cestac, an Advice or a Simulation, for study.yaml; default: Study(). An
         Identification holds its own.

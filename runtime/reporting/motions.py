@@ -6,17 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.limits import LIMIT
-from runtime.model.generated import joint_labels
-from runtime.reporting.figures import (
-    BLUE,
-    DOTTED,
-    GREY,
-    ORANGE,
-    drawn,
-    legend_above,
-    panels,
-)
+from runtime.core.limits import LIMIT
+from runtime.core.model import joint_labels
+from runtime.reporting.figures import BLUE, DOTTED, GREY, ORANGE, drawn, legend_above, panels
 from runtime.reporting.page import Page, Section
 from runtime.reporting.series import extremes
 

@@ -22,9 +22,9 @@ from typing import Any, Literal
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
-from runtime.markup import Markup, element
+from runtime.core.markup import Markup, element
+from runtime.core.table import Table
 from runtime.reporting.series import Series
-from runtime.table import Table
 
 State = Literal["good", "doubtful", "no", "open", ""]
 SCRIPTS = ("chart.js", "page.js")

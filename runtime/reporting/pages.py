@@ -6,15 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from runtime.identification.checklist import Checklist, rounded
-from runtime.identification.result import Identification
+from runtime.advisor.advice import Advice
+from runtime.core.cestac.result import Cestac
+from runtime.core.checklist import Checklist, rounded
+from runtime.core.result import Identification
+from runtime.core.table import Table
 from runtime.reporting.page import Number, Page, Section, state_mark
 from runtime.reporting.parameters import payload_section, physical_section
 from runtime.reporting.resolution import advice_section, level_numbers, resolution_section
 from runtime.reporting.sections import friction_section, identification_sections
-from runtime.resolution.advice import Advice
-from runtime.resolution.result import Cestac
-from runtime.table import Table
 
 SIMULATED_WARNING = (
     "Everything here was computed on a SIMULATED record, made from the values of the robot file "

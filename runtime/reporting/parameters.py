@@ -10,14 +10,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from runtime.estimators.estimate import Estimate
-from runtime.identification.payload_study import PayloadStudy
-from runtime.identification.result import Identification
-from runtime.limits import LIMIT
-from runtime.markup import element, formula, number, symbol, unit
-from runtime.model.generated import GeneratedModel
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.limits import LIMIT
+from runtime.core.markup import element, formula, number, symbol, unit
+from runtime.core.model import GeneratedModel
+from runtime.core.result import Identification
+from runtime.core.table import Table, csv_text
+from runtime.payload.study import PayloadStudy
 from runtime.reporting.page import Matrix, Section
-from runtime.table import Table, csv_text
 
 HEADER = (
     "parameter",

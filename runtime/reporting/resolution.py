@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from runtime.advisor.advice import NAMES, Advice, EncoderAdvice
+from runtime.core.cestac.result import Cestac
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Number, Section, State
-from runtime.resolution.advice import NAMES, Advice, EncoderAdvice
-from runtime.resolution.result import Cestac
 
 COLUMNS = 5
 LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes

@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from runtime.identification.friction import FrictionCurve, law_tables
-from runtime.identification.result import Identification
-from runtime.markup import number
+from runtime.core.markup import number
+from runtime.core.result import Identification
+from runtime.core.signals.decimation import CUTOFF
+from runtime.core.table import Table
+from runtime.friction.curves import FrictionCurve, law_tables
 from runtime.plausible.plausibility import Plausibility
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
 from runtime.reporting.parameters import correlation_section, parameter_section
 from runtime.reporting.series import series
-from runtime.signals.decimation import CUTOFF
-from runtime.table import Table
 
 
 def identification_sections(result: Identification) -> list[Section]:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from runtime.identification.validation import JointComparison
-from runtime.limits import LIMIT
+from runtime.core.limits import LIMIT
+from runtime.core.validation import JointComparison
 
 Array = np.ndarray
 

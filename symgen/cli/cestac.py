@@ -54,9 +54,9 @@ def cestac(
     """
     with session.results_in(output) as results:
         import runtime
+        from runtime.counts.coarse_encoders import READERS
+        from runtime.parallel.checkpoint import Checkpoint
         from runtime.reading.records import read_records
-        from runtime.resolution.checkpoint import Checkpoint
-        from runtime.resolution.coarse_encoders import READERS
 
         model = session.model_of(
             robot, "numpy" if advise else target, trust=trust, exact=exact, records=record

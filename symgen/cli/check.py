@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import described_robot, end, reported_errors
 

@@ -37,7 +37,7 @@ def compare(
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
-        from runtime.json_documents import json_text
+        from runtime.core.documents import json_text
 
         model = session.model_of(robot, trust=trust, exact=exact)
         short = len({Path(one).stem for one in study}) == len(study)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import fail, reported_errors
 
@@ -88,11 +88,11 @@ def convert(
             chain=chain,
         )
         if values is not None:
-            from runtime.files import read_bytes
+            from runtime.reading.files import read_bytes
 
             robot = with_values(robot, values_of_csv(read_bytes(values), str(values)))
         if estimate is not None:
-            from runtime.identification.schemas import load_whole_estimate
+            from runtime.estimate_files import load_whole_estimate
 
             standard = load_whole_estimate(estimate).details.get("standard")
             robot = with_estimate(robot, standard, str(estimate))

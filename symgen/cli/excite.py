@@ -55,7 +55,7 @@ def excite(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.json_documents import json_text
+        from runtime.core.documents import json_text
         from runtime.reading.records import read_records
 
         model = session.model_of(robot, trust=trust, exact=exact)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import NEGATIVE, described_robot, fail, reported_errors
 from symgen.derive.models import OPTIONS

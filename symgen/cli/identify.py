@@ -63,8 +63,8 @@ def identify(
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
         from runtime.compiled.model import target_of
+        from runtime.core.provenance import processor
         from runtime.reading.records import read_records
-        from runtime.records.provenance import processor
 
         model = session.model_of(robot, target, trust=trust, exact=exact, records=record)
         study = session.study_of_arguments(record)

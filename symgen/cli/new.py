@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.cli.session import fail, reported_errors
 
 

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 if TYPE_CHECKING:
-    from runtime.model.generated import GeneratedModel
-    from runtime.resolution.checkpoint import Checkpoint
-    from runtime.result_files import Results
-    from runtime.settings.study import Study
+    from runtime.core.model import GeneratedModel
+    from runtime.core.study import Study
+    from runtime.parallel.checkpoint import Checkpoint
+    from runtime.reporting.result_files import Results
     from symgen.description import Robot
 
 BAD_INPUT, NEGATIVE = 2, 1
@@ -29,7 +29,7 @@ def single_thread() -> None:
     """One BLAS thread unless the user set another number: matrices here are small and results then
     agree in every bit. Before numpy loads.
     """
-    from runtime.blas import BLAS_THREADS
+    from runtime.threads import BLAS_THREADS
 
     for name in BLAS_THREADS:
         os.environ.setdefault(name, "1")
@@ -41,7 +41,7 @@ def reported_errors() -> Iterator[None]:
     exit code 2, a false certificate with exit code 1, never a traceback; angles that are read
     otherwise than written as a note.
     """
-    from runtime.errors import DataUnavailableError, InputError
+    from runtime.core.errors import DataUnavailableError, InputError
     from symgen.errors import CertificateError, SymgenError
 
     single_thread()
@@ -111,7 +111,7 @@ def say(text: str) -> None:
 
 def show(text: str, results: Results | None = None, *, json: bool = False) -> None:
     """Print a result, and on the error stream where its report is."""
-    from runtime.errors import encodable
+    from runtime.core.errors import encodable
 
     typer.echo(encodable(text), nl=not json)
     if results is not None:
@@ -137,7 +137,7 @@ def model_of(
     `load_robot`. records : RECORD arguments; where they name wrenches the model has their columns.
     """
     import symgen
-    from runtime.model.generated import load_model
+    from runtime.core.model import load_model
     from runtime.reading.formats import is_measured
 
     if target not in ("numpy", "c"):
@@ -176,7 +176,7 @@ def variants_of(robot: str, *, exact: bool = False) -> GeneratedModel | None:
     which has no robot file.
     """
     import symgen
-    from runtime.model.generated import load_model
+    from runtime.core.model import load_model
 
     return (
         None
@@ -191,8 +191,8 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
 
     import runtime
     import symgen
-    from runtime.identification.assumptions import assumptions_asked
-    from runtime.model.generated import load_model
+    from runtime.assumptions import assumptions_asked
+    from runtime.core.model import load_model
 
     described = None if Path(robot).suffix == ".py" else symgen.load_robot(robot, exact=exact)
     if described is None or not described.assume:
@@ -236,10 +236,10 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     is a measured file like it, a record of its own.
     recorded : whether the study has to name a record.
     """
-    from runtime.errors import InputError
+    from runtime.core.errors import InputError
     from runtime.reading.formats import is_measured
+    from runtime.reading.location import located
     from runtime.reading.names import study_of
-    from runtime.settings.location import located
 
     study = located(*study_of(records[0]))
     if recorded:
@@ -265,10 +265,10 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
 
 def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     """The study with what is likely to cure each refusal of its records, written to `path`."""
-    from runtime.errors import InputError
+    from runtime.core.errors import InputError
+    from runtime.reading.location import study_text
     from runtime.reading.suggested import suggested
-    from runtime.result_files import write_all
-    from runtime.settings.location import study_text
+    from runtime.reporting.result_files import write_all
 
     if path.exists():
         raise InputError("the study to suggest exists; choose another name", file=str(path))
@@ -282,7 +282,7 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
 
 def require_record(study: Study, file: str) -> None:
     """InputError where the study of that file names no record."""
-    from runtime.errors import InputError
+    from runtime.core.errors import InputError
 
     if not study.record:
         raise InputError(
@@ -293,7 +293,7 @@ def require_record(study: Study, file: str) -> None:
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
     """The study with some settings replaced, checked like those of a file; None: as it is."""
-    from runtime.settings.study import study_from_mapping, to_mapping
+    from runtime.core.study import study_from_mapping, to_mapping
 
     mapping = to_mapping(study)
     for section, given in sections.items():
@@ -310,9 +310,9 @@ def names_of(text: str | None) -> str | list[str] | None:
 @contextmanager
 def map_of(workers: int, scheduler: str | None = None) -> Iterator[Any]:
     """The map of --workers, or of --scheduler."""
-    from runtime.cluster import cluster
-    from runtime.errors import InputError
-    from runtime.parallel import processes
+    from runtime.core.errors import InputError
+    from runtime.parallel.cluster import cluster
+    from runtime.parallel.processes import processes
 
     if scheduler and workers:
         raise InputError("a scheduler has workers of its own; leave out workers")
@@ -337,7 +337,7 @@ def progress_lines(after: float = 2.0) -> Iterator[None]:
     import logging
     from time import monotonic
 
-    from runtime.progress import LOGGER
+    from runtime.core.progress import LOGGER
 
     start, level = monotonic(), LOGGER.level
     handler = logging.StreamHandler()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.cli import options
 from symgen.cli.session import described_robot, fail, reported_errors
 

@@ -34,7 +34,7 @@ def simulate(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.json_documents import json_text
+        from runtime.core.documents import json_text
 
         model = session.model_of(robot, trust=trust, exact=exact)
         settings = session.study_of_arguments([study], recorded=False)

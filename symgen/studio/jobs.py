@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from runtime.blas import BLAS_THREADS
+from runtime.threads import BLAS_THREADS
 from symgen.studio.folder import result_of
 
 GRACE = 3.0  # s, between the interrupt and the kill

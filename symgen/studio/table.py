@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from runtime.settings.yaml import yaml_values
+from runtime.yaml_text import yaml_values
 from symgen.description import parse_robot
 from symgen.errors import DescriptionError
 

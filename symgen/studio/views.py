@@ -19,8 +19,8 @@ import numpy as np
 
 import runtime
 import symgen
-from runtime.errors import InputError
-from runtime.result_files import write_all
+from runtime.core.errors import InputError
+from runtime.reporting.result_files import write_all
 from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description.files import write_robot
@@ -135,8 +135,8 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Names of the columns of a measured file, and of those asked for (`columns`, by commas) first
     rows and thinned lines; rate and gaps by the column `t`.
     """
+    from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
-    from runtime.records.clock import time_stamps
 
     opened = read_table(Path(path))
     names = list(opened.names)[:NAMES_LISTED]
@@ -161,8 +161,8 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     """Measured and predicted torques of one `record` of the run in the folder `run`, fitted or to
     validate on, with positions, at instants that its estimate read.
     """
-    from runtime.identification.schemas import load_whole_estimate
-    from runtime.identification.validation import direct_comparison
+    from runtime.core.validation import direct_comparison
+    from runtime.estimate_files import load_whole_estimate
 
     place = Path(request["run"])
     loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
@@ -190,8 +190,8 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
     relative to its study.
     """
+    from runtime.reading.location import located
     from runtime.reading.records import read_records
-    from runtime.settings.location import located
 
     model = runtime.load_model(symgen.model(path))
     study = located(runtime.load_study(study_file), study_file.parent)

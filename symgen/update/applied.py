@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from runtime.json_documents import json_text
-from runtime.markup import number
-from runtime.result_files import write_all
-from runtime.table import Table, notebook
+from runtime.core.documents import json_text
+from runtime.core.markup import number
+from runtime.core.table import Table, notebook
+from runtime.reporting.result_files import write_all
 
 NOTHING = 1e-12  # SI; smaller numbers are rounding
 SOURCES = {"record": "the record", "sum": "the record, in sums", "file": "feasibility"}

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from runtime.estimators.estimate import Estimate
-from runtime.identification.schemas import load_whole_estimate
-from runtime.model.generated import load_model
-from runtime.model.inertia import PhysicalModel, physical_model
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import load_model
+from runtime.estimate_files import load_whole_estimate
+from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.modules import model as emitted
 from symgen.description.files import content_of, read_robot
 from symgen.description.robot import Robot, one_joint_parameters, parameter

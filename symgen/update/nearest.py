@@ -1,7 +1,7 @@
 """Numbers of a file that give the identified base parameters, as near to the file's as physics
 allows: the feasible program of `identify`, with the file as prior.
 
-    min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of `runtime.model.inertia`
+    min ||(u - u0) / S||     subject to  K chi(u) = X,  every condition of `runtime.physical.inertia`
 
 u are the numbers that the file states, u0 as it states them, S their sizes: of each link with
 inertia mass M, centre c and tensor I about it, and the parameters of the elements on the joints.
@@ -28,9 +28,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime.estimators.feasibility import feasibility, nearest_standard, scales
-from runtime.limits import LIMIT
-from runtime.model.inertia import INERTIAL, Condition, PhysicalModel
+from runtime.core.limits import LIMIT
+from runtime.physical.feasibility import feasibility, nearest_standard, scales
+from runtime.physical.inertia import INERTIAL, Condition, PhysicalModel
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 from symgen.update.places import FileLink

@@ -8,7 +8,7 @@ import typer
 from campaign import campaign
 from typer.testing import CliRunner
 
-from runtime.resolution.checkpoint import Checkpoint
+from runtime.parallel.checkpoint import Checkpoint
 from symgen.cli.cestac import cestac
 
 FILES = {"report.html", "study.yaml", "resolution.png", "resolution.svg"} | {

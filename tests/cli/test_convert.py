@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from runtime.estimators.estimate import Estimate
+from runtime.core.least_squares.estimate import Estimate
 from symgen.cli.main import app
 from symgen.description import load_robot
 

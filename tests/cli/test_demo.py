@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import symgen
 from runtime.loop.reference import point_to_point
-from runtime.settings.controller import Points
+from runtime.loop.settings import Points
 from symgen import demo as simulated
 from symgen import demo as tx40
 from symgen.cli.demo import demo

@@ -9,7 +9,7 @@ import pytest
 from campaign import campaign, some
 from typer.testing import CliRunner
 
-from runtime.result_files import write_all
+from runtime.reporting.result_files import write_all
 from symgen.certify.importing import without_certificate
 from symgen.cli.generate import emitted
 from symgen.cli.main import app

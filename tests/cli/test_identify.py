@@ -11,9 +11,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from runtime.estimators.estimate import Estimate
-from runtime.result_files import write_all
-from runtime.settings.files import load_study
+from runtime.core.least_squares.estimate import Estimate
+from runtime.reporting.result_files import write_all
+from runtime.study_files import load_study
 from symgen.cli.identify import identify
 from symgen.cli.main import app
 

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from runtime.result_files import FINISHED, UNFINISHED, OutputError, results_in, write_all
+from runtime.reporting.result_files import FINISHED, UNFINISHED, OutputError, results_in, write_all
 
 NAMES = ("a.txt", "b.txt", "c.txt")
 OLD, NEW = dict.fromkeys(NAMES, "old"), dict.fromkeys(NAMES, "new")

@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 
 from runtime import load_model
 from runtime.compose import observe
-from runtime.errors import SettingsError
-from runtime.estimators.essential import essential_of
-from runtime.identification.validation import record_errors
+from runtime.core.errors import SettingsError
+from runtime.core.essential import essential_of
+from runtime.core.study import study_from_mapping
+from runtime.core.validation import record_errors
 from runtime.reading.records import read_records
-from runtime.settings.study import study_from_mapping
 from symgen.cli.main import app
 
 RATE = 500

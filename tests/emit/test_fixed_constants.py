@@ -13,8 +13,8 @@ import pytest
 
 from oracles.loop_robots import BENNETT
 from oracles.test_random_loops import module_of
-from runtime.errors import InputError
-from runtime.model.generated import checked_model, constants_of
+from runtime.core.errors import InputError
+from runtime.core.model import checked_model, constants_of
 from symgen.certify.modules import certify
 from symgen.description import load_robot, parse_robot
 from symgen.emit.generate import generate_files, generate_module

@@ -52,7 +52,7 @@ def judged(
     read: Callable[[Path], object], path: Path, named: tuple[str, ...] = ("case",)
 ) -> Outcome:
     """What reading the file gives, in this process; an error holds one of the texts `named`."""
-    from runtime.errors import InputError
+    from runtime.core.errors import InputError
     from symgen.errors import SymgenError
 
     start = processor_time()
@@ -114,8 +114,8 @@ def serve(pipe, folder: Path) -> None:
         "mujoco",
         "symgen.emit",
         "runtime.reading.records",
-        "runtime.estimators.estimate",
-        "runtime.model.generated",
+        "runtime.core.least_squares.estimate",
+        "runtime.core.model",
     ):
         __import__(module)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from runtime.settings.study import Columns
+    from runtime.core.study import Columns
 
 
 def read_robot(path: Path) -> object:
@@ -40,9 +40,9 @@ def read_and_derive(path: Path) -> object:
 
 
 def read_study(path: Path) -> object:
-    from runtime.settings.files import load_study
-    from runtime.settings.location import located, study_text
-    from runtime.settings.study import to_mapping
+    from runtime.core.study import to_mapping
+    from runtime.reading.location import located, study_text
+    from runtime.study_files import load_study
 
     study = load_study(path)
     to_mapping(study)
@@ -51,7 +51,7 @@ def read_study(path: Path) -> object:
 
 def read_motion(path: Path) -> object:
     from runtime.loop.reference import reference_of
-    from runtime.settings.files import load_study
+    from runtime.study_files import load_study
 
     study = load_study(path)
     if study.controller is not None and study.controller.reference.motion is not None:
@@ -72,15 +72,15 @@ def two_joints() -> object:
 
 
 def read_record(path: Path) -> object:
+    from runtime.core.study import RecordSettings
     from runtime.reading.records import read_record as read
-    from runtime.settings.study import RecordSettings
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))
     return read(settings, folder=path.parent)
 
 
 def columns_of(path: Path) -> Columns:
-    from runtime.settings.study import Columns
+    from runtime.core.study import Columns
 
     if path.suffix == ".npy":
         return Columns(t="1", q=("2", "3"), tau=("4", "5"))
@@ -102,13 +102,13 @@ def read_folder(path: Path) -> object:
 
 
 def read_model(path: Path) -> object:
-    from runtime.model.generated import load_model
+    from runtime.core.model import load_model
 
     return load_model(path)
 
 
 def read_checkpoint(path: Path) -> object:
-    from runtime.resolution.checkpoint import Checkpoint
+    from runtime.parallel.checkpoint import Checkpoint
 
     folder = path.parent / "runs"
     folder.mkdir(exist_ok=True)
@@ -118,7 +118,7 @@ def read_checkpoint(path: Path) -> object:
 
 
 def read_settings(path: Path) -> object:
-    from runtime.resolution.checkpoint import Checkpoint
+    from runtime.parallel.checkpoint import Checkpoint
 
     folder = path.parent / "runs"
     folder.mkdir(exist_ok=True)
@@ -128,7 +128,7 @@ def read_settings(path: Path) -> object:
 
 def read_estimate(path: Path) -> object:
     """What is read can be shown and written, and is read again with the same bits."""
-    from runtime.estimators.estimate import Estimate, load_estimate
+    from runtime.core.least_squares.estimate import Estimate, load_estimate
 
     found = load_estimate(path)
     text = found.to_json()
@@ -139,7 +139,7 @@ def read_estimate(path: Path) -> object:
 
 def read_faulty(path: Path) -> object:
     """Does what its first line says: the harness is tested by it."""
-    from runtime.errors import InputError
+    from runtime.core.errors import InputError
 
     match path.read_text():
         case "hang":

@@ -211,8 +211,8 @@ def bag_tables() -> tuple[dict, ...]:
 
 @cache
 def study_tables() -> tuple[dict, ...]:
+    from runtime.core.study import Study, study_from_mapping, to_mapping
     from runtime.reading.datasets import dataset_study
-    from runtime.settings.study import Study, study_from_mapping, to_mapping
 
     small = {
         "symgen": 1,
@@ -280,11 +280,11 @@ def checkpoint_arrays() -> dict[str, np.ndarray]:
 @cache
 def estimate_file() -> bytes:
     from runtime.compose import estimate_of, observe
-    from runtime.model.generated import load_model
-    from runtime.model.loading import run
-    from runtime.records.record import Record
-    from runtime.rows.observation import stack
-    from runtime.settings.study import study_from_mapping
+    from runtime.core.loading import run
+    from runtime.core.model import load_model
+    from runtime.core.record import Record
+    from runtime.core.rows.observation import stack
+    from runtime.core.study import study_from_mapping
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module
 

@@ -3,9 +3,9 @@
 import numpy as np
 import planar_2r_model as planar
 
-from runtime.records.record import Origin, Record
-from runtime.rows.observation import Observation
-from runtime.settings.study import EstimateSettings
+from runtime.core.record import Origin, Record
+from runtime.core.rows.observation import Observation
+from runtime.core.study import EstimateSettings
 
 OLS = EstimateSettings()
 WLS = EstimateSettings(method="wls")

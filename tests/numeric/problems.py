@@ -7,9 +7,9 @@ import numpy as np
 from runtime.compose import READERS, problem, stated
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.problem import prepared
+from runtime.core.record import Origin, Record
 from runtime.loop.closed_loop import closed_loop
 from runtime.median import torque_median
-from runtime.records.record import Origin, Record
 from runtime.speeds import recorded_speeds
 
 

@@ -21,13 +21,13 @@ import numpy as np
 import runtime
 import symgen
 from runtime.compose import problem
-from runtime.errors import InputError
-from runtime.limits import LIMIT
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.study import study_from_mapping
 from runtime.plausible.causes import unchanged
 from runtime.plausible.samples import samples_of
 from runtime.plausible.trials import Baseline, baseline_of, regressor
-from runtime.settings.study import study_from_mapping
 from symgen.description.yaml import parse_robot
 from symgen.errors import SymgenError
 

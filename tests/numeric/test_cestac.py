@@ -12,18 +12,18 @@ from planar_data import TRUE, motion, record
 from scipy.stats import t
 
 from runtime.compose import cestac, estimate_of, observe
-from runtime.errors import InputError, SettingsError
-from runtime.model.drives import Drives
-from runtime.parallel import processes
-from runtime.resolution.cestac import key_blocks, levels_of
-from runtime.resolution.perturbed import perturbed_position, perturbed_torque
-from runtime.resolution.result import deciding_names, level_result, runs_needed
-from runtime.resolution.runs import Level, Run, Runs
-from runtime.rows.observation import Observation
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import select_rows
-from runtime.settings.study import CestacSettings, EstimateSettings, Lowpass, Rows, Signals, Study
-from runtime.signals.filters import filtered_states
+from runtime.core.cestac.cestac import key_blocks, levels_of
+from runtime.core.cestac.perturbed import perturbed_position, perturbed_torque
+from runtime.core.cestac.result import deciding_names, level_result, runs_needed
+from runtime.core.cestac.runs import Level, Run, Runs
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import select_rows
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Rows, Signals, Study
+from runtime.parallel.processes import processes
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()

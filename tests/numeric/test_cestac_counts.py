@@ -9,15 +9,15 @@ from problems import observed_states
 
 import symgen
 from runtime.compose import cestac
-from runtime.errors import InputError, SettingsError
-from runtime.records.record import Record
-from runtime.resolution.own_encoder import own_encoder
-from runtime.resolution.rounding import rounded, stream
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import select_rows
-from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study
-from runtime.signals.counts.reading import read_counts
-from runtime.signals.filters import filtered_states
+from runtime.core.cestac.rounding import rounded, stream
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.record import Record
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import select_rows
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study
+from runtime.counts.own_encoder import own_encoder
+from runtime.counts.reading import read_counts
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20), reader="counts")
 TIME = np.arange(6000) / 1000.0

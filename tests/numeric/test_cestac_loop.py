@@ -11,13 +11,13 @@ from problems import loop_of_records
 from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 
 from runtime.compose import cestac, estimate_of, observe
-from runtime.errors import InputError, SettingsError
+from runtime.core.cestac.rounding import rounded, stream
+from runtime.core.cestac.runs import Level
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.study import CestacSettings, EstimateSettings, study_from_mapping
+from runtime.loop.cestac import loop_of
 from runtime.loop.simulation import Simulator
-from runtime.parallel import processes
-from runtime.resolution.loop import loop_of
-from runtime.resolution.rounding import rounded, stream
-from runtime.resolution.runs import Level
-from runtime.settings.study import CestacSettings, EstimateSettings, study_from_mapping
+from runtime.parallel.processes import processes
 
 STEP = 2e-4
 TORQUE = {"saturation": None, "noise": 0.05}

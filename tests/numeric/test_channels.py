@@ -15,10 +15,10 @@ from scipy.optimize import least_squares
 import runtime
 import symgen
 from runtime.compose import problem
-from runtime.errors import InputError, ModelError
-from runtime.model.generated import require
+from runtime.core.errors import InputError, ModelError
+from runtime.core.model import require
+from runtime.core.study import study_from_mapping
 from runtime.reading.records import read_records
-from runtime.settings.study import study_from_mapping
 from symgen.certify.modules import certified_files
 from symgen.description.yaml import parse_robot
 from symgen.errors import DescriptionError, SymgenError

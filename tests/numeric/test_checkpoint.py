@@ -18,10 +18,10 @@ import pytest
 from planar_data import record
 
 from runtime.compose import cestac
-from runtime.errors import InputError
-from runtime.resolution.checkpoint import Checkpoint
-from runtime.resolution.runs import Run, Runs
-from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
+from runtime.core.cestac.runs import Run, Runs
+from runtime.core.errors import InputError
+from runtime.core.study import CestacSettings, Lowpass, Signals, Study
+from runtime.parallel.checkpoint import Checkpoint
 
 RECORD = record(N=3000)
 HERE = Path(__file__).parent
@@ -195,7 +195,7 @@ def some_runs(first, count, b=3):
 
 def test_runs_are_written_when_it_is_time(tmp_path, monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("runtime.resolution.checkpoint.monotonic", lambda: now[0])
+    monkeypatch.setattr("runtime.parallel.checkpoint.monotonic", lambda: now[0])
     checkpoint = Checkpoint(tmp_path, every=10)
     assert len(checkpoint.resume({"a": 1}, 3)) == 0
     checkpoint.add(some_runs(0, 5))

@@ -15,17 +15,17 @@ from problems import loop_of_records
 
 from runtime import InputError, Record, identify, load_model
 from runtime.compose import estimate_of, observe
-from runtime.errors import SettingsError
-from runtime.estimators.essential import essential_of
+from runtime.core.errors import SettingsError
+from runtime.core.essential import essential_of
+from runtime.core.study import EstimateSettings, study_from_mapping
 from runtime.loop.closed_loop import loop_of, slips
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
+from runtime.loop.settings import ReferenceSettings
 from runtime.loop.simulated_motion import judged, simulated_motion
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.settings.controller import ReferenceSettings
-from runtime.settings.study import EstimateSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 SIMULATING = ("iv", "didim")
@@ -485,7 +485,7 @@ def test_a_fit_survives_a_validation_that_fails(arm, clean, monkeypatch):
     own = replace(study, estimate=EstimateSettings("didim"))
     kept = tuple(name for name in model.BASE_PARAMETERS if name not in ("ZZ1R", "ZZ2"))
     monkeypatch.setattr(
-        "runtime.identification.fits.essential_of",
+        "runtime.core.fits.essential_of",
         lambda *given, **named: replace(essential_of(*given, **named), names=kept),
     )
     result = identify(model, record, own, simulator=simulator)

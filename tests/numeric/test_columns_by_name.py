@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numeric.bag_files import joint_states, write_bag
 
-from runtime.errors import InputError
+from runtime.core.errors import InputError
 from runtime.reading.records import read_records
-from runtime.settings.record import Columns, RecordSettings
+from runtime.reading.settings import Columns, RecordSettings
 
 NAMES = ("elbow", "shoulder", "wrist")
 MODEL = SimpleNamespace(

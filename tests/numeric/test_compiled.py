@@ -18,12 +18,12 @@ import pytest
 
 from runtime import load_model
 from runtime.compiled.model import CompiledModel, FallbackWarning, compiled_model
-from runtime.errors import InputError
-from runtime.model.generated import GeneratedModel
-from runtime.model.loading import cache_folder
-from runtime.rows.regressor import Columns
-from runtime.settings.study import Decimate
-from runtime.signals.filters import States, decimation_plan
+from runtime.core.errors import InputError
+from runtime.core.loading import cache_folder
+from runtime.core.model import GeneratedModel
+from runtime.core.rows.regressor import Columns
+from runtime.core.signals.filters import States, decimation_plan
+from runtime.core.study import Decimate
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -20,19 +20,16 @@ from runtime import load_model
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import CompiledModel, compiled_model
 from runtime.compose import cestac, problem
-from runtime.errors import InputError
-from runtime.estimators.method import linear_system
-from runtime.model.drives import Drives
-from runtime.parallel import processes
-from runtime.reading.datasets import dataset_study
-from runtime.reading.records import read_records
-from runtime.records.record import Origin, Record
-from runtime.resolution.coarse_encoders import CoarseEncoders
-from runtime.resolution.perturbed import perturbed_position, system_of
-from runtime.rows.prepared import decimated_torque
-from runtime.rows.regressor import Columns
-from runtime.rows.selection import select_rows
-from runtime.settings.study import (
+from runtime.core.cestac.perturbed import perturbed_position, system_of
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.least_squares.method import linear_system
+from runtime.core.record import Origin, Record
+from runtime.core.rows.prepared import decimated_torque
+from runtime.core.rows.regressor import Columns
+from runtime.core.rows.selection import select_rows
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import (
     CestacSettings,
     Decimate,
     EstimateSettings,
@@ -42,7 +39,10 @@ from runtime.settings.study import (
     Study,
     study_from_mapping,
 )
-from runtime.signals.filters import filtered_states
+from runtime.counts.coarse_encoders import CoarseEncoders
+from runtime.parallel.processes import processes
+from runtime.reading.datasets import dataset_study
+from runtime.reading.records import read_records
 from symgen.description import load_robot
 from symgen.description.robot import Robot
 from symgen.emit.generate import generate_files

@@ -17,20 +17,20 @@ import runtime
 import symgen
 from runtime import load_model
 from runtime.compose import observe, problem
-from runtime.errors import InputError, SettingsError
-from runtime.model.generated import drives_of
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.model import drives_of
+from runtime.core.record import Record
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import UNCERTAIN, certain_rows, select_rows
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping
+from runtime.counts.boxes import box_moments
+from runtime.counts.encoder_advice import encoder_sentences
+from runtime.counts.lattice import lattice
+from runtime.counts.reading import MARGIN, STRETCH, read_counts, stretches
+from runtime.counts.spline import Basis, Factor, next_density
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.records.record import Record
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import UNCERTAIN, certain_rows, select_rows
-from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study, study_from_mapping
-from runtime.signals.counts.boxes import box_moments
-from runtime.signals.counts.lattice import lattice
-from runtime.signals.counts.reading import MARGIN, STRETCH, read_counts, stretches
-from runtime.signals.counts.spline import Basis, Factor, next_density
-from runtime.signals.encoder_advice import encoder_sentences
-from runtime.signals.filters import filtered_states
 from symgen.demo import MAIN
 
 GENERATED = Path(__file__).parents[2] / "generated"
@@ -288,8 +288,8 @@ def test_wraps_across_stretches(planar, record, monkeypatch, bits):
     """Counts that wrap within a stretch, within its margins and while samples are missing: rows and
     sentences.
     """
-    monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1500)
-    monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", 400)
+    monkeypatch.setattr("runtime.counts.reading.STRETCH", 1500)
+    monkeypatch.setattr("runtime.counts.reading.MARGIN", 400)
     fine, half = 2e-5, slice(4000)
     wrapped = fine * (np.round(motion(record.t[half])[0] / fine) % 2**bits)
     missing = np.zeros(wrapped.shape, dtype=bool)
@@ -402,7 +402,7 @@ def test_no_direction_is_known_while_a_joint_stands():
 
 
 def test_a_coarser_step_of_the_record_is_told(planar, record, monkeypatch):
-    monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 3000)
+    monkeypatch.setattr("runtime.counts.reading.STRETCH", 3000)
     study = replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3))
     found = observe(planar, record, study).findings[0]
     assert "multiples of 2; the step of the record is 0.005" in found

@@ -6,10 +6,10 @@ from problems import resolved
 
 import runtime
 import symgen
+from runtime.core.signals.cutoff import cutoff
+from runtime.core.signals.filters import median_filtered
+from runtime.core.study import Signals, Study
 from runtime.median import taken
-from runtime.settings.study import Signals, Study
-from runtime.signals.cutoff import cutoff
-from runtime.signals.filters import median_filtered
 
 RATE = 1000.0
 T = np.arange(10_000) / RATE

@@ -6,10 +6,10 @@ import hashlib
 import pooch
 import pytest
 
-from runtime.errors import DataUnavailableError, InputError
+from runtime.core.errors import DataUnavailableError, InputError
+from runtime.core.study import study_from_mapping
 from runtime.reading import datasets
 from runtime.reading.datasets import DATASETS, Dataset, dataset_study, fetch, locate
-from runtime.settings.study import study_from_mapping
 
 CONTENT = b"q1,tau1\n1,2\n"
 

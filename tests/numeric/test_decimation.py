@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.signals.decimation import decimate, operator, plan
+from runtime.core.signals.decimation import decimate, operator, plan
 
 
 @pytest.mark.parametrize("offset", [0, 100])
@@ -59,6 +59,6 @@ def test_pieces_change_nothing(samples, phase, monkeypatch):
     u = np.random.default_rng(1).normal(size=(3, 1003)).cumsum(axis=-1)
     how = plan(1003, 7, phase, 27)
     expected = decimate(u, how)
-    monkeypatch.setattr("runtime.signals.decimation.PIECE", samples)
+    monkeypatch.setattr("runtime.core.signals.decimation.PIECE", samples)
     assert len(how.pieces()) == (18 if samples < 1000 else 1)
     np.testing.assert_allclose(decimate(u, how), expected, rtol=0, atol=1e-13)

@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 import runtime
 import symgen
-from runtime.errors import InputError
-from runtime.settings.study import study_from_mapping
+from runtime.core.errors import InputError
+from runtime.core.study import study_from_mapping
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 30}}})
 

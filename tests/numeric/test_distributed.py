@@ -14,10 +14,10 @@ import planar_2r_model as planar
 import pytest
 from planar_data import record
 
-from runtime.cluster import cluster as mapped
 from runtime.compose import cestac
-from runtime.errors import InputError
-from runtime.settings.study import CestacSettings, Lowpass, Signals, Study
+from runtime.core.errors import InputError
+from runtime.core.study import CestacSettings, Lowpass, Signals, Study
+from runtime.parallel.cluster import cluster as mapped
 
 RECORD = record(N=3000)
 STUDY = Study(

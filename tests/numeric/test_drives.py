@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from runtime.errors import InputError
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
 
 RATIO = np.array([[32.0, 0, 0], [0, -48, 0], [0, 32, 45]])
 OFFSET = [0, -np.pi / 2, 0.3]

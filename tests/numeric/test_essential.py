@@ -8,9 +8,9 @@ import pytest
 from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 
 from runtime.compose import estimate_of
-from runtime.errors import SettingsError
-from runtime.estimators.essential import essential_of
-from runtime.settings.study import EssentialSettings, EstimateSettings
+from runtime.core.errors import SettingsError
+from runtime.core.essential import essential_of
+from runtime.core.study import EssentialSettings, EstimateSettings
 
 
 def eliminated(seen, threshold):

@@ -12,13 +12,13 @@ from planar_data import OLS, TRUE, WLS, observation, one_joint_at_rest
 from scipy.signal import lfilter
 
 from runtime.compose import METHODS, estimate_of
-from runtime.errors import SettingsError
-from runtime.estimators.block_covariance import block_covariance
-from runtime.estimators.method import LINEAR, linear_system
-from runtime.estimators.solution import null_groups, solve
-from runtime.rows.factor import Factor, factor, merged
-from runtime.rows.observation import split_rows
-from runtime.settings.study import EstimateSettings
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.block_covariance import block_covariance
+from runtime.core.least_squares.method import LINEAR, linear_system
+from runtime.core.least_squares.solution import null_groups, solve
+from runtime.core.rows.factor import Factor, factor, merged
+from runtime.core.rows.observation import split_rows
+from runtime.core.study import EstimateSettings
 
 EVERY = [
     OLS,

@@ -11,17 +11,17 @@ import pytest
 from campaign import campaign
 
 from runtime.compose import estimate_of, excite, observe, problem
-from runtime.errors import InputError, SettingsError
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.model import load_model
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.settings import structure
+from runtime.core.study import Decimate, Lowpass, Signals, Study
 from runtime.excitation.criteria import Weights, excesses, limits_of, planned, usage, weights_of
 from runtime.excitation.optimiser import Search, improved, one_start, smoothed
+from runtime.excitation.settings import ExcitationSettings, Sphere
+from runtime.excitation.trajectories import Motion, Part, motion_from_mapping
 from runtime.loop.dry_friction import dry_friction
-from runtime.model.generated import load_model
-from runtime.records.record import Record
-from runtime.rows.observation import Observation
-from runtime.settings.excitation import ExcitationSettings, Sphere
-from runtime.settings.schema import structure
-from runtime.settings.study import Decimate, Lowpass, Signals, Study
-from runtime.settings.trajectories import Motion, Part, motion_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -9,9 +9,9 @@ import pytest
 
 import runtime
 import symgen
-from runtime.identification.expected_error import expected_error, with_values
-from runtime.model.inertia import physical_model
-from runtime.settings.study import study_from_mapping
+from runtime.core.study import study_from_mapping
+from runtime.expected import expected_error, with_values
+from runtime.physical.inertia import physical_model
 
 
 @pytest.fixture(scope="module")

@@ -20,9 +20,10 @@ from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
 from runtime.compose import estimate_of
-from runtime.estimators.estimate import Estimate, load_estimate
-from runtime.identification.schemas import json_schema
-from runtime.latex import escaped, name_cell, number_cell, unit_cell
+from runtime.core.cestac.result import Cestac, level_result
+from runtime.core.cestac.runs import Level, Run, Runs
+from runtime.core.least_squares.estimate import Estimate, load_estimate
+from runtime.estimate_files import json_schema
 from runtime.reporting.arrays import (
     array_files,
     cestac_arrays,
@@ -32,8 +33,7 @@ from runtime.reporting.arrays import (
     matlab_names,
     npz,
 )
-from runtime.resolution.result import Cestac, level_result
-from runtime.resolution.runs import Level, Run, Runs
+from runtime.reporting.latex import escaped, name_cell, number_cell, unit_cell
 
 HOSTILE = (
     "\\input{/etc/passwd}",

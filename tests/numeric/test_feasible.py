@@ -16,9 +16,14 @@ import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
 from runtime.compose import estimate_of
-from runtime.errors import SettingsError
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.feasibility import (
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.model import load_model
+from runtime.core.rows.observation import Observation
+from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.validation import split_validation
+from runtime.physical.feasibility import (
     Ellipsoid,
     RobotLimits,
     feasibility,
@@ -27,23 +32,18 @@ from runtime.estimators.feasibility import (
     scales,
     standard_parameters,
 )
-from runtime.estimators.feasible import (
+from runtime.physical.feasible import (
     FeasibleOptions,
     decided,
     residual_norm,
     weighed,
     within_limits,
 )
-from runtime.estimators.method import linear_companion, linear_system
-from runtime.estimators.physical import negative_elements, reach_of
-from runtime.estimators.semidefinite import closest, everything
-from runtime.identification.validation import split_validation
-from runtime.model.generated import load_model
-from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
+from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
+from runtime.physical.semidefinite import closest, everything
+from runtime.physical.signs import negative_elements, reach_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.rows.observation import Observation
-from runtime.settings.study import EstimateSettings, study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -395,7 +395,7 @@ def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
         problem[-1].max_iter = 1
         return whole(*problem)
 
-    monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", impatient)
+    monkeypatch.setattr("runtime.physical.semidefinite.clarabel.DefaultSolver", impatient)
     with pytest.raises(
         InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"
     ):
@@ -411,7 +411,7 @@ def test_a_solver_that_panics_is_told(arm, monkeypatch) -> None:
     def panics(*problem):
         raise PanicException("index out of bounds")
 
-    monkeypatch.setattr("runtime.estimators.semidefinite.clarabel.DefaultSolver", panics)
+    monkeypatch.setattr("runtime.physical.semidefinite.clarabel.DefaultSolver", panics)
     with pytest.raises(InputError, match=r"was not solved \(Clarabel stopped by an error"):
         estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
 
@@ -559,7 +559,7 @@ def test_a_weight_that_the_solver_cannot_do_is_passed_over(arm, monkeypatch, wei
     """The search goes on with the others; where none can be solved, the error is that of the
     solver.
     """
-    import runtime.estimators.feasible as method
+    import runtime.physical.feasible as method
 
     seen, solid, whole = (
         simulated(arm, arm.base_parameters(arm.VALUES), 0.5, N=60),

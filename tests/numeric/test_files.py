@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from runtime import read_record
-from runtime.errors import InputError
-from runtime.model.drives import Drives
-from runtime.settings.study import RecordSettings, study_from_mapping
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.study import RecordSettings, study_from_mapping
 
 N, RATE = 1003, 500.0
 DRIVES = Drives([[30.0, 0.0], [12.0, -20.0]], [0.1, -0.2], [0.5, 0.4])

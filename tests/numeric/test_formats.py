@@ -19,10 +19,10 @@ from bag_files import joint_states, write_bag
 from campaign import sampled
 
 from runtime import load_model, observe
-from runtime.estimators.essential import essential_of
+from runtime.core.essential import essential_of
+from runtime.core.study import study_from_mapping
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
-from runtime.settings.study import study_from_mapping
 
 FORMATS = (
     "csv",

@@ -12,15 +12,15 @@ from campaign import campaign
 
 from runtime import InputError, Record, observe
 from runtime.compose import estimate_of, problem
-from runtime.identification.friction import friction_curves, own_friction
-from runtime.identification.residuals import correlation_time, residual_correlation
-from runtime.model.generated import load_model
+from runtime.core.model import load_model
+from runtime.core.residuals import correlation_time, residual_correlation
+from runtime.core.study import study_from_mapping
+from runtime.friction.curves import friction_curves, own_friction
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Page, render
 from runtime.reporting.sections import friction_section
-from runtime.settings.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 from rosbags.typesys import get_types_from_msg
 
 from runtime import read_record
-from runtime.errors import InputError
+from runtime.core.errors import InputError
+from runtime.core.study import study_from_mapping
 from runtime.reading.formats import read_table
-from runtime.settings.study import study_from_mapping
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20
@@ -37,7 +37,7 @@ MESSAGES = {"/joint_states": joint_states(STAMPS, ("j1", "j2"), np.zeros((N, 2))
 @pytest.fixture(autouse=True)
 def smaller(monkeypatch):
     """The limit of 256 MiB takes seconds to reach."""
-    monkeypatch.setattr("runtime.files.ALWAYS", ALWAYS)
+    monkeypatch.setattr("runtime.reading.files.ALWAYS", ALWAYS)
 
 
 def refused(read, said, peak=60e6):

@@ -14,13 +14,13 @@ import pytest
 from campaign import campaign
 
 import runtime
-import runtime.rows.prepared
+import runtime.core.rows.prepared
 from runtime import InputError
 from runtime.compose import assess
-from runtime.records.provenance import origin, record_names
-from runtime.records.record import Origin
-from runtime.settings.location import located, study_text
-from runtime.settings.study import Lowpass, Signals, study_from_mapping
+from runtime.core.provenance import origin, record_names
+from runtime.core.record import Origin
+from runtime.core.study import Lowpass, Signals, study_from_mapping
+from runtime.reading.location import located, study_text
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 STUDY = study_from_mapping(
@@ -85,8 +85,8 @@ def test_work_is_done_once(model, monkeypatch):
     coupled = SimpleNamespace(**{**vars(model), "DRIVES": drives, "regressor": regressor})
     keep = {"filtered_states": filtered, "factor": factored}
     for place in (
-        "runtime.rows.prepared.filtered_states",
-        "runtime.rows.observation.factor",
+        "runtime.core.rows.prepared.filtered_states",
+        "runtime.core.rows.observation.factor",
     ):
         calls, real = keep[place.rpartition(".")[2]], pydoc.locate(place)
         monkeypatch.setattr(
@@ -110,13 +110,13 @@ def test_a_record_is_filtered_once_for_all_checks(model, monkeypatch):
     """Identification, plausibility, delay, friction, and the advice on encoders share what the
     filters of the study made of the record; none is filtered twice by the same settings.
     """
-    passes, real = [], runtime.rows.prepared.filtered_states
+    passes, real = [], runtime.core.rows.prepared.filtered_states
 
     def counted(q, rate, signals, v=None):
         passes.append((signals.median, signals.lowpass))
         return real(q, rate, signals, v)
 
-    monkeypatch.setattr("runtime.rows.prepared.filtered_states", counted)
+    monkeypatch.setattr("runtime.core.rows.prepared.filtered_states", counted)
     lowpass = Lowpass(cutoff=5)
     study = replace(STUDY, signals=Signals(median=1, lowpass=lowpass))
     result = assess(model, measured(model, 0), study)

@@ -12,13 +12,13 @@ from planar_data import OLS, TRUE, observation
 from scipy.optimize import least_squares
 
 from runtime.compose import estimate_of, observe
-from runtime.errors import SettingsError
-from runtime.estimators.estimate import Estimate
-from runtime.estimators.irls import slope, weight
-from runtime.model.generated import load_model
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import load_model
+from runtime.core.study import EstimateSettings, study_from_mapping
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.settings.study import EstimateSettings, study_from_mapping
+from runtime.robust import slope, weight
 
 HUBER = EstimateSettings(method="irls")
 TUKEY = EstimateSettings(method="irls", options={"loss": "tukey"})

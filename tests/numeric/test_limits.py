@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.limits import ENTRIES, LIMIT
+from runtime.core.limits import ENTRIES, LIMIT
 
 ROOM = Path(__file__).parents[2] / "runtime"
 

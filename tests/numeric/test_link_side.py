@@ -9,8 +9,8 @@ import pytest
 
 import runtime
 import symgen
-from runtime.errors import SettingsError
-from runtime.settings.study import study_from_mapping
+from runtime.core.errors import SettingsError
+from runtime.core.study import study_from_mapping
 
 DRIVES = ("Ia", "FV", "FS")
 

@@ -18,16 +18,16 @@ from typer.testing import CliRunner
 import symgen
 from runtime import load_model
 from runtime.compose import cestac, observe
-from runtime.errors import InputError
-from runtime.model.drives import Drives
-from runtime.model.generated import drives_of
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.missing import Missing, bridged
+from runtime.core.model import drives_of
+from runtime.core.record import Record
+from runtime.core.signals.filters import filtered_states
+from runtime.core.signals.states import encoder_position
+from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study
 from runtime.reading.records import read_record
-from runtime.records.missing import Missing, bridged
-from runtime.records.record import Record
-from runtime.settings.record import RecordSettings
-from runtime.settings.study import CestacSettings, Lowpass, Rows, Signals, Study
-from runtime.signals.filters import filtered_states
-from runtime.signals.states import encoder_position
+from runtime.reading.settings import RecordSettings
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).parents[2] / "generated"
@@ -183,8 +183,8 @@ def test_gaps_across_stretches(monkeypatch, margin):
     """Gaps across stretches, with the small margin one that holds a whole stretch and
     its margins.
     """
-    monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1500 if margin == 1000 else 300)
-    monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", margin)
+    monkeypatch.setattr("runtime.counts.reading.STRETCH", 1500 if margin == 1000 else 300)
+    monkeypatch.setattr("runtime.counts.reading.MARGIN", margin)
     study = replace(STUDY, signals=replace(SIGNALS, step=STEP))
     whole = observe(planar, RECORD, study)
     X, *_ = np.linalg.lstsq(whole.W, whole.Y, rcond=None)
@@ -195,8 +195,8 @@ def test_gaps_across_stretches(monkeypatch, margin):
 
 def test_a_first_stretch_without_a_sample(monkeypatch):
     """Step and phase are those of later samples."""
-    monkeypatch.setattr("runtime.signals.counts.reading.STRETCH", 1000)
-    monkeypatch.setattr("runtime.signals.counts.reading.MARGIN", 200)
+    monkeypatch.setattr("runtime.counts.reading.STRETCH", 1000)
+    monkeypatch.setattr("runtime.counts.reading.MARGIN", 200)
     late = replace(RECORD, missing=MISSING | ((T < 1.3)[:, None] & [True, False]))
     observation = observe(planar, late, STUDY)
     assert observation.t.min() > 1.3 and np.isfinite(observation.W).all()

@@ -14,21 +14,18 @@ import scipy.signal
 from planar_data import TRUE, motion
 
 from runtime import Record, essential, estimate, load_model, observe
-from runtime.errors import InputError
-from runtime.identification.uncertainty import block_bootstrap
-from runtime.identification.validation import weak_directions
-from runtime.model.bound import BoundModel
-from runtime.records.record import Origin
-from runtime.rows.factor import factor
-from runtime.rows.observation import stack
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.regressor import (
-    Columns,
-    distinct_entries,
-)
-from runtime.rows.selection import select_rows
-from runtime.settings.study import Decimate, EstimateSettings, study_from_mapping
-from runtime.signals.filters import States, decimated, decimation_plan, filtered_states
+from runtime.core.bound import BoundModel
+from runtime.core.errors import InputError
+from runtime.core.record import Origin
+from runtime.core.rows.factor import factor
+from runtime.core.rows.observation import stack
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.regressor import Columns, distinct_entries
+from runtime.core.rows.selection import select_rows
+from runtime.core.signals.filters import States, decimated, decimation_plan, filtered_states
+from runtime.core.study import Decimate, EstimateSettings, study_from_mapping
+from runtime.core.uncertainty import block_bootstrap
+from runtime.core.validation import weak_directions
 from symgen.description import load_robot
 from symgen.emit import spec
 from symgen.regroup.regrouping import regroup
@@ -310,7 +307,7 @@ def test_rows_are_factored_once(record, monkeypatch):
     """Estimates, essential parameters and deviations read one factor."""
     calls = []
     monkeypatch.setattr(
-        "runtime.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
+        "runtime.core.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
     )
     o = observe(planar, record, study())
     fits = estimate(planar, o), essential(planar, o)

@@ -12,8 +12,8 @@ from campaign import campaign
 
 import runtime
 import symgen
-from runtime.model.generated import joint_units
-from runtime.settings.study import study_from_mapping
+from runtime.core.model import joint_units
+from runtime.core.study import study_from_mapping
 
 ARM = """
 symgen: 1

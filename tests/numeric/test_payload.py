@@ -9,12 +9,12 @@ import pytest
 
 from runtime import InputError, Record, observe
 from runtime.compose import problem
-from runtime.errors import SettingsError
-from runtime.identification.drive_gains import drive_gains
-from runtime.identification.payload import payload
-from runtime.model.generated import load_model
-from runtime.model.inertia import INERTIAL, physical_model
-from runtime.settings.study import PayloadSettings, study_from_mapping
+from runtime.core.errors import SettingsError
+from runtime.core.model import load_model
+from runtime.core.study import PayloadSettings, study_from_mapping
+from runtime.payload.gains import drive_gains
+from runtime.payload.load import payload
+from runtime.physical.inertia import INERTIAL, physical_model
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -11,8 +11,8 @@ import pytest
 from campaign import campaign
 from threadpoolctl import threadpool_info
 
-from runtime.errors import InputError
-from runtime.parallel import processes
+from runtime.core.errors import InputError
+from runtime.parallel.processes import processes
 
 
 def told(key):
@@ -88,7 +88,7 @@ def test_a_number_below_zero():
 def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it cannot tell them to."""
     code = (
-        "from runtime.parallel import processes\nimport test_processes\nif __name__ == '__main__':\n"
+        "from runtime.parallel.processes import processes\nimport test_processes\nif __name__ == '__main__':\n"
         "    with processes(2) as several:\n        list(several(test_processes.telling, [60.0, 60.0]))\n"
     )
     script = tmp_path / "script.py"

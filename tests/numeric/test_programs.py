@@ -5,10 +5,10 @@ import pytest
 
 import runtime
 import symgen
-from runtime.estimators.semidefinite import Program
+from runtime.core.study import EssentialSettings, study_from_mapping
+from runtime.physical.semidefinite import Program
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.settings.study import EssentialSettings, study_from_mapping
 
 
 @pytest.fixture

@@ -8,14 +8,14 @@ import numpy as np
 from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
+from runtime.advisor.advice import crossing
 from runtime.compose import advise, cestac, problem
-from runtime.limits import LIMIT
+from runtime.core.limits import LIMIT
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import CestacSettings, Rows, Study
+from runtime.counts.advice import curves
+from runtime.counts.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.reporting.resolution import advice_section
-from runtime.resolution.advice import crossing
-from runtime.resolution.coarse_encoders import PHASES, CoarseEncoders, mean_change
-from runtime.resolution.readers import curves
-from runtime.settings.study import CestacSettings, Rows, Study
-from runtime.signals.filters import filtered_states
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
 STUDY = Study(

@@ -14,11 +14,11 @@ import pytest
 import scipy.io
 
 from runtime import Record, read_record
-from runtime.errors import InputError, SettingsError
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.record import Origin
+from runtime.core.study import RecordSettings, study_from_mapping
 from runtime.reading.records import read_records
-from runtime.records.record import Origin
-from runtime.settings.study import RecordSettings, study_from_mapping
 
 N, RATE = 60, 200.0
 T = np.arange(N) / RATE

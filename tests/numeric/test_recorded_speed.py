@@ -14,9 +14,9 @@ from problems import resolved
 
 from runtime import identify
 from runtime.compose import observe, plausibility
-from runtime.records.record import Record
-from runtime.settings.study import Lowpass, Signals, Study
-from runtime.signals.filters import filtered_states
+from runtime.core.record import Record
+from runtime.core.signals.filters import filtered_states
+from runtime.core.study import Lowpass, Signals, Study
 
 RATE, N = 500.0, 8000
 STEP, NOISE = 2e-3, 4e-3  # rad, rad/s

@@ -10,23 +10,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from runtime.advisor.advice import crossing, sampled
+from runtime.advisor.advisor import ALL, Predictor, torque_sigma
+from runtime.advisor.noise_gain import bandwidth
+from runtime.advisor.position_errors import perturbation
+from runtime.advisor.sign_errors import Switch, kernels, switched, switches
 from runtime.compose import advise, observe
-from runtime.errors import InputError, ModelError, SettingsError
-from runtime.limits import LIMIT
-from runtime.model.generated import load_model
+from runtime.core.errors import InputError, ModelError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.model import load_model
+from runtime.core.record import Record
+from runtime.core.rows.prepared import decimated_torque
+from runtime.core.signals.filters import decimated, filtered_states
+from runtime.core.signals.states import encoder_drives
+from runtime.core.study import Decimate, Lowpass, Signals, study_from_mapping
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.records.record import Record
 from runtime.reporting.resolution import advice_section
-from runtime.resolution.advice import crossing, sampled
-from runtime.resolution.advisor import ALL, Predictor, torque_sigma
-from runtime.rows.position_errors import perturbation
-from runtime.rows.prepared import decimated_torque
-from runtime.rows.sign_errors import Switch, kernels, switched, switches
-from runtime.settings.study import Decimate, Lowpass, Signals, study_from_mapping
-from runtime.signals.filters import decimated, filtered_states
-from runtime.signals.noise_gain import bandwidth
-from runtime.signals.states import encoder_drives
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

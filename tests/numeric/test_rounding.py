@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from runtime.errors import InputError
-from runtime.resolution.rounding import rounded, signs, stream
+from runtime.core.cestac.rounding import rounded, signs, stream
+from runtime.core.errors import InputError
 
 STEP = 0.02
 

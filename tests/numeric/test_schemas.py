@@ -9,10 +9,10 @@ import jsonschema
 import pytest
 
 import runtime
-from runtime.estimators.estimate import Status
-from runtime.identification.schemas import json_schema
+from runtime.core.least_squares.estimate import Status
+from runtime.core.study import Study, study_from_mapping, to_mapping
+from runtime.estimate_files import json_schema
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.settings.study import Study, study_from_mapping, to_mapping
 
 ROOM = Path(runtime.__file__).parent
 
@@ -110,7 +110,7 @@ def test_editors_show_what_a_key_holds():
     definitions = json_schema("study")["$defs"]
     assert definitions["Lowpass"]["properties"]["cutoff"]["description"] == (
         "Cutoff frequency; auto: from the motion and the noise of the records "
-        "(`runtime.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50 "
+        "(`runtime.core.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50 "
         "where no record is. [Hz]"
     )
     for name, definition in definitions.items():

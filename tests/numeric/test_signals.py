@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from runtime.errors import InputError
-from runtime.settings.study import Decimate, Lowpass, Signals
-from runtime.signals.filters import (
+from runtime.core.errors import InputError
+from runtime.core.signals.filters import (
     decimated,
     decimation_factor,
     derivative,
@@ -17,6 +16,7 @@ from runtime.signals.filters import (
     lowpass_filtered,
     median_filtered,
 )
+from runtime.core.study import Decimate, Lowpass, Signals
 
 RATE = 1000.0
 T = np.arange(3000) / RATE

@@ -16,12 +16,12 @@ import pytest
 from campaign import campaign
 
 from runtime.compose import estimate_of
-from runtime.model.generated import load_model
-from runtime.records.record import Record
-from runtime.rows.prepared import decimated_torque, observation_from_states
-from runtime.rows.selection import select_rows
-from runtime.settings.study import EstimateSettings, study_from_mapping
-from runtime.signals.filters import States
+from runtime.core.model import load_model
+from runtime.core.record import Record
+from runtime.core.rows.prepared import decimated_torque, observation_from_states
+from runtime.core.rows.selection import select_rows
+from runtime.core.signals.filters import States
+from runtime.core.study import EstimateSettings, study_from_mapping
 
 RATE, N = 500.0, 4000
 NOISE = np.array([3.0, 3.0, 2.0, 0.8, 0.8, 0.5])  # N m, of each joint

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
-from runtime.errors import InputError, SettingsError
-from runtime.settings.study import study_from_mapping
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.study import study_from_mapping
 from symgen.cli.main import app
 from symgen.description import load_robot
 

@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 import runtime
 import symgen
-from runtime.checks.check import Check
-from runtime.model.drives import Drives
+from runtime.core.check import Check
+from runtime.core.drives import Drives
 from runtime.plausible.causes import Robot, causes
 from runtime.reading.likely_columns import likely_columns
-from runtime.settings.units import torque_unit
+from runtime.reading.units import torque_unit
 from symgen.cli.main import app
 from symgen.description.yaml import parse_robot
 
@@ -223,7 +223,7 @@ def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path, mon
     def violated(self, chi):
         return {condition.name: -1e-9 for condition in self.conditions}
 
-    monkeypatch.setattr("runtime.model.inertia.PhysicalModel.smallest", violated)
+    monkeypatch.setattr("runtime.physical.inertia.PhysicalModel.smallest", violated)
     model = symgen.model("planar_2r")
     written(tmp_path, *motion(model, noise=0.05, seed=1))
     asked = said(tmp_path, estimate={"method": "feasible", "options": {"prior": "none"}})
@@ -481,8 +481,8 @@ def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
 def test_names_of_joints_stand_in_limits_and_advice() -> None:
     """They had numbers alone there."""
     from runtime.compose import advise
+    from runtime.core.model import joint_labels
     from runtime.loop.reference import Reference, check_limits
-    from runtime.model.generated import joint_labels
 
     text = (files("symgen.description.robots") / "planar_2r.yaml").read_text()
     named = parse_robot((text + "labels: {1: shoulder, 2: elbow}\n").encode(), "named.yaml")

@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from runtime.compose import METHODS
-from runtime.errors import InputError, SettingsError
-from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.reading.names import study_of
-from runtime.settings import gone
-from runtime.settings.arithmetic import number
-from runtime.settings.files import load_study, study_from_text
-from runtime.settings.gone import WENT
-from runtime.settings.study import (
+from runtime.core import gone
+from runtime.core.arithmetic import number
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.gone import WENT
+from runtime.core.study import (
     CestacSettings,
     Lowpass,
     Rows,
@@ -25,6 +22,9 @@ from runtime.settings.study import (
     study_from_mapping,
     to_mapping,
 )
+from runtime.reading.datasets import DATASETS, dataset_study
+from runtime.reading.names import study_of
+from runtime.study_files import load_study, study_from_text
 
 DESIGN = """
 symgen: 1

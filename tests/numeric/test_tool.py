@@ -13,11 +13,11 @@ from test_payload import BOX, emitted, observe, record
 from test_payload import STUDY as PAYLOAD_STUDY
 
 from runtime import InputError, load_model
-from runtime.errors import SettingsError
-from runtime.identification.payload import payload
-from runtime.model.inertia import INERTIAL, physical_model, pseudo_inertia
-from runtime.model.mount import load_effect, load_of_body, mount, ten_parameters
-from runtime.settings.study import PayloadSettings
+from runtime.core.errors import SettingsError
+from runtime.core.study import PayloadSettings
+from runtime.payload.load import payload
+from runtime.payload.mount import load_effect, load_of_body, mount, ten_parameters
+from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
 from symgen.description import load_robot, parse, parse_robot
 from symgen.description.expression import Expression
 from symgen.description.robot import Frame

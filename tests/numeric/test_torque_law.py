@@ -15,9 +15,9 @@ from planar_data import TRUE, motion
 from scipy.integrate import solve_ivp
 
 from runtime import InputError, identify
-from runtime.errors import SettingsError
+from runtime.core.errors import SettingsError
+from runtime.core.study import study_from_mapping, to_mapping
 from runtime.reading.records import read_records
-from runtime.settings.study import study_from_mapping, to_mapping
 
 RATE, N = 200.0, 3000
 KP, KD = np.array([400.0, 120.0]), np.array([30.0, 8.0])
@@ -143,7 +143,7 @@ def test_what_is_no_law_is_refused(tmp_path, record, controller, said):
 
 def test_a_simulated_loop_needs_a_number(tmp_path):
     from runtime.loop.control_law import control_law
-    from runtime.settings.controller import Controller
+    from runtime.loop.settings import Controller
 
     with pytest.raises(SettingsError, match="found by identify"):
         control_law(Controller(kp=10, kd="fit"), planar)
@@ -232,7 +232,7 @@ def test_the_saturation_is_in_force_where_kd_is_found(tmp_path, moving):
 def test_every_entry_point_has_the_torque_of_the_found_law(tmp_path):
     """Estimate and cestac took the torque without kd, or refused."""
     from runtime import cestac, estimate
-    from runtime.settings.study import CestacSettings
+    from runtime.core.study import CestacSettings
 
     settings = CestacSettings(delta=(1e-6,), runs=2, columns="all")
     study = replace(logged_early(tmp_path, kd="fit"), cestac=settings)

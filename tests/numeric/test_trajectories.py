@@ -6,16 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from runtime.errors import InputError, SettingsError
-from runtime.settings.families import (
-    AnyFamily,
-    Fourier,
-    PointToPoint,
-    Sinusoids,
-    Triangular,
-)
-from runtime.settings.schema import structure
-from runtime.settings.trajectories import Motion, Part, motion_from_mapping
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.settings import structure
+from runtime.excitation.families import AnyFamily, Fourier, PointToPoint, Sinusoids, Triangular
+from runtime.excitation.trajectories import Motion, Part, motion_from_mapping
 
 EVERY = [
     Fourier(4.0, 3, 2),

@@ -13,7 +13,7 @@ import symgen
 from runtime import load_model
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import compiled_model
-from runtime.errors import ModelError
+from runtime.core.errors import ModelError
 from symgen.cli.main import app
 
 EMITTED = Path(__file__).parents[2] / "generated"

@@ -20,7 +20,7 @@ import truth_simulator as world
 from truth_shared import Unseen, emitted, record_of, study
 
 import runtime
-from runtime.signals.counts.reading import read_counts
+from runtime.counts.reading import read_counts
 
 EVERY = pytest.mark.parametrize("name", list(world.ROBOTS))
 

@@ -9,16 +9,16 @@ import pytest
 from planar_data import OLS, TRUE, motion, observation
 
 from runtime.compose import estimate_of
-from runtime.errors import InputError
-from runtime.identification.parameter_sets import held_out_validation
-from runtime.identification.validation import (
+from runtime.core.errors import InputError
+from runtime.core.parameter_sets import held_out_validation
+from runtime.core.study import EstimateSettings
+from runtime.core.validation import (
     cross_validation,
     direct_comparison,
     prediction_errors,
     split_validation,
     weak_directions,
 )
-from runtime.settings.study import EstimateSettings
 
 
 def test_comparison_holds_the_torques_of_every_joint():

@@ -14,8 +14,8 @@ import runtime
 import symgen
 from oracles.applying import motion
 from oracles.pinocchio_model import PinocchioModel
-from runtime.errors import InputError
-from runtime.settings.study import study_from_mapping
+from runtime.core.errors import InputError
+from runtime.core.study import study_from_mapping
 from runtime.wrench import WrenchModel
 
 OPTION = ("base_wrench_regressor",)

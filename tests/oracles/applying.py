@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from oracles.urdf_table import snapped_text
-from runtime.estimators.estimate import Estimate
+from runtime.core.least_squares.estimate import Estimate
 from symgen.description.mjcf_model import compiled as compiled_mjcf
 from symgen.description.robot import INERTIAL
 from symgen.description.xml_text import read_elements

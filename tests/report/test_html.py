@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from report.strict_html import Strict
 
-from runtime.markup import element, formula, symbol
+from runtime.core.markup import element, formula, symbol
+from runtime.core.table import Table
 from runtime.reporting.page import Image, Matrix, Number, Page, Section, embedded, render
 from runtime.reporting.series import Series
-from runtime.table import Table
 
 HOSTILE = (
     "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 "

@@ -10,10 +10,10 @@ import nbformat
 import numpy as np
 from nbclient import NotebookClient
 
-from runtime.estimators.estimate import Estimate, JointFit
-from runtime.resolution.result import Cestac, level_result
-from runtime.resolution.runs import Level, Run, Runs
-from runtime.rows.observation import Observation
+from runtime.core.cestac.result import Cestac, level_result
+from runtime.core.cestac.runs import Level, Run, Runs
+from runtime.core.least_squares.estimate import Estimate, JointFit
+from runtime.core.rows.observation import Observation
 
 HOSTILE = "<script>alert(1)</script>\"'&"
 
@@ -119,7 +119,7 @@ def test_a_notebook_shows_them():
         nbformat.v4.new_code_cell(
             "import symgen\nsymgen.symbolic('planar_2r').formulas('base_parameters')"
         ),
-        nbformat.v4.new_code_cell("from runtime.markup import symbol\nprint(symbol('ZZ1R'))"),
+        nbformat.v4.new_code_cell("from runtime.core.markup import symbol\nprint(symbol('ZZ1R'))"),
     ]
     NotebookClient(book, timeout=120, kernel_name="python3").execute()
     data = book.cells[0].outputs[0]["data"]

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from runtime.identification.validation import JointComparison
+from runtime.core.validation import JointComparison
 from runtime.reporting import figures as plots
 
 

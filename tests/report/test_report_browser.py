@@ -12,7 +12,7 @@ from browser import FRAME, WEAK_CONTRAST
 from campaign import campaign
 from typer.testing import CliRunner
 
-from runtime.model.generated import load_model
+from runtime.core.model import load_model
 from symgen.cli.main import app
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module

@@ -11,16 +11,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime.estimators.estimate import Estimate, JointFit
-from runtime.identification.checklist import _state, checklist_of, lost_joints, separate
-from runtime.identification.expected_error import Expected
-from runtime.identification.validation import JointComparison
-from runtime.markup import split, symbol, unit
-from runtime.model.generated import load_model
+from runtime.core.checklist import _state, checklist_of, lost_joints, separate
+from runtime.core.least_squares.estimate import Estimate, JointFit
+from runtime.core.markup import split, symbol, unit
+from runtime.core.model import load_model
+from runtime.core.study import Decimate, Signals
+from runtime.core.validation import JointComparison
+from runtime.expected import Expected
 from runtime.reporting.parameters import cad_values, correlation_matrix, roles_of
 from runtime.reporting.sections import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
-from runtime.settings.study import Decimate, Signals
 from symgen.symbols.letters import letter as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

@@ -16,7 +16,7 @@ from report.strict_html import Strict
 from typer.testing import CliRunner
 
 from oracles.named_robots import planar_2r
-from runtime.model.generated import load_model
+from runtime.core.model import load_model
 from symgen.cli.main import app
 from symgen.derive.columns import inertial_names
 from symgen.description import load_robot

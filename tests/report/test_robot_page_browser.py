@@ -10,7 +10,7 @@ import pytest
 from browser import WEAK_CONTRAST
 from campaign import sampled, some
 
-from runtime.model.generated import load_model
+from runtime.core.model import load_model
 from symgen.description import load_robot
 from symgen.regroup.regrouping import regroup
 from symgen.report.page import robot_page

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import runtime
 from runtime import Estimate, Record
-from runtime.markup import number
-from runtime.model.drives import Coupling, Drives
-from runtime.table import Table
+from runtime.core.drives import Coupling, Drives
+from runtime.core.markup import number
+from runtime.core.table import Table
 from symgen.demo import Prepared, prepare
 
 COUPLINGS: dict[Coupling, str] = {

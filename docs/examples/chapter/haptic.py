@@ -15,7 +15,7 @@ from operational_space import felt_at_the_handle
 
 import runtime
 import symgen
-from runtime.model.drives import Drives
+from runtime.core.drives import Drives
 
 # The chapter, Tables 6 and 7, its fC as FS: CAD (* from specific tests), identified, then %e at
 # Delta = 2 pi/4000, 2 pi/100, 2 pi/80 of the motor.

@@ -36,7 +36,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from runtime import Estimate, InputError
-from runtime.model.generated import GeneratedModel, require
+from runtime.core.model import GeneratedModel, require
 
 Array = np.ndarray
 

@@ -1,0 +1,1 @@
+"""How coarse may an encoder be? Predicted, not sampled."""

@@ -1,0 +1,508 @@
+"""What the resolution advisor answers: steps, curves, sampled confirmation, and the verdict in
+words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from runtime.core.cestac.result import deciding_names
+from runtime.core.cestac.runs import Level
+from runtime.core.documents import Result, json_text
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.limits import LIMIT
+from runtime.core.table import Table
+
+Array = np.ndarray
+
+LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
+ALL = "all"  # Label of the advice on all encoders alike
+NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """CESTAC at one step.
+
+    Attributes
+    ----------
+    delta : float, rad or m
+    runs : int
+    change : ndarray, shape (b,), %
+        Of the mean of the estimates, signed.
+    half_width : ndarray, shape (b,), %
+        Of its Student interval.
+    """
+
+    delta: float
+    runs: int
+    change: Array
+    half_width: Array
+
+
+def sampled(delta: float, ratios: Array) -> Sampled:
+    """Eqs. (18), (21) of estimates over those of the record, shape (runs, b)."""
+    N = len(ratios)
+    half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
+    change = 100 * (ratios.mean(axis=0) - 1)
+    return Sampled(delta, N, change, 100 * half * ratios.std(axis=0, ddof=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """Step at which %e reaches `percent`, and the parameter that gets there first.
+
+    Attributes
+    ----------
+    percent : float, %
+    delta : float, rad or m
+        inf where no step does.
+    parameter : str
+        "" where no step does.
+    sampled : Sampled or None
+        CESTAC at that step; None without runs.
+    error, half_width : float, %
+        %e of the parameter in the runs, and half width of its Student interval.
+    """
+
+    percent: float
+    delta: float
+    parameter: str
+    sampled: Sampled | None = None
+    error: float = float("nan")
+    half_width: float = float("nan")
+
+    @property
+    def agrees(self) -> bool:
+        """Sampled and predicted %e differ by no more than the interval and 30 %, which is 15 % in
+        Delta; True without runs.
+        """
+        return (
+            self.sampled is None
+            or abs(self.error - self.percent)
+            <= self.half_width + LIMIT.PREDICTION_AGREES * self.percent
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class EncoderAdvice:
+    """Advice on some encoders that are coarse, the others exact.
+
+    Attributes
+    ----------
+    label : str
+        "all", or the joint.
+    limits : tuple of Limit
+        The coarsest steps.
+    delta : ndarray, shape (m,), rad or m
+        Steps of the curve.
+    change : ndarray, shape (m, b), %
+        Predicted change of the estimate, signed.
+    sampled : tuple of Sampled
+        CESTAC at some steps of the curve.
+    unit : str
+        Of the steps: "rad", "m", or "rad or m" where encoders of both kinds are coarse.
+    """
+
+    label: str
+    limits: tuple[Limit, ...]
+    delta: Array
+    change: Array
+    sampled: tuple[Sampled, ...] = ()
+    unit: str = "rad"
+
+    def reached(self, percent: float) -> Array:
+        """Step at which the |change| of every parameter first reaches `percent`, shape (b,); nan
+        where it does not within the curve.
+        """
+        return np.array([crossing(self.delta, np.abs(e), percent) for e in self.change.T])
+
+
+@dataclass(frozen=True, eq=False)
+class ReaderAdvice:
+    """Advice on real encoders, whose law is phase, by one reader.
+
+    Attributes
+    ----------
+    reader : str
+        lowpass: read as positions; counts.
+    encoders : tuple of EncoderAdvice
+        All together first, then one at a time.
+    notes : tuple of str
+    steps : ndarray, shape (len(asked), b), %
+        Change at the steps asked for, of all encoders; nan where the records do not tell.
+    """
+
+    reader: str
+    encoders: tuple[EncoderAdvice, ...]
+    notes: tuple[str, ...] = ()
+    steps: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Advice(Result):
+    """Advice on the encoders of one robot, and on its torque sensors.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters, b of them.
+    reference : Estimate
+        From the record as measured.
+    encoders : tuple of EncoderAdvice
+        All together first, then one at a time.
+    asked : tuple of float, rad or m
+        Further steps, of all encoders.
+    steps : ndarray, shape (len(asked), b), %
+        Change predicted there by the chapter's law; under law phase, of real encoders read as the
+        study reads them, nan where the records do not tell.
+    torque_sigma : ndarray, shape (b,)
+        Deviation of the parameters per N m (N) of deviation of the motor torques.
+    real : tuple of ReaderAdvice
+        Real encoders read as positions, and as counts; empty where they were not asked for.
+    assumptions : tuple of str
+    settings, provenance : mapping
+    """
+
+    names: tuple[str, ...]
+    reference: Estimate
+    encoders: tuple[EncoderAdvice, ...]
+    asked: tuple[float, ...]
+    steps: Array
+    torque_sigma: Array
+    assumptions: tuple[str, ...]
+    real: tuple[ReaderAdvice, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def deciding(self) -> tuple[str, ...]:
+        """Parameters that matter: %sigma (11) at most 10."""
+        return deciding_names(self.reference)
+
+    @property
+    def ways(self) -> tuple[tuple[str, tuple[EncoderAdvice, ...], Array], ...]:
+        """How encoders were judged, in words, the advice on them, and the change at the steps
+        asked for: by the chapter's law, without words, unless real encoders alone were; then real
+        ones by both readers.
+        """
+        real = tuple((NAMES[one.reader], one.encoders, one.steps) for one in self.real)
+        if self.real and self.encoders is self.real[0].encoders:
+            return real
+        return (("", self.encoders, self.steps), *real)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the first steps: "rad", "m", or "rad or m" where encoders of both kinds are
+        coarse.
+        """
+        return self.encoders[0].unit
+
+    @property
+    def place(self) -> str:
+        """Where the encoders stand."""
+        return {"joint": "at the joints", "motor": "at the motors"}[
+            self.settings.get("cestac", {}).get("side", "joint")
+        ]
+
+    def worst(self, step: int, steps: Array | None = None) -> tuple[str, float]:
+        """The parameter that matters most at the step asked for, and its %e. steps : changes;
+        default: those of the advice.
+        """
+        decisive = [self.names.index(name) for name in self.deciding]
+        e = np.abs((self.steps if steps is None else steps)[step])[decisive]
+        k = int(np.argmax(e)) if len(e) else 0
+        return (self.names[decisive[k]], float(e[k])) if len(e) else ("", float("nan"))
+
+    @property
+    def negative(self) -> bool:
+        """Whether least squares would be biased at one of the steps asked for, or the runs
+        contradict the prediction.
+        """
+        several = (encoder for _, encoders, _ in self.ways for encoder in encoders)
+        contradicted = any(not limit.agrees for encoder in several for limit in encoder.limits)
+        return contradicted or any(self.worst(k)[1] > LIMIT.BIASED for k in range(len(self.asked)))
+
+    @property
+    def verdict(self) -> str:
+        """The answer in words."""
+        parts: list[str] = []
+        for name, encoders, _ in self.ways:
+            parts += [f"Real encoders read as {name}:"] if name else []
+            parts += self._answers(encoders)
+        parts.append("Noise of the torques does not bias the estimate; it adds to sigma.")
+        return " ".join(parts)
+
+    def _answers(self, encoders: Sequence[EncoderAdvice]) -> list[str]:
+        """Sentences on some encoders, all together first."""
+        if not self.deciding:
+            return [
+                (
+                    f"no parameter has a %sigma of at most {LIMIT.DECIDING:g} %, so no step can be "
+                    "judged; "
+                    "more motion, or fewer columns, tell more."
+                )
+            ]
+        first, single = encoders[0], encoders[1:]
+        parts = [
+            self._sentence(limit, "With every encoder alike", first.unit) for limit in first.limits
+        ]
+        for unit in dict.fromkeys(advice.unit for advice in single) if len(single) > 1 else ():
+            known = [
+                advice
+                for advice in single
+                if advice.unit == unit and not np.isnan(advice.limits[0].delta)
+            ]
+            if not known:
+                continue
+            hardest = min(known, key=lambda advice: advice.limits[0].delta)
+            limit, kind = hardest.limits[0], "" if unit == self.unit else f" in {unit}"
+            parts.append(
+                f"Of single encoders{kind}, that of joint {hardest.label} asks most: "
+                f"{step_text(limit.delta, unit)} for "
+                f"{limit.percent:g} % ({limit.parameter or 'no parameter'})."
+            )
+        doubted = [
+            f"{advice.label} at {limit.percent:g} %"
+            for advice in encoders
+            for limit in advice.limits
+            if not limit.agrees
+        ]
+        if doubted:
+            parts.append(
+                f"Sampling does not confirm the prediction for: {', '.join(doubted)}; trust the "
+                "runs."
+            )
+        return parts
+
+    def _sentence(self, limit: Limit, who: str, unit: str) -> str:
+        if np.isnan(limit.delta) and not limit.parameter:
+            return f"{who}, no step could be judged on this record."
+        if np.isnan(limit.delta):
+            return (
+                f"{who}, {limit.parameter} changes by more than {limit.percent:g} % at the "
+                "finest step that was tried."
+            )
+        if not np.isfinite(limit.delta):
+            return f"{who}, no step makes a parameter that matters change by {limit.percent:g} %."
+        text = (
+            f"{who}, least squares changes by less than {limit.percent:g} % up to Delta = "
+            f"{step_text(limit.delta, unit)} {self.place} ({limit.parameter} first"
+        )
+        if limit.sampled is not None:
+            text += (
+                f"; {limit.sampled.runs} runs there gave {limit.error:.2f} +- "
+                f"{limit.half_width:.2f} %"
+            )
+        return text + ")."
+
+    def to_table(self) -> str:
+        """Steps by encoder, then by parameter, then what was assumed."""
+        tables = [table.to_text() for table in self.tables()]
+        notes = [note for reader in self.real for note in reader.notes]
+        return "\n\n".join(
+            [
+                *tables,
+                *self.asked_lines(),
+                "\n".join(f"- {text}" for text in (*self.assumptions, *notes)),
+            ]
+        )
+
+    def tables(self) -> list[Table]:
+        """Steps by encoder, by the chapter's law and of real encoders by both readers, then by
+        parameter.
+        """
+        law, real = ([way for way in self.ways if bool(way[0]) == real] for real in (False, True))
+        captions = (
+            "Coarsest step of each encoder, the others exact; sampled: %e of that parameter with "
+            "the Student interval of the runs",
+            "Real encoders, counts of random phase: coarsest step of each, the others exact; none: "
+            "not even the finest step tried",
+        )
+        tables = [
+            self._step_table(caption, ways)
+            for caption, ways in zip(captions, (law, real), strict=True)
+            if ways
+        ]
+        return [*tables, self.parameter_table()]
+
+    def _step_table(
+        self, caption: str, ways: Sequence[tuple[str, tuple[EncoderAdvice, ...], Array]]
+    ) -> Table:
+        """Coarsest steps by encoder, of some ways side by side."""
+        headers, rows = ["encoder"], []
+        for name, encoders, _ in ways:
+            for limit in encoders[0].limits:
+                percent = f"{limit.percent:g} %"
+                step = f"{name}, {percent}" if name else f"{percent}: Delta, {self.unit}"
+                headers += [step, "first parameter", "sampled %e"]
+        for alike in zip(*(encoders for _, encoders, _ in ways), strict=True):
+            unit = alike[0].unit
+            cells = [alike[0].label if unit == self.unit else f"{alike[0].label}, {unit}"]
+            for limit in (limit for advice in alike for limit in advice.limits):
+                runs = f"{limit.error:.2f} ± {limit.half_width:.2f}" if limit.sampled else "-"
+                step = "none" if np.isnan(limit.delta) else f"{limit.delta:.3g}"
+                turn = counts(limit.delta) if unit == "rad" else ""
+                cells += [turn or step, limit.parameter or "-", runs]
+            rows.append(tuple(cells))
+        return Table(caption, headers, rows)
+
+    def parameter_table(self) -> Table:
+        """By parameter: %sigma, steps of all encoders at the limits, deviation per N m (N) of
+        torque noise in %.
+        """
+        first = self.encoders[0]
+        reached = [first.reached(limit.percent) for limit in first.limits]
+        header = (
+            "parameter",
+            "%sigma",
+            *(f"Delta at {limit.percent:g} %" for limit in first.limits),
+            "% per unit torque deviation",
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            added = 100 * self.torque_sigma / np.abs(self.reference.X)
+        rows = []
+        for i, name in enumerate(self.names):
+            mark = "" if name in self.deciding else " *"
+            steps = (f"{step[i]:.3g}" if np.isfinite(step[i]) else "-" for step in reached)
+            rows.append(
+                (name + mark, f"{self.reference.relative_sigma[i]:.2f}", *steps, f"{added[i]:.3g}")
+            )
+        caption = (
+            "All encoders alike, by parameter; * does not decide; last column: %sigma added "
+            "by white motor torque noise of deviation 1"
+        )
+        return Table(caption, header, rows)
+
+    def asked_lines(self) -> list[str]:
+        """One line per step asked for."""
+        lines = []
+        for k, delta in enumerate(self.asked):
+            for reader, _, steps in self.ways:
+                name, e = self.worst(k, steps)
+                way = f", read as {reader}" if reader else ""
+                change = (
+                    "not judged on this record"
+                    if np.isnan(e)
+                    else f"largest predicted change {e:.2f} % ({name})"
+                )
+                lines.append(f"Delta = {Level(delta).label}{way}: {change}")
+        return ["\n".join(lines)] if lines else []
+
+    def to_json(self) -> str:
+        """JSON text of everything."""
+        return json_text(
+            {
+                "schema": 1,
+                "names": self.names,
+                "X_LS": self.reference.X,
+                "relative_sigma_LS": self.reference.relative_sigma,
+                "deciding": self.deciding,
+                "deciding_relative_sigma": LIMIT.DECIDING,
+                "verdict": self.verdict,
+                "encoders": [_summary(advice) for advice in self.encoders],
+                "real": {
+                    reader.reader: [_summary(advice) for advice in reader.encoders]
+                    for reader in self.real
+                },
+                "asked": [
+                    {"delta": delta, "change": change, "worst": self.worst(k)}
+                    for k, (delta, change) in enumerate(zip(self.asked, self.steps, strict=True))
+                ],
+                "torque_sigma": self.torque_sigma,
+                "assumptions": self.assumptions,
+                "settings": self.settings,
+                "provenance": self.provenance,
+            }
+        )
+
+
+def _summary(advice: EncoderAdvice) -> dict[str, Any]:
+    return {
+        "encoder": advice.label,
+        "unit": advice.unit,
+        "limits": advice.limits,
+        "delta": advice.delta,
+        "change": advice.change,
+        "sampled": advice.sampled,
+        "reached": {f"{limit.percent:g}": advice.reached(limit.percent) for limit in advice.limits},
+    }
+
+
+def confirmed(
+    advice: EncoderAdvice, reference: Estimate, level: Callable[[float], Sampled]
+) -> EncoderAdvice:
+    """The advice with runs at the steps of its limits; of all encoders, also between and above
+    them.
+    """
+    made = {limit.delta: level(limit.delta) for limit in advice.limits if np.isfinite(limit.delta)}
+    limits = []
+    for limit in advice.limits:
+        if limit.delta in made:
+            point, i = made[limit.delta], reference.names.index(limit.parameter)
+            limit = replace(
+                limit,
+                sampled=point,
+                error=abs(float(point.change[i])),
+                half_width=float(point.half_width[i]),
+            )
+        limits.append(limit)
+    if advice.label == ALL and made:
+        low, high = min(made), max(made)
+        for delta in (np.sqrt(low * high), 2 * high, 5 * high):
+            if delta <= advice.delta[-1]:
+                made[float(delta)] = level(float(delta))
+    return replace(
+        advice, limits=tuple(limits), sampled=tuple(made[delta] for delta in sorted(made))
+    )
+
+
+def limits_of(delta: Array, change: Array, reference: Estimate) -> tuple[Limit, ...]:
+    """Where the first parameter that matters crosses the limits; nan where the finest step is
+    already beyond or none is judged, inf where no step is.
+    """
+    names, limits = deciding_names(reference), []
+    e = {name: np.abs(change[:, reference.names.index(name)]) for name in names}
+    for percent in LIMITS if len(delta) else ():
+        first = {name: crossing(delta, e[name], percent) for name in names}
+        beyond = [name for name in names if e[name][0] > percent]
+        reached = [name for name in names if np.isfinite(first[name])]
+        if beyond:
+            limits.append(Limit(percent, np.nan, max(beyond, key=lambda name: e[name][0])))
+        elif reached:
+            name = min(reached, key=lambda name: first[name])
+            limits.append(Limit(percent, first[name], name))
+        else:
+            limits.append(Limit(percent, np.inf, ""))
+    return tuple(limits) or tuple(Limit(percent, np.nan, "") for percent in LIMITS)
+
+
+def crossing(delta: Array, e: Array, percent: float) -> float:
+    """First step at which e reaches `percent`, straight lines between the points of logarithmic
+    axes; nan where it does not.
+    """
+    above = np.flatnonzero(e >= percent)
+    if not len(above) or (above[0] == 0 and e[0] > percent):
+        return float("nan")
+    k = int(above[0])
+    if k == 0:
+        return float(delta[0])
+    low, high = max(float(e[k - 1]), 1e-12), float(e[k])
+    share = np.log(percent / low) / np.log(high / low)
+    return float(delta[k - 1] * (delta[k] / delta[k - 1]) ** share)
+
+
+def counts(delta: float) -> str:
+    """A step as a share of a turn, such as 2*pi/5236."""
+    return f"2*pi/{2 * np.pi / delta:.0f}" if 0 < delta < np.pi else ""
+
+
+def step_text(delta: float, unit: str) -> str:
+    """A step with its unit and, of a turn, its share, such as 9.16e-05 rad (2*pi/68626)."""
+    text = counts(delta) if unit == "rad" else ""
+    return f"{delta:.3g} {unit}" + (f" ({text})" if text else "")

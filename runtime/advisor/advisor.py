@@ -1,0 +1,410 @@
+"""Resolution advisor: the coarsest encoder that keeps the change of the estimate below 1 % and
+below 5 %, predicted without sampling.
+
+CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That
+mean is known to first order in the variance v
+of the rounding (errors in variables), from the expected normal equations of
+`runtime.advisor.position_errors`:
+
+    X(v) = E[W_c' W_c]^-1 E[W_c' Y]                %e (21) = 100 |1 - X(v) / X(0)|
+
+    v = Delta^2 (two-point, gaussian), Delta^2 / 3 (uniform, quantise)
+
+so that one set of sensitivities gives the curve of every parameter, for all encoders together and
+for one at a time with the others exact. The step at
+which the first parameter that matters reaches a limit is confirmed by runs of CESTAC, with Student
+intervals. Parameters matter when their
+%sigma (11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not
+decide.
+
+Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white
+noise of the motors
+
+    C = A^-1 (sum_ij Omega_ij W_i'W_j) A^-1,  A = W'W,  Omega = c R'R,  c = G(0)^2 / n_d of the
+    decimation (the noise that slow columns see)
+
+Weights of the joints (method wls) are those of the unperturbed fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial, reduce
+from itertools import count
+from operator import add
+from typing import Any
+
+import numpy as np
+
+from runtime.advisor.advice import (
+    ALL,
+    LIMITS,
+    Advice,
+    EncoderAdvice,
+    Limit,
+    ReaderAdvice,
+    confirmed,
+    limits_of,
+)
+from runtime.advisor.position_errors import Perturbation, perturbation, solution
+from runtime.core.cestac.perturbed import study_columns
+from runtime.core.cestac.result import deciding_names
+from runtime.core.cestac.rounding import VARIANCE, Mode
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import assemble
+from runtime.core.least_squares.method import linear_system
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
+from runtime.core.problem import Problem
+from runtime.core.record import Record
+from runtime.core.rows.observation import stack
+from runtime.core.rows.prepared import common_drives
+from runtime.core.study import Study, to_mapping
+from runtime.counts.advice import reader_advice
+from runtime.counts.coarse_encoders import READERS, CoarseEncoders, ReaderName
+
+Array = np.ndarray
+Progress = Callable[[int, int], None]
+
+FIRST_ORDER = "first order in the variance of the errors, motion slow beside the filters; "
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """X as a function of the step, for the encoders of several records of one robot.
+
+    parts : the records.   weights : ndarray, shape (n,), 1/s_j.
+            share : variance of the rounding over Delta^2.
+    """
+
+    parts: tuple[Perturbation, ...]
+    weights: Array
+    share: float
+
+    def change(self, delta: float, encoders: Sequence[int]) -> Array:
+        """100 (X(v)/X(0) - 1), shape (b,), in %."""
+        X = solution(self._total(self.share * delta**2, encoders), self.weights)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * (X / self.exact - 1))
+
+    @cached_property
+    def exact(self) -> Array:
+        """X with exact encoders, shape (b,)."""
+        return solution(self._total(0.0, ()), self.weights)
+
+    def rate(self, encoders: Sequence[int]) -> Array:
+        """Change in % per Delta^2 at Delta = 0, shape (b,), columns that switch left out."""
+        moved, X = self._total(0.0, ()), self.exact
+        added = reduce(add, [part.smooth[i] for part in self.parts for i in encoders])
+        moved[..., -1] = added @ np.append(-X, 1.0)
+        moved = solution(moved, self.weights)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * self.share * moved / X)
+
+    def _total(self, variance: float, encoders: Sequence[int]) -> Array:
+        return reduce(add, [part.expected(variance, encoders) for part in self.parts])
+
+
+def advise(
+    problem: Problem,
+    *,
+    columns: Sequence[str] | None = None,
+    asked: Sequence[float] = (),
+    encoders: Sequence[str] | None = None,
+    confirm: bool = True,
+    progress: Progress | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    readers: Sequence[ReaderName] | None = None,
+) -> Advice:
+    """Coarsest encoders that keep the change of the estimate below 1 % and below 5 %, predicted;
+    side, rounding, columns and runs by study.cestac.
+
+    Real encoders, law phase, are judged by each of `readers`: read as positions, read as counts
+    (`runtime.counts.advice`).
+
+    Parameters
+    ----------
+    problem : Problem
+        Prepared.
+    columns : sequence of str, optional
+        Essential names where they are known; default: by study.cestac.columns.
+    asked : sequence of float, rad or m
+        Further steps whose change is predicted.
+    encoders : sequence of str, optional
+        "all" and numbers of joints whose encoder alone is coarse; default: "all", then every one.
+    confirm : bool
+        Sample at the steps of the limits, study.cestac.runs times each.
+    progress : callable, optional
+        Called with the number of choices of encoders done and their total.
+    provenance : mapping, optional
+        Further entries of Advice.provenance; names and time stamps of the records are there.
+    readers : sequence of "lowpass" or "counts", optional
+        By which real encoders are judged; default: both where study.cestac.rounding is phase, else
+        none.
+
+    Raises
+    ------
+    SettingsError
+        A method that is not linear least squares, or a median filter, which no prediction goes
+        through.
+    """
+    if any(is_axis(joint) for joint in problem.model.JOINTS):
+        raise InputError(
+            "force sensors: the advisor judges encoders at every joint, and the axes of a sensor have none; leave the wrench out"
+        )
+    settings = problem.settings
+    sought = replace(settings.cestac, delta=())  # steps are what is sought
+    problem = problem.changed(settings=replace(settings, cestac=sought))
+    model, study, as_measured = problem.model, problem.settings, list(problem.prepared)
+    whole = list(problem.records)
+    _refuse(study)
+    law, drives = study.cestac.rounding, common_drives(model, as_measured)
+    names = study_columns(problem, as_measured, columns)
+    parts = tuple(perturbation(model, own, study, names, drives=drives) for own in as_measured)
+    linear = replace(study.estimate, columns="all")
+    measured = (
+        stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
+    )
+    system = linear_system(measured, linear)
+    reference = assemble(
+        system, system.solve(), model=model, provenance={**problem.provenance, **(provenance or {})}
+    )
+    predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
+    decisive = [names.index(name) for name in deciding_names(reference)]
+    every = range(len(model.JOINTS))
+    joints = joint_units(model) if study.cestac.side == "joint" else ["rad" for _ in every]
+    selections = _selections(model, encoders)
+    units = {
+        label: " or ".join(sorted({joints[i] for i in own}, reverse=True))
+        for label, own in selections.items()
+    }
+    readers = readers or (READERS if law == "phase" else ())
+    total = len(selections) * ((law != "phase") + len(readers))
+    done = count(1)
+
+    def advance() -> None:
+        if progress is not None:
+            progress(next(done), total)
+
+    def coarse(law: Mode, reader: ReaderName) -> CoarseEncoders:
+        return CoarseEncoders(problem, names, drives, law, reader)
+
+    rate = replace(predictor, share=VARIANCE["phase"]).rate(every)[decisive]
+    fastest = np.abs(rate).max(initial=0.0)
+    start = float(np.sqrt(LIMITS[0] / fastest)) if np.isfinite(fastest) and fastest > 0 else np.inf
+    by_reader: list[ReaderAdvice] = []
+    advices = []
+    for reader in readers:
+        by_reader.append(
+            reader_advice(
+                coarse("phase", reader),
+                reference,
+                selections,
+                units,
+                start,
+                asked=asked,
+                confirm=confirm,
+                progress=advance,
+            )
+        )
+    runs = coarse(law, "lowpass") if confirm and law != "phase" else None
+    for label, own in selections.items() if law != "phase" else ():
+        advice = _advice(predictor, label, own, reference, units[label])
+        if runs is not None:
+            advice = confirmed(advice, reference, partial(runs.sampled, own))
+        advices.append(advice)
+        advance()
+    steps = np.array([predictor.change(delta, every) for delta in asked]).reshape(
+        len(asked), len(names)
+    )
+    if law == "phase":
+        readings = {one.reader: one.steps for one in by_reader}
+        steps = readings.get(study.signals.reader, by_reader[0].steps)
+    return Advice(
+        names=names,
+        reference=reference,
+        encoders=tuple(advices) if advices else by_reader[0].encoders,
+        real=tuple(by_reader),
+        asked=tuple(asked),
+        steps=steps,
+        torque_sigma=torque_sigma(predictor, drives),
+        assumptions=assumptions(study, whole, parts, reference, real=bool(by_reader)),
+        settings={
+            **measured.settings,
+            "estimate": to_mapping(study.estimate),
+            "cestac": to_mapping(study.cestac),
+            "rate": [record.rate for record in whole],
+        },
+        provenance={**reference.provenance, "seed": study.cestac.seed},
+    )
+
+
+def _selections(model: GeneratedModel, wanted: Sequence[str] | None) -> dict[str, tuple[int, ...]]:
+    """Coarse encoders (from 0) by label."""
+    n = len(model.JOINTS)
+    every = {ALL: tuple(range(n)), **{str(joint): (i,) for i, joint in enumerate(model.JOINTS)}}
+    labels = tuple(wanted) if wanted is not None else tuple(every)[: n + 1 if n > 1 else 1]
+    unknown = [label for label in labels if label not in every]
+    if unknown or not labels:
+        raise InputError(
+            f"no encoder {', '.join(unknown) or 'named'}; expected some of {', '.join(every)}"
+        )
+    names = dict(zip(list(every)[1:], joint_labels(model), strict=True))
+    return {names.get(label, label): every[label] for label in labels}
+
+
+def _advice(
+    predictor: Predictor, label: str, encoders: Sequence[int], reference: Estimate, unit: str
+) -> EncoderAdvice:
+    """Limits by a walk on steps in geometric progression; the curve of all encoders goes on beyond
+    them.
+    """
+    decisive = [reference.names.index(name) for name in deciding_names(reference)]
+    rate = np.abs(predictor.rate(encoders)[decisive]).max(initial=0.0)
+    if not (np.isfinite(rate) and rate > 0):
+        limits = tuple(Limit(percent, np.inf, "") for percent in LIMITS)
+        return EncoderAdvice(
+            label, limits, np.empty(0), np.empty((0, len(reference.names))), unit=unit
+        )
+    start = float(np.sqrt(LIMITS[0] / rate))
+    known: dict[int, Array] = {}
+
+    def worst(k: int) -> float:
+        if k not in known:
+            known[k] = predictor.change(start * LIMIT.CURVE_RATIO**k, encoders)
+        return float(np.abs(known[k][decisive]).max())
+
+    low = next(
+        (k for k in range(0, -LIMIT.CURVE_STEPS, -1) if worst(k) < LIMITS[0]), -LIMIT.CURVE_STEPS
+    )
+    high = next(
+        (k for k in range(low, LIMIT.CURVE_STEPS) if worst(k) > LIMITS[-1]), LIMIT.CURVE_STEPS - 1
+    )
+    if label == ALL:
+        low, high = low - LIMIT.CURVE_BELOW, high + LIMIT.CURVE_ABOVE
+    for k in range(low, high + 1):
+        worst(k)
+    order = sorted(known)
+    delta = start * LIMIT.CURVE_RATIO ** np.array(order, dtype=float)
+    change = np.array([known[k] for k in order])
+    return EncoderAdvice(label, limits_of(delta, change, reference), delta, change, unit=unit)
+
+
+def torque_sigma(predictor: Predictor, drives: Drives | None) -> Array:
+    """Deviation of X, shape (b,), per unit deviation of white noise of every motor torque."""
+    n = predictor.parts[0].observation.n
+    R = np.eye(n) if drives is None else drives.ratio
+    w = predictor.weights
+    middle, A = 0.0, 0.0
+    for part in predictor.parts:
+        b = len(part.observation.names)
+        full = np.zeros((n, len(part.selection.kept), b))
+        full[part.selection.mask] = part.observation.W
+        Omega = R.T @ R * part.band.gain**2 / part.selection.factor
+        middle = middle + np.einsum(
+            "i,j,ij,iKa,jKb->ab", w**2, w**2, Omega, full, full, optimize=True
+        )
+        A = A + np.einsum("j,jab->ab", w**2, part.clean[:, :-1, :-1])
+    inverse = np.linalg.inv(A)
+    return np.asarray(np.sqrt(np.diag(inverse @ middle @ inverse)))
+
+
+def assumptions(
+    study: Study,
+    records: Sequence[Record],
+    parts: Sequence[Perturbation],
+    reference: Estimate,
+    *,
+    real: bool = False,
+) -> tuple[str, ...]:
+    """What the prediction stands on, in words. real : real encoders were judged too."""
+    cestac, low = study.cestac, study.signals.lowpass
+    law = {
+        "two-point": "+-Delta, variance Delta^2",
+        "gaussian": "normal, deviation Delta",
+        "uniform": "uniform within +-Delta, variance Delta^2/3",
+        "quantise": (
+            "to the grid of step Delta below or above, taken as white noise of variance Delta^2/3"
+        ),
+    }.get(cestac.rounding)
+    rates = ", ".join(f"{record.rate:g} Hz" for record in records)
+    filters = (
+        "no low-pass"
+        if low is None
+        else (
+            f"Butterworth of order {low.order} at {low.hertz:g} Hz forward and backward on "
+            f"{' and '.join(low.on)}"
+        )
+    )
+    out = [name for name in reference.names if name not in deciding_names(reference)]
+    friction = ", ".join(reference.names[s.column] for s in parts[0].switches)
+    lines = f"uneven by {cestac.uneven:g} of a step" if cestac.uneven else "even"
+    place = f"on the {cestac.side} side, sampled at {rates}"
+    encoders = (
+        [
+            (
+                f"Encoders: rounding {cestac.rounding} ({law}) of every sample, independent from "
+                f"sample to sample, {place}."
+            )
+        ]
+        if law
+        else []
+    )
+    if real:
+        encoders.append(
+            f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and "
+            f"run, {place}. The reader knows the step, not the phase. "
+            "Curves are a quadrature over the phase, without first order; steps of fewer than "
+            f"{LIMIT.LINES_IN_MOTION} in the motion of a joint are not judged. "
+            "Both estimates stand on the rows that the reader leaves in; rows in which dry "
+            "friction has no certain direction are not among them. Steps are "
+            f"tried in the ratio {LIMIT.READER_RATIO:g}, read as positions more closely where "
+            "constant speeds "
+            "of the record lock to the sampling and change more; between "
+            "these, ask for the step of the encoder itself."
+        )
+    return (
+        *encoders,
+        (
+            f"Filters: {filters}, no median, decimation by "
+            f"{', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off "
+            "gives "
+            "another answer."
+        ),
+        f"Method {study.estimate.method}; {FIRST_ORDER if law else ''}rows used and weights are "
+        "those of the record.",
+        *(
+            [
+                (
+                    f"Friction that switches with the sign of a speed ({friction}) by its mean and "
+                    "covariance under normal errors."
+                )
+            ]
+            if friction and law
+            else []
+        ),
+        f"Parameters matter whose %sigma (11) is at most {LIMIT.DECIDING:g} %"
+        + (f"; not: {', '.join(out)}." if out else ", here all of them."),
+        (
+            "Torques: white noise of the motors does not bias X, to first order and beyond, since "
+            "Y "
+            "is "
+            "linear in it and W does not know it; it adds to sigma."
+        ),
+    )
+
+
+def _refuse(study: Study) -> None:
+    if study.estimate.method not in ("ols", "wls"):
+        raise SettingsError(
+            f"{study.estimate.method!r}; the prediction is that of least squares, use ols or wls",
+            path=("estimate", "method"),
+        )
+    if study.estimate.weights == "covariance":
+        raise SettingsError(
+            "'covariance'; the prediction knows weights by joint, use joint or iterated",
+            path=("estimate", "weights"),
+        )

@@ -1,1 +1,0 @@
-"""A question about a record, a study or a result, with its answer, its limit and its remedy."""

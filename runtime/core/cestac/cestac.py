@@ -1,0 +1,312 @@
+"""Encoder resolution by the CESTAC method (chapter, section 3): what would a coarser encoder have
+done to the estimate?
+
+    q_CESTAC  every raw sample of the position rounded at random, steps of Delta:
+              eqs. (15), (28), `runtime.core.cestac.rounding`
+    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the study: eq. (16)
+    X_CESTAC = least squares of Y on W_CESTAC, Y as measured: eq. (17)
+
+N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the deviation (19), %sigma (20), %e
+(21) and the residual (22); `runtime.core.cestac.result` holds them
+and their verdict. The rows used are those of the measured record in every run. Steps of the motor
+torque (`torque`, section 4.1.3) are studied alone and
+with the first Delta. Columns are by default the essential ones of the identification, rounding is
+two-point, on the joint side: those
+reproduce the chapter's figures.
+
+The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in
+the settings of the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from hashlib import sha256
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from runtime.compiled.model import target_of
+from runtime.core.cestac.perturbed import (
+    PreparedRecord,
+    Task,
+    perturbed,
+    prepared_records,
+    study_columns,
+)
+from runtime.core.cestac.result import Cestac, level_result
+from runtime.core.cestac.run import USABLE, run_block
+from runtime.core.cestac.runs import Level, Runs
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.estimation import estimate_of, point_estimate
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.limits import LIMIT
+from runtime.core.problem import Problem
+from runtime.core.provenance import processor
+from runtime.core.rows.prepared import common_drives
+from runtime.core.study import CestacSettings, Study, to_mapping
+from runtime.loop.cestac import Loop, loop_of, without_loop_options
+from runtime.parallel.checkpoint import Checkpoint
+
+if TYPE_CHECKING:
+    from runtime.loop.simulation import Simulator
+
+Progress = Callable[[int, int], None]
+Key = tuple[int, int]
+Map = Callable[..., Iterable[Any]]
+
+
+def cestac(
+    problem: Problem,
+    *,
+    columns: Sequence[str] | None = None,
+    map: Map = map,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+    provenance: Mapping[str, Any] | None = None,
+    simulator: Simulator | None = None,
+) -> Cestac:
+    """Change of the estimate under coarser encoders and torque sensors, by the settings
+    study.cestac and the method of study.estimate.
+
+    Parameters
+    ----------
+    problem : Problem
+        Prepared.
+    columns : sequence of str, optional
+        Essential names where they are known; default: those of the problem. Unused unless settings.cestac.columns is "essential".
+    map : callable, optional
+        As the built-in one; computes the runs, in processes (`runtime.parallel.processes.processes`) or by a
+        Dask cluster (`runtime.parallel.cluster.cluster`). The results do not depend on it in any bit.
+    progress : callable, optional
+        Called with the number of runs done and their total.
+    checkpoint : Checkpoint, optional
+        Where runs are kept while the study lasts; those of an interrupted or shorter study with the
+        same settings are not repeated.
+    provenance : mapping, optional
+        Further entries of Cestac.provenance; names and time stamps of the records are there.
+    simulator : Simulator, optional
+        Closed loop of iv, didim, and of place: loop; default: that of study.controller, with
+        the CasADi model beside `model`.
+
+    Raises
+    ------
+    SettingsError
+        Motor side without drives, a column that is no base parameter, or a closed loop that the
+        study does not tell.
+    InputError
+        A method that finds no estimate, or fewer than two at one of
+        the steps.
+    """
+    model, study = problem.model, problem.settings
+    settings = study.cestac
+    as_measured = list(problem.prepared)
+    drives = common_drives(model, as_measured)
+    if settings.side == "motor" and drives is None:
+        raise SettingsError(
+            (
+                f"motor, but {model.NAME} has no drives; use side: joint or give drives in the "
+                "robot "
+                "file"
+            ),
+            path=("cestac", "side"),
+        )
+    if study.signals.reader == "counts" and settings.delta and settings.rounding != "phase":
+        raise SettingsError(
+            (
+                f"{settings.rounding} with signals.reader: counts; it rounds every sample anew and "
+                "destroys the edges that counts are read by, use phase"
+            ),
+            path=("cestac", "rounding"),
+        )
+    loop = loop_of(problem, simulator)
+    if settings.place == "loop":
+        assert loop is not None
+        as_measured = [part.prepared for part in loop.closed.parts]
+    asked = to_mapping(study.estimate)
+    if loop is not None:
+        study = replace(study, estimate=without_loop_options(study.estimate, problem.methods))
+    task = Task(
+        records=prepared_records(as_measured, study, drives, loop),
+        model=model,
+        names=study_columns(problem, as_measured, columns, loop),
+        estimate=replace(study.estimate, columns="all"),
+        settings=settings,
+        levels=levels_of(settings),
+        drives=drives,
+        reader=problem.reader,
+        methods=problem.methods,
+        loop=loop,
+    )
+    measured = perturbed(task.columns, task, Level(0.0), ())
+    whole = [reading.record for reading in as_measured]
+    origins = {**problem.provenance, **(provenance or {})}
+    point = point_estimate(task.estimate, problem.methods)
+    reference = estimate_of(measured, point, problem.methods, model=model, provenance=origins)
+    _refuse(reference)
+    described = {
+        **measured.settings,
+        "estimate": asked,
+        "cestac": to_mapping(settings),
+        "rate": [record.rate for record in whole],
+        "target": target_of(model),
+        "torque_side": "joint" if drives is None else "motor",
+        **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
+    }
+    runs = _all_runs(
+        task,
+        partial(_identity, task, described, reference.provenance),
+        map,
+        progress,
+        checkpoint,
+    )
+    by_level = [runs.where(runs.level == k) for k in range(len(task.levels))]
+    levels = list(zip(task.levels, by_level, strict=True))
+    if settings.place == "loop":
+        (_, exact), *levels = levels
+        X = np.nanmean(exact.X, axis=0)
+        reference = replace(
+            reference, X=X, residual_norm=float(np.linalg.norm(measured.Y - measured.W @ X))
+        )
+    return Cestac(
+        names=task.names,
+        reference=reference,
+        levels=tuple(level_result(level, own, measured, reference) for level, own in levels),
+        settings=described,
+        provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
+        notes=(*notes(study, loop), *(record.note for record in task.records if record.note)),
+    )
+
+
+def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
+    """What the reader of a study must know beside its figures."""
+    method, place = study.estimate.method, study.cestac.place
+    if loop is None:
+        return ()
+    told = [loop.closed.assumption] if loop.closed.assumption else []
+    if place == "loop":
+        told.append(
+            "The encoder rounds inside the simulated loop, whose parameters are the values of the "
+            "robot file; every run is a record of its own, compared "
+            "with the mean of as many records of the same seeds whose encoder is that of the study."
+        )
+    elif method == "didim":
+        told.append(
+            "didim reads of the recorded positions the first alone; rounding them says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
+        )
+    elif method == "iv":
+        told.append(
+            "The instruments of iv know no rounding of recorded positions; what an encoder in the "
+            "loop does to them: place: loop."
+        )
+    return tuple(told)
+
+
+def _refuse(reference: Estimate) -> None:
+    """InputError where the method finds no estimate that runs could be compared with."""
+    if reference.status not in (*USABLE, "rank-deficient", "no-redundancy", "singular-weights"):
+        raise InputError(
+            f"{reference.method}: no estimate of the record as measured to compare with: "
+            f"{reference.message}"
+        )
+
+
+def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
+    """Positions alone for every Delta; then torques alone, and torques with the first Delta, for
+    every Phi. In the loop, that of the study first.
+    """
+    if settings.place == "loop":
+        return (Level(0.0), *map(Level, settings.delta))
+    steps = settings.torque or ()
+    with_position = [Level(settings.delta[0], phi) for phi in steps] if settings.delta else []
+    return (
+        *(Level(delta, 0.0) for delta in settings.delta),
+        *(Level(0.0, phi) for phi in steps),
+        *with_position,
+    )
+
+
+def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
+    """Keys (level, run) in tasks of at most LIMIT.TASK_RUNS runs with fixed borders: contiguous
+    runs of one
+    level or, where levels share their random
+    numbers, all levels of contiguous runs. A study of few runs has small tasks, so that there are
+    some for every worker.
+    """
+    size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
+
+    def block(key: Key) -> Key:
+        return (0 if common else key[0], key[1] // size)
+
+    return [
+        tuple(group)
+        for _, group in groupby(
+            sorted(keys, key=lambda key: (block(key), key[1], key[0])), key=block
+        )
+    ]
+
+
+def _all_runs(
+    task: Task,
+    identity: Callable[[], Mapping[str, Any]],
+    map: Map,
+    progress: Progress | None,
+    checkpoint: Checkpoint | None,
+) -> Runs:
+    """Every run, by level and number, in whatever order they finished. identity : gives what tells
+    this study from others on disk.
+    """
+    runs, levels, b = task.settings.runs, range(len(task.levels)), len(task.names)
+    finished = checkpoint.resume(identity(), b) if checkpoint else Runs.of((), b)
+    parts = [finished.where((finished.level < len(levels)) & (finished.run < runs))]
+    done, total, known = len(parts[0]), runs * len(levels), parts[0].keys
+    missing = [key for level in levels for run in range(runs) if (key := (level, run)) not in known]
+    try:
+        blocks = key_blocks(missing, runs, len(levels), task.settings.common)
+        for part in map(partial(run_block, task), blocks):
+            parts.append(part)
+            done += len(part)
+            if checkpoint is not None:
+                checkpoint.add(part)
+            if progress is not None:
+                progress(done, total)
+    finally:  # also when Ctrl-C or an error ends the study
+        if checkpoint is not None:
+            checkpoint.flush()
+    return Runs.joined(parts, b)
+
+
+def _measured(record: PreparedRecord) -> Iterator[memoryview]:
+    """Positions, torques and missing samples of a record."""
+    missing = () if record.missing is None else (np.packbits(record.missing.samples),)
+    return (np.ascontiguousarray(x).data for x in (record.q, record.tau, *missing))
+
+
+def _identity(
+    task: Task, described: Mapping[str, Any], provenance: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What decides every bit of every run: JSON values that tell studies apart, the number of runs
+    aside.
+    """
+    drives = task.drives
+    return {
+        **{key: value for key, value in described.items() if key != "cestac"},
+        **{f"cestac.{key}": value for key, value in described["cestac"].items() if key != "runs"},
+        "columns": list(task.names),
+        "constants": dict(task.model.CONSTANTS),
+        "drives": None
+        if drives is None
+        else [
+            drives.ratio.tolist(),
+            drives.offset.tolist(),
+            drives.torque_constant.tolist(),
+            drives.coupling,
+        ],
+        "robot": provenance.get("robot"),
+        "robot_sha256": provenance.get("robot_sha256"),
+        "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],
+        "versions": provenance["versions"],
+    }

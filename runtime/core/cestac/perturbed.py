@@ -1,0 +1,337 @@
+"""Measurements as coarser sensors would have given them, and the system Y = W X + rho that they
+make, eqs. (15), (16), (28).
+
+    q_CESTAC = R^-1 rounded(R (q - offset)) + offset
+            on the motor side; R = 1 on the joint side
+    W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC)   through the filters, on the measured rows
+
+Every record draws from streams of its own (`runtime.core.cestac.rounding.stream`), torques from
+others than positions, so that a draw is the same with
+and without torques and whatever records follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from runtime.core.cestac.rounding import rounded, stream
+from runtime.core.cestac.runs import Level
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.essential import essential_of
+from runtime.core.least_squares.method import Method, linear_companion
+from runtime.core.missing import COUNTS, Missing, require_positions
+from runtime.core.model import GeneratedModel, base_columns
+from runtime.core.problem import Problem
+from runtime.core.record import Origin, Record
+from runtime.core.rows.observation import Observation, stack
+from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
+from runtime.core.rows.regressor import Columns
+from runtime.core.rows.selection import Selection, select_rows
+from runtime.core.signals.filters import States, filtered_states
+from runtime.core.signals.states import Reader, require_motion
+from runtime.core.study import CestacSettings, EstimateSettings, Study
+from runtime.counts.own_encoder import OwnEncoder, own_encoder
+from runtime.loop.cestac import Loop
+from runtime.loop.closed_loop import LoopPart
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedRecord:
+    """One record, with what does not change from run to run.
+
+    Attributes
+    ----------
+    q, tau : ndarray, shape (N, n)
+        As measured, joint side, rad or m, N m or N.
+    rate : float, Hz
+    files : mapping
+        SHA-256 by file name.
+    selection : Selection
+        Rows used: those of the measured record.
+    torque : ndarray, shape (n, K), N m or N
+        Y before rows are left out.
+    states : States or None
+        Of the record as measured, where it can be read as counts; None: by the low-pass.
+    own : OwnEncoder or None
+        The encoder that made it, under law phase.
+    missing : Missing or None
+        Samples without a position, in every run the same.
+    channels : mapping
+        Functions of time that laws of the model read, (N,) by name.
+    note : str
+        Why the record as measured is not read as counts, where the study asks for counts.
+    """
+
+    q: Array
+    tau: Array
+    rate: float
+    files: Mapping[str, str]
+    selection: Selection
+    torque: Array
+    states: States | None = None
+    own: OwnEncoder | None = None
+    missing: Missing | None = None
+    channels: Mapping[str, Array] = field(default_factory=dict)
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What every run needs; travels once to each process.
+
+    Attributes
+    ----------
+    records : tuple of PreparedRecord
+    model : GeneratedModel
+    names : tuple of str
+        Columns, as fitted.
+    estimate, settings : EstimateSettings, CestacSettings
+    levels : tuple of Level
+    drives : Drives or None
+        Motor side.
+    reader : Reader
+        States of a record.
+    methods : mapping of str to Method
+        That of `estimate` among them.
+    loop : Loop or None
+        Closed loop, of a study that simulates one.
+    """
+
+    records: tuple[PreparedRecord, ...]
+    model: GeneratedModel
+    names: tuple[str, ...]
+    estimate: EstimateSettings
+    settings: CestacSettings
+    levels: tuple[Level, ...]
+    drives: Drives | None
+    reader: Reader
+    methods: Mapping[str, Method]
+    loop: Loop | None = None
+
+    @property
+    def columns(self) -> Columns:
+        """Its columns of W, for some runs one after the other."""
+        return Columns(self.model, self.names)
+
+
+def prepared_record(
+    own: Prepared, study: Study, drives: Drives | None = None, part: LoopPart | None = None
+) -> PreparedRecord:
+    """Rows and torques of the measured record, through the filters of the study with the median of
+    study.cestac.
+
+    part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
+    """
+    signals, record = replace(study.signals, median=study.cestac.median), own.record
+    encoder, counts, note = own_encoder(record, study, drives), None, ""
+    if signals.reader == "counts" and (
+        signals.step is not None
+        or record.missing
+        or (encoder is not None and encoder.reading is not None)
+    ):
+        known = (
+            signals
+            if signals.step is not None or encoder is None
+            else replace(signals, step=tuple(encoder.step), side=study.cestac.side)
+        )
+        own = replace(own, study=replace(study, signals=known))
+        counts = own.states
+    elif signals.reader == "counts":
+        note = (
+            f"Beside these steps the positions of {record.name} count as exact: the estimate "
+            "that runs are compared with reads them by the low-pass."
+        )
+    if counts is None:
+        require_positions(record.missing, "reader: lowpass", record.file, COUNTS)
+    if part is not None:
+        selection, torque = part.selection, part.torque
+    else:  # without a limit any speed will do
+        speeds = record.q
+        if np.any(study.rows.low_speed):
+            speeds = (counts or filtered_states(record.q, record.rate, signals)).qd
+        selection = select_rows(record, speeds, signals, study.rows)
+        torque = decimated_torque(record.torque, selection)
+    return PreparedRecord(
+        np.asfortranarray(record.q),  # one signal after the other, as filters read them
+        record.torque,
+        record.rate,
+        dict(record.files),
+        selection,
+        torque,
+        counts,
+        encoder,
+        record.missing,
+        own.channels,
+        note,
+    )
+
+
+def prepared_records(
+    records: Sequence[Prepared],
+    study: Study,
+    drives: Drives | None = None,
+    loop: Loop | None = None,
+) -> tuple[PreparedRecord, ...]:
+    """Rows and torques of every record; none where the encoder stands in the loop, whose records
+    are made anew.
+    """
+    if study.cestac.place == "loop":
+        return ()
+    parts = [None] * len(records) if loop is None else list(loop.closed.parts)
+    return tuple(
+        prepared_record(record, study, drives, part)
+        for record, part in zip(records, parts, strict=True)
+    )
+
+
+def study_columns(
+    problem: Problem,
+    records: Sequence[Prepared],
+    columns: Sequence[str] | None,
+    loop: Loop | None = None,
+) -> tuple[str, ...]:
+    """Columns of settings.cestac.columns: a list, all, or the essential ones of the identification that the problem describes.
+
+    columns : essential names where they are known.
+            Raises SettingsError for a name that is no base parameter, and for poses at rest.
+    """
+    settings = problem.settings
+    require_motion(settings.signals, "the study of encoders")
+    if settings.cestac.columns == "essential" and columns is None:
+        rows = stacked(problem.model, records) if loop is None else loop.closed.measured()
+        linear = linear_companion(settings.estimate)
+        return essential_of(rows, settings.essential, linear).names
+    return base_columns(problem.model, settings.cestac.columns, columns or (), "cestac", "columns")
+
+
+def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Streams of the positions and of the torques of record k: (*draw, 2 k) and (*draw, 2 k + 1),
+    positions of record 0 `draw` itself.
+    """
+    return ((*draw, 2 * k) if k else draw), (*draw, 2 * k + 1)
+
+
+def perturbed_position(
+    q: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
+) -> Array:
+    """q_CESTAC of eqs. (15), (28), shape (N, n), from the measured q; `key` of its random
+    stream.
+    """
+    if not level.delta:
+        return q
+    rng = stream(settings.seed, *key)
+    if settings.side == "joint" or drives is None:
+        return rounded(q, level.delta, settings.rounding, rng, settings.uneven)
+    return drives.joint_position(
+        rounded(drives.motor_position(q), level.delta, settings.rounding, rng, settings.uneven)
+    )
+
+
+def perturbed_torque(
+    tau: Array, level: Level, settings: CestacSettings, drives: Drives | None, key: Sequence[int]
+) -> Array:
+    """Joint torques, shape (N, n), with motor torques (N m) rounded in steps of Phi; joint torques
+    where there are no drives.
+    """
+    rng = stream(settings.seed, *key)
+    if drives is None:
+        return rounded(tau, level.torque, settings.rounding, rng)
+    motor = drives.motor_command(tau) * drives.torque_constant
+    return drives.joint_torque(
+        rounded(motor, level.torque, settings.rounding, rng) / drives.torque_constant
+    )
+
+
+def torque_rows(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
+    """Y of one record before rows are left out, shape (n, K): as measured, or rounded in steps of
+    Phi.
+    """
+    if not level.torque:
+        return record.torque
+    return decimated_torque(
+        perturbed_torque(record.tau, level, task.settings, task.drives, key), record.selection
+    )
+
+
+def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...]) -> Observation:
+    """The system with perturbed measurements; that of the measurements themselves at a level
+    without steps.
+    """
+    loop = task.loop
+    if loop is not None and task.settings.place == "loop":
+        return (loop.simulated(level, draw) if draw else loop.closed).measured().columns(task.names)
+    keys = [stream_keys(draw, k) for k in range(len(task.records))]
+    positions = [
+        run_position(task, r, level, own) for r, (own, _) in zip(task.records, keys, strict=True)
+    ]
+    torques = [
+        torque_rows(task, r, level, own) for r, (_, own) in zip(task.records, keys, strict=True)
+    ]
+    observation = system_of(columns, task, positions, torques, level)
+    return observation if loop is None else loop.perturbed(observation, positions)
+
+
+def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
+    """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than
+    those of the record, from a draw.
+    """
+    q = record.q
+    if level.delta and record.own is not None:
+        q = record.own.positions(q, level.delta, stream(task.settings.seed, *key, 0))
+    return perturbed_position(q, level, task.settings, task.drives, key)
+
+
+def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> States:
+    """States of joint positions q, shape (N, n), by the reader of the study, which knows the steps
+    of the level but not their phase.
+    """
+    signals = record.selection.signals
+    if signals.reader == "lowpass" or not level.delta:
+        states = record.states or filtered_states(q, record.rate, signals)
+    else:
+        known = replace(signals, step=level.delta, side=task.settings.side)
+        try:
+            states = task.reader(_moved(task, record, q), known)
+        except np.linalg.LinAlgError as e:
+            raise InputError(
+                f"counts of steps of {level.label} cannot be read on this motion ({e}); use finer steps"
+            ) from e
+    return replace(states, channels=record.channels)
+
+
+def _moved(task: Task, record: PreparedRecord, q: Array) -> Record:
+    """A record of the positions q of one run, for a reader."""
+    origin = Origin(drives=task.drives)
+    t = np.arange(len(q)) / record.rate
+    return Record(t, q, record.tau, rate=record.rate, missing=record.missing, origin=origin)
+
+
+def system_of(
+    columns: Columns,
+    task: Task,
+    positions: Sequence[Array],
+    torques: Sequence[Array],
+    level: Level | None = None,
+) -> Observation:
+    """The stacked system of positions, shape (N, n), and torque rows, shape (n, K), of every
+    record, by the way of the identification.
+
+    level : steps that the reader of counts is told; default: none, positions as they are.
+    """
+    observations = [
+        observation_of(
+            columns,
+            run_states(task, record, q, level or Level(0.0)),
+            torque,
+            record.selection,
+            files=record.files,
+        )
+        for record, q, torque in zip(task.records, positions, torques, strict=True)
+    ]
+    return observations[0] if len(observations) == 1 else stack(observations)

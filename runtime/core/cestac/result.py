@@ -1,0 +1,455 @@
+"""Results of a resolution study, and its verdict.
+
+With N runs X_k at one level and X_LS from the unperturbed record, by parameter:
+
+    mean      (18)  X = sum X_k / N                 sigma  (19)  = sqrt(sum (X_k - X)^2 / (N - 1))
+    %sigma    (20)  = 100 sigma / |X|               %e     (21)  = 100 |1 - X / X_LS|
+    interval        X +- t sigma / sqrt(N), t of Student's law with N - 1 degrees of freedom
+
+and for the residual, where rho_LS = Y - W X_LS, two readings of rho_CESTAC and two measures of
+each:
+
+    printed   rho_CESTAC = Y - W X, the measured W, as printed below (22)      own
+            Y - W_CESTAC X_k, mean of the norms over the runs
+    %e(rho)   (22)  = 100 |1 - ||rho_CESTAC|| / ||rho_LS|| |
+            increase = 100 (||rho_CESTAC|| - ||rho_LS||) / ||Y||
+
+As printed, (22) grows to hundreds of per cent where Table 3 says about ten; the increase relative
+to ||Y|| has the printed order.
+
+Verdict of the chapter: all %e and %e(rho) below 1 %: practically unbiased; above 5 %: biased;
+between: doubtful. Parameters whose own %sigma (11)
+is large do not decide; the result says which ones did. Section 4.1.4 calls the residual the best
+single indicator, as it sees the whole model:
+`residual_verdict` applies the same two limits to its increase alone.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+from scipy.special import stdtrit
+
+from runtime.core.cestac.runs import Level, Runs
+from runtime.core.documents import Result
+from runtime.core.errors import InputError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import LINEAR
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.rows.observation import Observation
+from runtime.core.table import Table, notebook
+from runtime.json_files import Vector
+
+Array = np.ndarray
+
+SCHEMA = "symgen-cestac/1"
+"""Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
+Verdict = Literal["unbiased", "doubtful", "biased"]
+
+
+@dataclass(frozen=True, eq=False)
+class LevelResult:
+    """One level of a study. Arrays are in the order of the names.
+
+    Attributes
+    ----------
+    level : Level
+        Steps.
+    runs : Runs
+        The runs.
+    mean : ndarray, shape (b,), SI
+        Mean of the runs, eq. (18).
+    sigma : ndarray, shape (b,), SI
+        Standard deviation of the runs, eq. (19).
+    relative_sigma : ndarray, shape (b,), %
+        100 sigma / |mean|, eq. (20).
+    e : ndarray, shape (b,), %
+        100 |1 - mean / X_LS|, eq. (21).
+    half_width : ndarray, shape (b,), SI
+        Half width of the Student interval of the mean.
+    half_width_percent : ndarray, shape (b,), %
+        100 half_width / |X_LS|.
+    e_rho : float, %
+        Eq. (22) as printed.
+    e_rho_own : float, %
+        Eq. (22) with the W of each run.
+    increase : float, %
+        Increase of the residual norm over the norm of Y.
+    increase_own : float, %
+        The same with the W of each run.
+    verdict : str
+        unbiased, doubtful or biased.
+    residual_verdict : str
+        Verdict of `increase` alone.
+    decided_by : mapping of float, %
+        Errors that decided the verdict, by name (rho for the residual), largest first.
+    runs_needed : int
+        Runs after which the intervals of the deciding parameters are narrower than 1 % of X_LS.
+    message : str
+        The verdict in words.
+    """
+
+    level: Level
+    runs: Runs
+    mean: Vector
+    sigma: Vector
+    relative_sigma: Vector
+    e: Vector
+    half_width: Vector
+    half_width_percent: Vector
+    e_rho: float
+    e_rho_own: float
+    increase: float
+    increase_own: float
+    verdict: Verdict
+    residual_verdict: Verdict
+    decided_by: Mapping[str, float]
+    runs_needed: int
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cestac(Result):
+    """A resolution study.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters, b of them.
+    reference : Estimate
+        X_LS, of the record as measured.
+    levels : tuple of LevelResult
+    settings : mapping
+        Signals, rows, estimator, study and sampling rate, complete: the bandwidth of the noise
+        decides the result.
+    provenance : mapping
+    notes : tuple of str
+        What the figures do not say.
+    """
+
+    names: tuple[str, ...]
+    reference: Estimate
+    levels: tuple[LevelResult, ...]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def deciding(self) -> tuple[str, ...]:
+        """Parameters that decide the verdict: %sigma (11) of the reference at most
+        LIMIT.DECIDING.
+        """
+        return deciding_names(self.reference)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of the levels."""
+        return max(
+            (result.verdict for result in self.levels),
+            key=get_args(Verdict).index,
+            default="unbiased",
+        )
+
+    @property
+    def finer_for_values(self) -> str:
+        """Why single values ask for a finer step than the residual does, a sentence after a blank;
+        "" where they do not.
+        """
+        apart = (
+            level
+            for level in self.levels
+            if level.residual_verdict == "unbiased" and level.verdict != "unbiased"
+        )
+        errors = (
+            {}
+            if (level := next(apart, None)) is None
+            else {name: e for name, e in level.decided_by.items() if name in self.names}
+        )
+        if level is None or not errors:
+            return ""
+        name = max(errors, key=errors.__getitem__)
+        return (
+            f" Single values ask for a finer one: at {level.level.label} {name} changes by "
+            f"{errors[name]:.0f} % and the residual grows by "
+            f"{level.increase:.1f} % of the torques, which hardly tell {name}."
+        )
+
+    @property
+    def message(self) -> str:
+        """The verdict of every step, in one sentence."""
+        by_verdict: dict[str, list[str]] = {}
+        for level in self.levels:
+            by_verdict.setdefault(level.verdict, []).append(level.level.label)
+        meaning = {"unbiased": "practically unbiased", "doubtful": "doubtful", "biased": "biased"}
+        parts = [
+            f"{meaning[verdict]} at {', '.join(labels)}" for verdict, labels in by_verdict.items()
+        ]
+        worst = max(
+            self.levels, key=lambda level: max(level.decided_by.values(), default=0.0), default=None
+        )
+        if worst is None:
+            return "Nothing was perturbed."
+        name, error = next(iter(worst.decided_by.items()))
+        change = (
+            f"{'the residual' if name == 'rho' else name}, {error:.1f} % at {worst.level.label}"
+        )
+        method = "Least squares" if self.estimator == "LS" else self.estimator
+        return f"{method} is {'; '.join(parts)}; largest change: {change}."
+
+    @property
+    def estimator(self) -> str:
+        """Name of the method in tables: LS for least squares, whatever its weights."""
+        return "LS" if self.reference.method in LINEAR else self.reference.method.upper()
+
+    @property
+    def lists_runs(self) -> bool:
+        """Whether the JSON text holds every run."""
+        return bool(sum(len(level.runs) for level in self.levels) <= LIMIT.RUNS_LISTED)
+
+    def to_table(self) -> str:
+        """Means as the chapter's Table 3, residual and verdict, then %e with %sigma, then every
+        verdict in words.
+        """
+        means, residual, errors = self.mean_table(), self.residual_table(), self.error_table()
+        notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
+        below = f"{errors.caption}\n{errors.to_text()}"
+        return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
+
+    def mean_table(self) -> Table:
+        """Mean of the runs of every parameter and level."""
+        rows = [
+            (name, number(self.reference.X[i]), *(number(r.mean[i]) for r in self.levels))
+            for i, name in enumerate(self.names)
+        ]
+        return Table(
+            "Mean of the runs (18)",
+            ("parameter", self.estimator, *(r.level.label for r in self.levels)),
+            rows,
+        )
+
+    def error_table(self) -> Table:
+        """%e (21) and, in brackets, %sigma (20) of every parameter and level; `*` marks parameters
+        that do not decide.
+        """
+        rows = [
+            (
+                name if name in self.deciding else f"{name} *",
+                number(self.reference.relative_sigma[i], ".2f"),
+                *(
+                    f"{number(r.e[i], '.2f')} ({number(r.relative_sigma[i], '.2f')})"
+                    for r in self.levels
+                ),
+            )
+            for i, name in enumerate(self.names)
+        ]
+        caption = "%e (21) and, in brackets, %sigma (20); * does not decide"
+        return Table(
+            caption,
+            ("parameter", f"%sigma of {self.estimator}", *(r.level.label for r in self.levels)),
+            rows,
+        )
+
+    def residual_table(self) -> Table:
+        """Both readings of %e(rho), the increase of the norm, and the verdict, by level."""
+        levels = self.levels
+        rows = [
+            (
+                "largest error of what decides, %",
+                *(number(max(r.decided_by.values(), default=np.nan), ".2f") for r in levels),
+            ),
+            ("%e(rho) (22), measured W, as printed", *(number(r.e_rho, ".2f") for r in levels)),
+            ("%e(rho) (22), each run's own W", *(number(r.e_rho_own, ".2f") for r in levels)),
+            (
+                "increase of the norm in % of |Y|, measured W",
+                *(number(r.increase, ".2f") for r in levels),
+            ),
+            (
+                "increase of the norm in % of |Y|, own W",
+                *(number(r.increase_own, ".2f") for r in levels),
+            ),
+            ("verdict of parameters and residual", *(r.verdict for r in levels)),
+            ("verdict of the increase (measured W) alone", *(r.residual_verdict for r in levels)),
+            ("runs for intervals within 1 %", *(str(r.runs_needed) for r in levels)),
+        ]
+        return Table("Residual and verdict", ("reading", *(r.level.label for r in levels)), rows)
+
+    def _repr_html_(self) -> str:
+        return notebook(
+            [f"Resolution study: {self.verdict}"],
+            self.residual_table(),
+            self.mean_table(),
+            self.error_table(),
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """What `to_json` writes, as a mapping."""
+        return {
+            "schema": SCHEMA,
+            "names": self.names,
+            "X_LS": self.reference.X,
+            "relative_sigma_LS": self.reference.relative_sigma,
+            "deciding": self.deciding,
+            "verdict": self.verdict,
+            "levels": [self._level_summary(level) for level in self.levels],
+            "settings": self.settings,
+            "provenance": self.provenance,
+            "notes": self.notes,
+        }
+
+    def _level_summary(self, level: LevelResult) -> dict[str, Any]:
+        """The fields of one level; of many runs, their number stands for them."""
+        shown = {f.name: getattr(level, f.name) for f in fields(level)}
+        runs = list(level.runs) if self.lists_runs else None
+        return {**shown, "runs": runs, "run_count": len(level.runs)}
+
+
+def deciding_names(reference: Estimate) -> tuple[str, ...]:
+    """Names whose %sigma (11) is at most LIMIT.DECIDING."""
+    return tuple(
+        name
+        for name, relative in zip(reference.names, reference.relative_sigma, strict=True)
+        if relative <= LIMIT.DECIDING
+    )
+
+
+def level_result(
+    level: Level, runs: Runs, measured: Observation, reference: Estimate
+) -> LevelResult:
+    """Eqs. (18)-(22) and the verdict of one level; `measured` is the unperturbed system with the
+    columns of the runs.
+    """
+    found = np.isfinite(runs.X).all(axis=1)
+    runs, failed = runs.where(found), int(np.sum(~found))
+    X, N = runs.X, len(runs)
+    if N < 2:
+        raise InputError(
+            f"{reference.method} finds {N} estimates of {N + failed} runs at {level.label}; use "
+            "smaller steps, or another method"
+        )
+    mean, sigma = X.mean(axis=0), X.std(axis=0, ddof=1)
+    norm_Y = float(np.linalg.norm(measured.Y))
+    rho_ls = (
+        reference.residual_norm
+        if reference.method in LINEAR
+        else float(np.linalg.norm(measured.Y - measured.W @ reference.X))
+    )
+    rho = float(np.linalg.norm(measured.Y - measured.W @ mean))
+    own = float(runs.residual_norm.mean())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = 100 * np.abs(1 - mean / reference.X)
+        spread = 100 * sigma / np.abs(reference.X)
+        relative_sigma = 100 * sigma / np.abs(mean)
+    half = float(stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2)) / np.sqrt(N)
+    decisive = [reference.names.index(name) for name in deciding_names(reference)]
+    errors = {reference.names[i]: float(e[i]) for i in decisive} | {
+        "rho": _relative_change(rho, rho_ls)
+    }
+    verdict, decided_by = _verdict(errors)
+    needed = runs_needed(float(spread[decisive].max(initial=0.0)))
+    return LevelResult(
+        level=level,
+        runs=runs,
+        mean=mean,
+        sigma=sigma,
+        relative_sigma=relative_sigma,
+        e=e,
+        half_width=half * sigma,
+        half_width_percent=half * spread,
+        e_rho=errors["rho"],
+        e_rho_own=_relative_change(own, rho_ls),
+        increase=100 * (rho - rho_ls) / norm_Y,
+        increase_own=100 * (own - rho_ls) / norm_Y,
+        verdict=verdict,
+        residual_verdict=_judged(100 * abs(rho - rho_ls) / norm_Y),
+        decided_by=decided_by,
+        runs_needed=needed,
+        message=_message(
+            verdict,
+            decided_by,
+            reference,
+            decisive,
+            N,
+            float(half * spread[decisive].max(initial=0.0)),
+            needed,
+        )
+        + (f" {failed} of {N + failed} runs found no estimate and are left out." if failed else ""),
+    )
+
+
+def runs_needed(spread: float) -> int:
+    """Fewest runs whose Student interval of the mean is narrower than LIMIT.NEGLIGIBLE on either
+    side;
+    spread : 100 sigma / |X_LS|.
+    """
+    return 2 + bisect_left(
+        range(2, LIMIT.RUNS_ANSWERED),
+        True,
+        key=lambda N: bool(
+            stdtrit(N - 1, (1 + LIMIT.STUDENT_PROBABILITY) / 2) * spread / np.sqrt(N)
+            < LIMIT.NEGLIGIBLE
+        ),
+    )
+
+
+def _verdict(errors: Mapping[str, float]) -> tuple[Verdict, dict[str, float]]:
+    """Verdict, and the errors that decided it, largest first; the largest one alone when all are
+    negligible.
+    """
+    ordered = sorted(errors.items(), key=lambda item: -item[1])
+    verdict = _judged(ordered[0][1])
+    if verdict == "unbiased":
+        return verdict, dict(ordered[:1])
+    limit = LIMIT.BIASED if verdict == "biased" else LIMIT.NEGLIGIBLE
+    return verdict, {name: value for name, value in ordered if value >= limit}
+
+
+def _judged(error: float) -> Verdict:
+    """Verdict of one error, in %."""
+    return (
+        "unbiased" if error < LIMIT.NEGLIGIBLE else "biased" if error > LIMIT.BIASED else "doubtful"
+    )
+
+
+def _message(
+    verdict: str,
+    decided_by: Mapping[str, float],
+    reference: Estimate,
+    decisive: Sequence[int],
+    N: int,
+    half: float,
+    needed: int,
+) -> str:
+    named = ", ".join(f"{name} {value:.2f} %" for name, value in decided_by.items())
+    undecided = [name for i, name in enumerate(reference.names) if i not in decisive]
+    text = {
+        "unbiased": (
+            "practically unbiased, all errors of the deciding parameters below "
+            f"{LIMIT.NEGLIGIBLE:g} % (largest: {named})."
+        ),
+        "doubtful": (
+            f"doubtful, errors between {LIMIT.NEGLIGIBLE:g} and {LIMIT.BIASED:g} %: {named}."
+        ),
+        "biased": f"biased, errors above {LIMIT.BIASED:g} %: {named}.",
+    }[verdict]
+    if undecided:
+        text += (
+            f" Not deciding, since their own %sigma exceeds {LIMIT.DECIDING:g} %: "
+            f"{', '.join(undecided)}."
+        )
+    if half >= LIMIT.NEGLIGIBLE:
+        text += (
+            f" {N} runs leave means uncertain by {half:.1f} %; about {needed} runs make that "
+            f"{LIMIT.NEGLIGIBLE:g} %."
+        )
+    return text
+
+
+def _relative_change(norm: float, of: float) -> float:
+    """Eq. (22), in %."""
+    return 100 * abs(1 - norm / of) if of > 0 else float("inf" if norm > 0 else 0.0)

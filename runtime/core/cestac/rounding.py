@@ -1,0 +1,114 @@
+"""Random rounding of a measurement as a coarser sensor would make it, eqs. (15) and (28).
+
+    two-point   x + Delta or x - Delta, probability 1/2 each           variance Delta^2
+            eq. (15)
+    gaussian    x + N(0, Delta^2)                                      variance Delta^2
+            eq. (28)
+    uniform     x + U(-Delta, Delta)                                   variance Delta^2 / 3
+    quantise    the grid point below or above x, step Delta, 1/2 each
+            variance Delta^2 / 3 about a smooth x
+    phase       phi + Delta round((x - phi) / Delta), phi uniform in [0, Delta), one for each column
+            variance Delta^2 / 12
+
+The first three add Delta xi to the measurement, with xi the same for every Delta; the last two
+replace it. `phase` is what a real encoder does: its
+error is a sawtooth along the motion, not white, and its edges say when the position passed a known
+value, which the other laws destroy. Its lines,
+at phi + (k + 1/2) Delta, may be uneven: each is displaced by its own normal number of deviation
+`uneven` Delta; where a whole number of steps makes
+one turn the pattern repeats with every turn. Every draw has its own stream, a Philox generator
+keyed by (seed, level, run): its numbers do not depend
+on who draws, or when.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+
+Array = np.ndarray
+Mode = Literal["two-point", "uniform", "gaussian", "quantise", "phase"]
+
+VARIANCE = {"two-point": 1.0, "gaussian": 1.0, "uniform": 1 / 3, "quantise": 1 / 3, "phase": 1 / 12}
+"""Variance of a mode over Delta^2."""
+ADDED = ("two-point", "gaussian", "uniform")  # Modes that add Delta xi
+
+
+def stream(seed: int, *key: int) -> np.random.Generator:
+    """Random numbers of one draw: the same ones for the same seed and key, independent ones for
+    others.
+    """
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
+
+
+def rounded(
+    x: Array, step: float, mode: Mode, rng: np.random.Generator, uneven: float = 0.0
+) -> Array:
+    """x, shape (N, n) or (N,), as measured with steps of `step` (in the unit of x). uneven :
+    deviation of the lines of mode phase, in steps.
+    """
+    if mode in ADDED:
+        return np.asarray(x + step * noise(x.shape, mode, rng))
+    if mode == "phase":
+        columns = x.reshape(len(x), -1).T
+        phases = step * rng.random(len(columns))
+        return np.stack(
+            [
+                counted(own, step, phi, uneven, rng)
+                for own, phi in zip(columns, phases, strict=True)
+            ],
+            axis=-1,
+        ).reshape(x.shape)
+    cell = x / step
+    below = np.floor(cell)
+    up = (signs(x.shape, rng) > 0) & (cell > below)  # a value on the grid stays there
+    return np.asarray(step * (below + up))
+
+
+def counted(x: Array, step: float, phase: float, uneven: float, rng: np.random.Generator) -> Array:
+    """Positions, shape (N,), that an encoder of these lines shows of x."""
+    cell = (x - phase) / step
+    if not uneven:
+        return np.asarray(phase + step * np.floor(cell + 0.5))
+    first, last = (
+        int(np.floor(cell.min() - LIMIT.LINES_BEYOND)),
+        int(np.ceil(cell.max() + LIMIT.LINES_BEYOND)),
+    )
+    if last - first > LIMIT.UNEVEN_LINES:
+        raise InputError(
+            f"{last - first} lines of {step:.3g} along the motion; uneven lines want at most "
+            f"{LIMIT.UNEVEN_LINES}, use larger steps"
+        )
+    line, turn = np.arange(first, last), 2 * np.pi / step
+    lines = round(turn) if abs(turn - round(turn)) < 1e-6 and round(turn) < len(line) else len(line)
+    edges = np.sort(line + 0.5 + uneven * rng.standard_normal(lines)[line % lines])
+    return np.asarray(phase + step * (first + np.searchsorted(edges, cell, side="right")))
+
+
+def noise(shape: tuple[int, ...], mode: Mode, rng: np.random.Generator) -> Array:
+    """xi of a mode that adds, shape (N, n)."""
+    if mode == "two-point":
+        return signs(shape, rng)
+    return rng.standard_normal(shape) if mode == "gaussian" else rng.uniform(-1.0, 1.0, shape)
+
+
+def signs(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+    """+1.0 or -1.0 with probability 1/2, one random bit each; columns are contiguous, as filters
+    want them.
+    """
+    return np.take([-1.0, 1.0], np.ascontiguousarray(bits(shape, rng).T)).T
+
+
+def bits(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+    """1 or 0 with probability 1/2."""
+    size = int(np.prod(shape))
+    return np.unpackbits(packed_bits(size, rng), count=size).reshape(shape)
+
+
+def packed_bits(size: int, rng: np.random.Generator) -> Array:
+    """`size` random bits, the high ones of a byte first, and one byte more."""
+    return np.frombuffer(rng.bytes(-(-size // 8) + 1), dtype=np.uint8)

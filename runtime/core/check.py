@@ -1,0 +1,93 @@
+"""One question about a record, a study, a robot file or an identification, with its answer.
+
+good       within the limit
+doubtful   usable with the care that the remedy names
+no         not usable
+open       not asked, or only the user can tell: does not count
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, Literal, NamedTuple, ParamSpec
+
+from runtime.core.limits import LIMIT
+
+State = Literal["good", "doubtful", "no", "open"]
+WORST: tuple[State, ...] = ("no", "doubtful", "good")
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question.
+
+    Attributes
+    ----------
+    question : str
+    state : "good", "doubtful", "no" or "open"
+    finding : str
+        The answer, with its numbers.
+    limit : str
+        What a good answer keeps to.
+    remedy : str
+        What to do where the answer is not good.
+    """
+
+    question: str
+    state: State
+    finding: str
+    limit: str = ""
+    remedy: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """Question, finding, and what to do."""
+        remedy = f" {self.remedy[0].upper()}{self.remedy[1:]}." if self.remedy else " "
+        return f"{self.question} {self.finding}.{remedy}"
+
+
+class Answer(NamedTuple):
+    """State and finding of a Check; remedy and limit where they are not those of its Question."""
+
+    state: State
+    finding: str
+    remedy: str | None = None
+    limit: str | None = None
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a function answers, with the limit of a good answer and the remedy of another one: a
+    decorator that makes a Check of its Answer, and None of None.
+    """
+
+    question: str
+    limit: str = ""
+    remedy: str = ""
+
+    def __call__(self, judge: Callable[P, Answer | None]) -> Callable[P, Any]:
+        @wraps(judge)
+        def check(*args: P.args, **options: P.kwargs) -> Check | None:
+            answer = judge(*args, **options)
+            if answer is None:
+                return None
+            limit = self.limit if answer.limit is None else answer.limit
+            remedy = self.remedy if answer.remedy is None else answer.remedy
+            return Check(self.question, answer.state, answer.finding, limit, remedy)
+
+        return check
+
+
+def worst_of(checks: Sequence[Check]) -> Check | None:
+    """The first check of the worst answer; None where all are good, open ones aside."""
+    return next((c for state in WORST[:2] for c in checks if c.state == state), None)
+
+
+def named(names: Sequence[str]) -> str:
+    """The first LIMIT.PARAMETERS_NAMED names, and how many more there are."""
+    more = len(names) - LIMIT.PARAMETERS_NAMED
+    listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])
+    return f"{listed} and {more} more" if more > 0 else listed

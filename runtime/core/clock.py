@@ -1,0 +1,256 @@
+"""The clock of a record: what its time stamps are like, whether they are uniform within the jitter allowed, and at what rate.
+
+Steps are told apart by the period T, the median of the steps that go forward:
+
+    step < 0              time goes back: the clock was set, or a second record follows
+    step = 0              a repeated stamp
+    0 < step <= gap T     jitter, step/T - 1
+    step > gap T          a gap: samples are missing
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.core.errors import InputError, instant
+
+Array = np.ndarray
+
+GAP = 3.0  # periods; a longer step is a gap
+DIGITS = 1e-6  # relative error of stamps as they are written: three periods are no more than that
+LISTED = 3  # places named, of those of one kind
+JITTER = 0.1  # sampling periods that stamps may be off the uniform grid where nothing is said
+RATE_TOLERANCE = 1e-3
+"""Between a stated rate and that of the stamps, beyond what the jitter of the two ends makes."""
+BRIDGED = 0.02  # s
+BRIDGED_PERIODS = 10.0
+"""Gaps up to the longer of the two are bridged: by the bound 5 (w h)^4/384 of `resampled` a spline over 10 ms is right to 2e-3 at 10 Hz."""
+
+
+def sample(i: int) -> str:
+    """The place of sample i, from 0, of arrays."""
+    return f"sample {i + 1}"
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Time stamps of one record and how messages name them.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file or of the record.
+    column : str or None
+        Name of the column; None: the record is made of arrays.
+    row : callable
+        Place of sample i, from 0, in words.
+    rate : float or None
+        Stated rate, Hz.
+    jitter : float
+        Largest deviation from a uniform grid, sampling periods.
+    """
+
+    file: str
+    column: str | None = None
+    row: Callable[[int], str] = sample
+    rate: float | None = None
+    jitter: float = JITTER
+
+
+def rate_of(stamps: Stamps, t: Array) -> float:
+    """Sampling rate, Hz, of the stamps t, shape (N,), s: the stated one where there is one.
+
+    Raises
+    ------
+    InputError
+        Time that goes back or stands, another rate than the stated one, or stamps off the uniform grid; it lists every irregularity and the setting that cures them.
+    """
+    N = len(t)
+    if N < 2:
+        raise InputError(f"{N} samples; a record needs more", file=stamps.file)
+    step = np.diff(t)
+    place: int | None = None
+    if (step <= 0).any():
+        place = int(np.argmax(step <= 0)) + 1
+        message = f"time goes from {instant(t[place - 1])} s to {instant(t[place])} s; expected increasing time"
+    else:
+        rate = (N - 1) / float(t[-1] - t[0])
+        tolerance = RATE_TOLERANCE + 2 * stamps.jitter / (N - 1)
+        off_grid = np.abs(t - t[0] - np.arange(N) / rate).max() * rate
+        if stamps.rate is not None and abs(rate / stamps.rate - 1) > tolerance:
+            message = f"time runs at {rate:g} Hz, record.rate is {stamps.rate:g} Hz; correct one, or the unit of time"
+        elif off_grid > stamps.jitter:
+            place = int(np.argmax(np.abs(step * rate - 1))) + 1
+            message = f"time is not uniform: off the grid by up to {off_grid:.3g} sampling periods, step {step[place - 1]:g} s here, {1 / rate:g} s on average"
+        else:
+            return stamps.rate or rate
+    resample: dict[str, Any] | None = None
+    if (step > 0).any():
+        regularity = time_stamps(t, file=stamps.file)
+        message += f". In all: {regularity.to_text(stamps.row)}"
+        if not regularity.regular or regularity.jitter > stamps.jitter:
+            resample = remedy(regularity)
+            message += f". {remedy_text(t, regularity, arrays=stamps.column is None)}"
+    raise InputError(
+        message,
+        file=stamps.file,
+        column=stamps.column,
+        row=None if place is None else stamps.row(place),
+        remedy=None if resample is None or stamps.column is None else {"resample": resample},
+    )
+
+
+def remedy(stamps: TimeStamps) -> dict[str, Any]:
+    """The settings `record.resample` that fit such a clock: short gaps are bridged, the record is split at long ones."""
+    periods = [gap.step / stamps.period for gap in stamps.gaps]
+    most = max(BRIDGED / stamps.period, BRIDGED_PERIODS)
+    short = [gap for gap in periods if gap <= most]
+    settings: dict[str, Any] = {}
+    if stamps.resets or len(short) < len(periods):
+        settings["gaps"] = "split"
+    if short:
+        settings["longest"] = int(np.ceil(max(short) + 0.5))
+    return settings
+
+
+def remedy_text(t: Array, stamps: TimeStamps, *, arrays: bool = False) -> str:
+    """Sentences: the rate that the samples have beside that of the period, the remedy that fits, and that for samples that are uniform though their stamps are not; arrays : the record is made of arrays, and the remedy is a call."""
+    settings = remedy(stamps)
+    step = np.diff(t)
+    taken = step[(step > 0) & (step <= max(BRIDGED, BRIDGED_PERIODS * stamps.period))]
+    rate = len(taken) / float(taken.sum())
+    count = f"{len(taken) + 1} samples in {taken.sum():.6g} s, pauses aside, are {rate:.6g} Hz, 1/median step is {1 / stamps.period:.6g} Hz. Remedy:"
+    if arrays and "gaps" in settings:
+        return f"{count} one Record for each piece"
+    if arrays:
+        bridging = f", longest={settings['longest']:g}" if settings else ""
+        return f"{count} runtime.resample(t, q{bridging}), and so for tau"
+    does = []
+    if "gaps" in settings:
+        does.append("makes a record of each piece between gaps")
+    if "longest" in settings:
+        does.append(f"bridges gaps of up to {settings['longest']:g} periods by interpolation")
+    written = ", ".join(f"{key}: {value}" for key, value in settings.items())
+    uniform = "{gaps: split, method: count}" if "gaps" in settings else "{method: count}"
+    return f"{count} record.resample: {{{written}}} {' and '.join(does) or 'interpolates at the stamps'}. Where samples are uniform and their stamps alone are not: record.resample: {uniform}, or record.rate: {rate:.6g} without columns.t"
+
+
+@dataclass(frozen=True)
+class Irregular:
+    """A step that is no jitter.
+
+    Attributes
+    ----------
+    sample : int
+        Number, from 0, of the sample in which it ends.
+    before, after : float, s
+        Time ahead of it and behind.
+    """
+
+    sample: int
+    before: float
+    after: float
+
+    @property
+    def step(self) -> float:
+        """Length, s."""
+        return self.after - self.before
+
+
+@dataclass(frozen=True)
+class TimeStamps:
+    """Regularity of N time stamps.
+
+    Attributes
+    ----------
+    samples : int
+        N.
+    period : float, s
+        T.
+    jitter, jitter_rms : float, periods
+        Largest and rms deviation of the regular steps from T.
+    gaps, resets, repeats : tuple of Irregular
+        The other steps, in time.
+    longest : float, s
+        A longer step is a gap.
+    """
+
+    samples: int
+    period: float
+    jitter: float
+    jitter_rms: float
+    gaps: tuple[Irregular, ...]
+    resets: tuple[Irregular, ...]
+    repeats: tuple[Irregular, ...]
+    longest: float
+
+    @property
+    def regular(self) -> bool:
+        """Whether every step is one period, jitter aside."""
+        return not (self.gaps or self.resets or self.repeats)
+
+    def to_text(self, row: Callable[[int], str] = lambda i: f"sample {i + 1}") -> str:
+        """One sentence; row : how the file counts sample i, from 0."""
+        parts = [
+            (
+                f"{self.samples} samples, median step {self.period:.6g} s, jitter up to "
+                f"{100 * self.jitter:.2g} % ({100 * self.jitter_rms:.2g} % rms)"
+            )
+        ]
+        for found, kind in (
+            (self.gaps, "gap"),
+            (self.resets, "step back"),
+            (self.repeats, "repeated stamp"),
+        ):
+            if found:
+                largest = sorted(found, key=lambda s: -abs(s.step))[:LISTED]
+                places = ", ".join(
+                    f"{row(s.sample)} (t = {s.before:.6g} s"
+                    + (f", {s.step:.6g} s" if s.step else "")
+                    + (f", {s.step / self.period:.0f} periods)" if s.step > 0 else ")")
+                    for s in largest
+                )
+                parts.append(
+                    f"{times(len(found), kind)}{', the largest' if len(found) > LISTED else ''} "
+                    f"at {places}"
+                )
+        return "; ".join(parts)
+
+
+def times(number: int, kind: str) -> str:
+    """1 gap, 2 steps back."""
+    several = "steps back" if kind == "step back" else f"{kind}s"
+    return f"{number} {kind if number == 1 else several}"
+
+
+def time_stamps(t: Array, *, gap: float = GAP, file: str = "record") -> TimeStamps:
+    """What the stamps t, shape (N,), s, are like."""
+    step = np.diff(t)
+    forward = step[step > 0]
+    if not len(forward):
+        raise InputError("time never goes forward; expected increasing time", file=file)
+    period = float(np.median(forward))
+    rounding = (gap + 2) * np.spacing(np.abs(t).max())  # of the step and of the median
+    longest = gap * period * (1 + DIGITS) + rounding
+    regular = forward[forward <= longest]
+    off = regular / period - 1
+
+    def those(mask: Array) -> tuple[Irregular, ...]:
+        return tuple(
+            Irregular(int(i) + 1, float(t[i]), float(t[i + 1])) for i in np.flatnonzero(mask)
+        )
+
+    return TimeStamps(
+        len(t),
+        period,
+        float(np.abs(off).max()),
+        float(np.sqrt(np.mean(off**2))),
+        those(step > longest),
+        those(step < 0),
+        those(step == 0),
+        longest,
+    )

@@ -1,0 +1,196 @@
+"""Essential parameters: the few that carry the model (chapter 4.1.1).
+
+The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as
+sigma_rho, eq. (9), stays below threshold times its
+first value. Removing column k deletes a column of the triangular factor and makes its trailing
+block triangular again; W is not touched. The
+same trail, followed to its end, gives the count for every other threshold. With weights, the
+weights of the first fit stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.core.documents import Result
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import System, assemble, standard_deviations
+from runtime.core.least_squares.method import linear_system
+from runtime.core.model import GeneratedModel
+from runtime.core.rows.observation import Observation
+from runtime.core.study import EssentialSettings, EstimateSettings
+from runtime.core.table import aligned
+
+THRESHOLDS = (1.02, 1.03, 1.04, 1.05, 1.06, 1.07, 1.08, 1.09, 1.10)
+"""Thresholds whose counts are reported beside the one used."""
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One step of the trail.
+
+    Attributes
+    ----------
+    name : str
+        Parameter of the largest %sigma.
+    relative_sigma : float, %
+        Its %sigma.
+    ratio : float
+        sigma_rho without it over the first sigma_rho.
+    removed : bool
+        Whether it was removed.
+    """
+
+    name: str
+    relative_sigma: float
+    ratio: float
+    removed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Essential(Result):
+    """The essential parameters, and the trail that leads to them.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters kept, in column order.
+    estimate : Estimate
+        Fit with these alone.
+    all_parameters : Estimate
+        The first fit.
+    trail : tuple of Removal
+        The steps; the last one is the first refused, or the last parameter.
+    threshold : float
+        Largest ratio of sigma_rho to its first value.
+    counts : mapping of float to int
+        Number of parameters kept, by threshold.
+    further : tuple of Removal
+        The next steps, up to the largest threshold.
+    """
+
+    names: tuple[str, ...]
+    estimate: Estimate
+    all_parameters: Estimate
+    trail: tuple[Removal, ...]
+    threshold: float
+    counts: Mapping[float, int]
+    further: tuple[Removal, ...] = ()
+
+    @property
+    def removed(self) -> tuple[str, ...]:
+        """Names removed, in order."""
+        return tuple(step.name for step in self.trail if step.removed)
+
+    def to_table(self) -> str:
+        """The trail, then the counts by threshold."""
+        first = len(self.all_parameters.names)
+        lines: list[Sequence[str]] = [("removed", "left", "%sigma", "sigma_rho ratio")]
+        for k, step in enumerate(self.trail):
+            name = step.name if step.removed else f"{step.name} (kept)"
+            lines.append(
+                (
+                    name,
+                    str(first - k - step.removed),
+                    f"{step.relative_sigma:.3f}",
+                    f"{step.ratio:.5f}",
+                )
+            )
+        counts = ", ".join(f"{threshold:.2f}: {count}" for threshold, count in self.counts.items())
+        return (
+            f"{len(self.names)} of {first} parameters at threshold "
+            f"{self.threshold}\n\n{aligned(lines)}\n\nparameters kept by threshold  {counts}"
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """What `to_json` writes, as a mapping."""
+        return {
+            "schema": 1,
+            "names": self.names,
+            "threshold": self.threshold,
+            "trail": self.trail,
+            "further": self.further,
+            "counts": {f"{k:g}": v for k, v in self.counts.items()},
+        }
+
+
+def essential_of(
+    observation: Observation,
+    settings: EssentialSettings | None = None,
+    estimate: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Essential:
+    """Essential parameters of an observation.
+
+    Parameters
+    ----------
+    observation : Observation
+        Y = W X + rho.
+    settings : EssentialSettings, optional
+        Threshold on sigma_rho.
+    estimate : EstimateSettings, optional
+        A method that is one linear system.
+    model : GeneratedModel, optional
+        Gives units, joint numbers and the hash of the robot file.
+    provenance : mapping, optional
+        Further entries for Estimate.provenance.
+    """
+    settings = settings or EssentialSettings()
+    system = linear_system(observation, estimate or EstimateSettings())
+    wanted = sorted({*THRESHOLDS, settings.threshold})
+    steps = _trail(system, wanted[-1])
+    removed = {threshold: _accepted(steps, threshold) for threshold in wanted}
+    accepted = removed[settings.threshold]
+    trail = tuple(replace(step, removed=k < accepted) for k, step in enumerate(steps))
+    gone = {step.name for step in trail if step.removed}
+    kept = tuple(name for name in system.names if name not in gone)
+    reduced = system.select(kept)
+    return Essential(
+        names=kept,
+        estimate=assemble(reduced, reduced.solve(), model=model, provenance=provenance),
+        all_parameters=assemble(system, system.solve(), model=model, provenance=provenance),
+        trail=trail[: accepted + 1],
+        threshold=settings.threshold,
+        counts={threshold: len(system.names) - count for threshold, count in removed.items()},
+        further=trail[accepted + 1 :],
+    )
+
+
+def _accepted(steps: Sequence[Removal], threshold: float) -> int:
+    """Removals before the first whose ratio reaches the threshold."""
+    return next((k for k, step in enumerate(steps) if not step.ratio < threshold), len(steps))
+
+
+def _trail(system: System, threshold: float) -> list[Removal]:
+    """%sigma before a parameter goes, sigma_rho ratio after, until the ratio reaches `threshold` or
+    one parameter is left.
+    """
+    steps: list[Removal] = []
+    fit = system.solve()
+    first, C = standard_deviations(system, fit)
+    while len(system.names) > 1 and np.isfinite(first):
+        relative = _relative(C, fit.X)
+        worst = system.names[int(np.argmax(relative))]
+        system = system.drop(worst)
+        fit = system.solve()
+        sigma_rho, C = standard_deviations(system, fit)
+        ratio = sigma_rho / first if first > 0 else (1.0 if sigma_rho == 0 else np.inf)
+        steps.append(Removal(worst, float(relative.max()), float(ratio), False))
+        if ratio >= threshold:
+            break
+    return steps
+
+
+def _relative(C: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """%sigma, shape (b,); inf where the record does not determine the parameter, which therefore
+    goes first.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = 100 * np.sqrt(np.diag(C)) / np.abs(X)
+    return np.where(np.isnan(relative), np.inf, relative)

@@ -1,0 +1,170 @@
+"""Fits of all rows: all parameters, the essential ones, the nested sets; and what each predicts of
+rows that did not give it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from runtime.agreement import Homogeneity, homogeneity
+from runtime.core.errors import InputError
+from runtime.core.essential import Essential, essential_of
+from runtime.core.estimation import estimated
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import LINEAR, linear_companion
+from runtime.core.parameter_sets import (
+    SetName,
+    best_set,
+    held_out_validation,
+    least_squares_sets,
+    physical_asked,
+    physical_possible,
+    physical_set,
+)
+from runtime.core.problem import Problem
+from runtime.core.progress import at
+from runtime.core.rows.observation import Observation, halves
+from runtime.core.study import EstimateSettings, Study
+from runtime.core.validation import CrossValidation, cross_validation, split_validation
+
+
+@dataclass(frozen=True)
+class Fits:
+    """Fits of all rows.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        All parameters, by the method of the study.
+    reduced : Essential
+        By its linear companion.
+    sets : mapping of str to Estimate
+        The nested sets, the feasible one where it was asked; empty where the method is not linear.
+    settings : mapping of str to EstimateSettings
+        Settings that give each set from parts of the rows.
+    """
+
+    estimate: Estimate
+    reduced: Essential
+    sets: Mapping[SetName, Estimate]
+    settings: Mapping[Any, EstimateSettings]
+
+    def best(self, validation: Sequence[CrossValidation], study: Study) -> Estimate:
+        """The estimate that stands for the robot."""
+        errors = validation[-1].errors() if validation and self.sets else {}
+        return self.sets.get(best_set(errors, study.essential.first), self.estimate)
+
+
+def fitted(problem: Problem, observation: Observation, provenance: Mapping[str, Any]) -> Fits:
+    """All parameters and the essential ones."""
+    study, model = problem.settings, problem.model
+    at("least squares, essential parameters")
+    reduced = essential_of(
+        observation,
+        study.essential,
+        linear_companion(study.estimate),
+        model=model,
+        provenance=provenance,
+    )
+    if study.estimate.method in LINEAR:
+        return Fits(reduced.all_parameters, reduced, *least_squares_sets(study.estimate, reduced))
+    at(study.estimate.method)
+    essential = replace(study.estimate, columns=reduced.names)
+    return Fits(
+        estimated(problem, observation, provenance=provenance),
+        reduced,
+        {},
+        {"all": study.estimate, "essential": essential},
+    )
+
+
+def validated(
+    problem: Problem,
+    fits: Fits,
+    observation: Observation,
+    unseen: Mapping[str, Observation],
+    name: str,
+) -> tuple[Fits, tuple[CrossValidation, ...], tuple[str, ...]]:
+    """Windows of the records of that `name` against each other, or fifths of them where halves
+    prefer all parameters to physical ones, then further records, `unseen`; the fits, with the
+    feasible set where it may stand for the robot; and what could not be done. Nothing is validated
+    where the method did not end well, since each validation would simulate a wrong loop once more.
+    """
+    study = problem.settings
+    method, status = study.estimate.method, fits.estimate.status
+    if status != "ok" and method not in LINEAR:
+        return fits, (), (f"validation: {method} ended with status {status}",)
+    at("validation")
+    predict = partial(_validation, problem, observation, unseen, name)
+    validation, missing = predict(fits.settings, fits.sets or {"all": fits.estimate})
+    errors = validation[-1].errors() if validation else {}
+    linear = method in LINEAR
+    possible = linear and physical_possible(observation, study.estimate, fits.estimate)
+    if possible and physical_asked(errors, study.essential.first):
+        try:
+            fit, settings = physical_set(problem, observation)
+        except InputError as e:
+            return fits, validation, (f"physical parameters: {e}", *missing)
+        if fit.status != "ok":
+            reason = f"physical parameters: {fit.status}. {fit.message.split('. ')[0]}"
+            return fits, validation, (reason, *missing)
+        sets, choices = {**fits.sets, "feasible": fit}, {**fits.settings, "feasible": settings}
+        fits = replace(fits, sets=sets, settings=choices)
+        physical, more = predict({"feasible": settings}, {"feasible": fit})
+        validation = tuple(map(CrossValidation.beside, validation, physical))
+        missing = tuple(dict.fromkeys((*missing, *more)))
+    halved = not unseen and not study.validate.split and "feasible" in fits.sets
+    if halved and validation and best_set(validation[0].errors()) == "all":
+        by_fifths = held_out_validation(problem, observation, fits.settings)
+        validation, missing = (by_fifths,), by_fifths.missing
+    return fits, validation, missing
+
+
+def _validation(
+    problem: Problem,
+    observation: Observation,
+    unseen: Mapping[str, Observation],
+    name: str,
+    choices: Mapping[Any, EstimateSettings],
+    known: Mapping[Any, Estimate],
+) -> tuple[tuple[CrossValidation, ...], tuple[str, ...]]:
+    """The sets `choices` between windows of the records, then those `known` of all rows on further
+    records; and what could not be done.
+    """
+    validation, missing = [], []
+    try:
+        windows = problem.settings.validate.split or halves(*observation.span)
+        validation.append(split_validation(problem, observation, windows, choices))
+    except InputError as e:
+        missing.append(f"validation between windows of the record: {e}")
+    if unseen:
+        validation.append(
+            cross_validation(
+                problem, observation, unseen, choices, name=name, fitted=known, further=True
+            )
+        )
+    missing += [text for part in validation for text in part.missing]
+    return tuple(validation), tuple(missing)
+
+
+def agreement(
+    problem: Problem,
+    fits: Fits,
+    observation: Observation,
+    fitted_names: Sequence[str],
+    unseen: Mapping[str, Observation],
+) -> Homogeneity | None:
+    """Whether several records agree: in all parameters, or in the essential ones where one of the
+    records does not determine all. None for one record.
+    """
+    if len(fitted_names) + len(unseen) < 2:
+        return None
+    settings, model = problem.settings.estimate, problem.model
+    parts = {name: observation.of_record(k) for k, name in enumerate(fitted_names)} | dict(unseen)
+    in_all = homogeneity(parts, fits.reduced.all_parameters.names, settings, model=model)
+    if not in_all.untested:
+        return in_all
+    return homogeneity(parts, fits.reduced.names, settings, model=model)

@@ -1,0 +1,288 @@
+"""What every estimator returns: parameters, their deviations and the quality of the fit.
+
+Equation numbers are those of the chapter (Experimental identification of the inverse dynamic model:
+minimal encoder resolution):
+
+    X        (7)     sigma_rho  (9)  = ||Y - W X|| / sqrt(r - b)
+    sigma    (10)    = square roots of the diagonal of C = sigma_rho^2 (W'W)^-1
+    %sigma   (11)    = 100 sigma / |X|
+
+Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it:
+blocks of time are taken as
+independent instead of samples (`runtime.core.least_squares.block_covariance`). What a record does not
+determine is nan in memory and null in JSON.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.core.documents import json_text
+from runtime.core.markup import number
+from runtime.core.table import Table, notebook
+from runtime.json_files import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, read_text
+from runtime.reporting.latex import parameter_table
+
+Array = np.ndarray
+
+SCHEMA = "symgen-estimate/1"
+"""Kind and version of the JSON layout; `symgen schema --of estimate` prints its JSON Schema."""
+
+
+Status = Literal[
+    "ok",
+    "rank-deficient",
+    "no-redundancy",
+    "singular-weights",
+    "ill-posed",
+    "not-converged",
+    "weak-instruments",
+    "simulation-apart",
+]
+"""Outcome of an estimator; the message of the Estimate explains."""
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Fit of the rows of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    rows : int
+        Rows of the joint in W.
+    residual_norm : float, N m or N
+        ||Y_j - W_j X||.
+    relative_error : float, %
+        100 ||Y_j - W_j X|| / ||Y_j||.
+    sigma_rho : float
+        ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
+    scale : float, N m or N
+        s_j by which the rows were divided; 1 without weights.
+    """
+
+    joint: str
+    rows: Whole
+    residual_norm: NanIfNull
+    relative_error: NanIfNull
+    sigma_rho: NanIfNull
+    scale: NanIfNull = 1.0
+
+    @property
+    def is_axis(self) -> bool:
+        """Whether it is an axis of a force sensor (`runtime.wrench`), no joint."""
+        return not self.joint[:1].isdigit()
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters of a robot, their uncertainty and the quality of the fit.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Parameters in column order; b of them.
+    X : ndarray, shape (b,), SI
+        Values.
+    sigma : ndarray, shape (b,), SI
+        Standard deviations, eq. (10); nan for a parameter that the record does not determine.
+    covariance : ndarray, shape (b, b), SI
+        Covariance of X, eq. (10).
+    sigma_corrected : ndarray, shape (b,), SI
+        Standard deviations without the assumption of independent residuals.
+    sigma_rho : float, N m or N
+        Eq. (9) of the system that was solved; with weights near 1 and without unit.
+    cond : float
+        Condition number of that W; inf where it is rank-deficient.
+    cond_unit : float
+        The same with columns of norm 1.
+    rank : int
+        Numerical rank with columns of norm 1.
+    residual_norm : float, N m or N
+        ||Y - W X||, without weights.
+    relative_error : float, %
+        100 ||Y - W X|| / ||Y||, without weights.
+    per_joint : tuple of JointFit
+        Fit by joint.
+    method : str
+        Estimator.
+    status : str
+        Outcome; no-redundancy: no more rows than parameters.
+    message : str
+        Explanation of the outcome.
+    groups : tuple of tuple of str
+        For rank-deficient: the names that cannot be told apart, group by group.
+    iterations : int
+        Number of passes.
+    settings : mapping
+        Settings of the study, complete.
+    provenance : mapping
+        Hashes, versions and seed that reproduce the result.
+    units : mapping of str
+        Units by name, such as kg*m**2.
+    details : mapping
+        Further results of the method, by name; of feasible: standard parameters, eigenvalues, the
+        result of least squares alone.
+    """
+
+    names: tuple[str, ...]
+    X: Vector
+    sigma: Vector
+    covariance: Matrix
+    sigma_corrected: Vector
+    sigma_rho: NanIfNull
+    cond: InfIfNull
+    cond_unit: InfIfNull
+    rank: Whole
+    residual_norm: NanIfNull
+    relative_error: NanIfNull
+    per_joint: tuple[JointFit, ...]
+    method: str
+    status: Status = "ok"
+    message: str = ""
+    groups: tuple[tuple[str, ...], ...] = ()
+    iterations: Whole = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        b = len(self.names)
+        for name, shape in (
+            ("X", (b,)),
+            ("sigma", (b,)),
+            ("sigma_corrected", (b,)),
+            ("covariance", (b, b)),
+        ):
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape:
+                raise ValueError(f"{name} has shape {array.shape}; {b} names ask for {shape}")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def relative_sigma(self) -> Vector:
+        """%sigma of eq. (11), shape (b,), in %; inf for a parameter estimated as exactly zero."""
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return np.asarray(100 * self.sigma / np.abs(self.X))
+
+    @property
+    def rows(self) -> Whole:
+        """Number of rows r of W."""
+        return sum(fit.rows for fit in self.per_joint)
+
+    @property
+    def worst_joint(self) -> JointFit:
+        """The joint with the largest relative error, of those that have rows; an axis of a force
+        sensor, which may measure its noise alone, where there are no joints.
+        """
+        return max(
+            self.per_joint, key=lambda fit: (fit.rows > 0, not fit.is_axis, fit.relative_error)
+        )
+
+    def __getitem__(self, name: str) -> float:
+        """Value of one parameter."""
+        return float(self.X[self.names.index(name)])
+
+    def __str__(self) -> str:
+        return self.to_table()
+
+    def _repr_html_(self) -> str:
+        return notebook([*self._head(), *([self.message] if self.message else [])], *self.tables())
+
+    def _repr_latex_(self) -> str:
+        return self.to_latex()
+
+    def to_json(self) -> str:
+        """JSON text of every field (design: estimate.json); numbers that do not exist are null."""
+        computed = {"relative_sigma": self.relative_sigma, "rows": self.rows}
+        return json_text({"schema": SCHEMA, **vars(self), **computed})
+
+    @classmethod
+    def from_json(cls, text: str, *, file: str = "estimate.json") -> Estimate:
+        """The Estimate that `to_json` wrote, every number to the bit; what stands beside it
+        (estimate.json of `symgen identify`) is left out.
+
+        Raises InputError where the text is no JSON, of another schema or incomplete; `file` is the
+        name it gives.
+        """
+        return from_text(cls, text, SCHEMA, file)
+
+    def to_table(self) -> str:
+        """Plain text: one line per parameter, one per joint."""
+        parameters, joints = self.tables()
+        note = ["", self.message] if self.message else []
+        return "\n".join([*self._head(), "", parameters.to_text(), "", joints.to_text(), *note])
+
+    def tables(self) -> tuple[Table, Table]:
+        """Parameters, then joints, line by line."""
+        parameters = [
+            (
+                name,
+                f"{self.X[i]:.6g}",
+                number(self.sigma[i], ".3g"),
+                number(self.relative_sigma[i], ".3f"),
+                number(self.sigma_corrected[i], ".3g"),
+                self.units.get(name, ""),
+            )
+            for i, name in enumerate(self.names)
+        ]
+        joints = [
+            (
+                fit.joint,
+                str(fit.rows),
+                f"{fit.residual_norm:.6g}",
+                number(fit.relative_error, ".3f"),
+                number(fit.sigma_rho, ".4g"),
+                f"{fit.scale:.4g}",
+            )
+            for fit in self.per_joint
+        ]
+        return (
+            Table(
+                "parameters",
+                ("parameter", "value", "sigma", "%sigma", "corrected", "unit"),
+                parameters,
+                symbols=True,
+            ),
+            Table(
+                "joints",
+                ("joint", "rows", "residual norm", "relative error %", "sigma_rho", "scale"),
+                joints,
+            ),
+        )
+
+    def _head(self) -> tuple[str, str]:
+        return (
+            (
+                f"{self.method}: {self.rows} rows, {len(self.names)} parameters, rank {self.rank}, "
+                f"status {self.status}"
+            ),
+            f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho "
+            f"{self.sigma_rho:.4g}, "
+            f"residual norm {self.residual_norm:.6g}, relative error {self.relative_error:.3f} %",
+        )
+
+    def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:
+        """LaTeX tabular (booktabs) as the chapter's Table 2; `names` restricts and orders its
+        lines, `blocks` stand side by side.
+        """
+        shown = self.names if names is None else tuple(names)
+        place = [self.names.index(name) for name in shown]
+        return parameter_table(
+            shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks
+        )
+
+
+def load_estimate(path: Path | str) -> Estimate:
+    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as
+    `Estimate.from_json`.
+    """
+    return from_text(Estimate, read_text(path), SCHEMA, str(path))

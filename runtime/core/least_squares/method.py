@@ -1,0 +1,183 @@
+"""What a method of estimation is: its options, the rows it starts from, and its fit.
+
+    start = rows(observation, settings, options)     least squares, solved once for every method
+    fitted = fit(start)                              what the method makes of it; None: nothing more
+
+A new method is a file with a function `fit` and a line in METHODS (`runtime.compose`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.estimate import Estimate, Status
+from runtime.core.least_squares.linear import LinearOptions, System, assemble, ordinary
+from runtime.core.least_squares.solution import Solution
+from runtime.core.least_squares.wls import weighted
+from runtime.core.model import GeneratedModel
+from runtime.core.rows.factor import Array
+from runtime.core.rows.observation import Observation
+from runtime.core.settings import Settings, require, structure
+from runtime.core.study import EstimateSettings
+
+OPTIONS = ("estimate", "options")
+WEIGHTINGS = ("none", "joint", "iterated", "covariance")
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """What a method is given.
+
+    Attributes
+    ----------
+    observation : Observation
+        Rows held, with the columns asked for alone.
+    settings : EstimateSettings
+    options : Settings
+        Those of the method, checked.
+    system : System
+        The rows as least squares weighs them.
+    solution : Solution
+        Of that system.
+    model : GeneratedModel or None
+    """
+
+    observation: Observation
+    settings: EstimateSettings
+    options: Any
+    system: System
+    solution: Solution
+    model: GeneratedModel | None
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What a method gives.
+
+    Attributes
+    ----------
+    system : System
+        Rows as the method weighs them in the end.
+    solution : Solution
+        With the X of the method.
+    covariance : ndarray, shape (b, b), or None
+        Of X; default: eq. (10) of `system`.
+    corrected : ndarray, shape (b,), or None
+        Deviations without the assumption of independent residuals; default: those of `system`.
+    status, message : str
+        Outcome, where the rows are good.
+    details : mapping
+    """
+
+    system: System
+    solution: Solution
+    covariance: Array | None = None
+    corrected: Array | None = None
+    status: Status = "ok"
+    message: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method of estimation.
+
+    Attributes
+    ----------
+    options : type
+        Settings class of estimate.options.
+    rows : callable
+        The weighted rows of the least squares that it starts from.
+    fit : callable or None
+        What it makes of them; None: it is these least squares, which need no single row.
+    weights : tuple of str
+        Weights that it takes.
+    observe : callable or None
+        Makes the rows of a problem, of a method that needs rows of its own, as one that simulates the closed loop of the records; None: those of the measured positions.
+    brief : mapping
+        Options under which resampled records and explanations are left out.
+    any_rank : bool
+        Whether it has an answer where the rows do not determine all parameters.
+    """
+
+    options: type[Settings]
+    rows: Callable[[Observation, EstimateSettings, LinearOptions], System]
+    fit: Callable[[Beginning], Fitted] | None = None
+    weights: tuple[str, ...] = WEIGHTINGS
+    observe: Callable[[Any], Observation] | None = None
+    brief: Mapping[str, Any] = field(default_factory=dict)
+    any_rank: bool = False
+
+    def checked(self, settings: EstimateSettings) -> Any:
+        """The options of the settings; SettingsError where they or the weights do not suit."""
+        message = (
+            f"{settings.weights!r} with method {settings.method}; expected "
+            f"{' or '.join(self.weights)}: it has its own weights or none, others belong to "
+            "method wls"
+        )
+        require(settings.weights in self.weights, message, "estimate", "weights")
+        return structure(self.options, settings.options, OPTIONS)
+
+    def system(self, observation: Observation, settings: EstimateSettings) -> System:
+        """The rows of the least squares that the method starts from."""
+        options = self.checked(settings)
+        if not isinstance(options, LinearOptions):
+            given = getattr(options, "linear", {})
+            options = structure(LinearOptions, given, (*OPTIONS, "linear"))
+        return self.rows(observation, settings, options)
+
+
+LINEAR: Mapping[str, Method] = {
+    "ols": Method(LinearOptions, ordinary, weights=("none",)),  # ordinary least squares
+    "wls": Method(LinearOptions, weighted),  # least squares weighted by joint
+}
+"""Methods that are one least-squares problem in the rows of the observation."""
+
+
+def linear_system(observation: Observation, settings: EstimateSettings) -> System:
+    """The factored rows as the method of `settings` weighs them; SettingsError for a method that is
+    not one linear system.
+    """
+    if settings.method not in LINEAR:
+        message = f"{settings.method!r} is not one linear system; expected {' or '.join(LINEAR)}"
+        raise SettingsError(message, path=("estimate", "method"))
+    return LINEAR[settings.method].system(observation, settings)
+
+
+def linear_companion(settings: EstimateSettings) -> EstimateSettings:
+    """The settings themselves where their method is one linear system; else least squares with the
+    same weights and columns.
+
+    Essential parameters and weak directions of such a method are those of its companion.
+    """
+    if settings.method in LINEAR:
+        return settings
+    return EstimateSettings(
+        "ols" if settings.weights == "none" else "wls", settings.weights, settings.columns
+    )
+
+
+def linear_estimate(
+    observation: Observation,
+    settings: EstimateSettings | None = None,
+    *,
+    model: GeneratedModel | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """Parameters of Y = W X + rho by one linear system; SettingsError for another method.
+
+    Parameters
+    ----------
+    observation : Observation
+    settings : EstimateSettings, optional
+        Method, weights, columns, options; default: ols.
+    model : GeneratedModel, optional
+        Gives units, joint numbers and the hash of the robot file.
+    provenance : mapping, optional
+        Further entries for Estimate.provenance.
+    """
+    system = linear_system(observation, settings or EstimateSettings())
+    return assemble(system, system.solve(), model=model, provenance=provenance)

@@ -1,0 +1,143 @@
+"""Least squares weighted by joint: rows of joint j divided by s_j, the deviation of its residuals
+in N m.
+
+    X = argmin sum_j ||Y_j - W_j X||^2 / s_j^2,    C = (sum_j W_j'W_j / s_j^2)^-1
+
+`weights` says where s_j comes from:
+
+    joint       (default) s_j^2 = ||Y_j - W_j X_j||^2 / (N_j - b_j), X_j the least squares of joint
+                j alone, b_j = rank W_j. Exactly invariant
+                under scaling of Y and W of one joint.
+    iterated    s_j^2 = ||Y_j - W_j X||^2 / (N_j (1 - b/r)) from the common solution, repeated until
+                every s_j changes by less than 1e-3.
+    covariance  residuals E, shape (n, N), of ordinary least squares; Omega = E E'/(N - b/n); the n
+    rows of one instant times L^-1, L L' = Omega.
+
+The chapter leaves weights open; Gautier (1997) and BIRDy use the first and the last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
+
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.estimate import Status
+from runtime.core.least_squares.linear import LinearOptions, System, ordinary
+from runtime.core.least_squares.solution import joint_scatter, solve
+from runtime.core.limits import LIMIT
+from runtime.core.rows.factor import Factor, factor
+from runtime.core.rows.observation import Observation, whitened
+from runtime.core.study import EstimateSettings
+
+
+def weighted(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """The rows weighted as `settings.weights` asks; "none" means "joint", as the method has been
+    named.
+
+    s_j comes from joint j alone; from the common ordinary least squares where joint j has too few
+    rows. Never zero.
+    """
+    system = ordinary(observation, settings, options)
+    raw, fit = system.raw, system.solve()
+    own = joint_scatter(raw, options.rank_tolerance)  # nan where a joint has too few rows
+    scales = floored(raw, np.where(np.isnan(own), common_scales(raw, fit.X, fit.rank), own))
+    start = replace(
+        system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known_variance=True
+    )
+    if settings.weights == "covariance":
+        return _covariance(start)
+    return _iterated(start) if settings.weights == "iterated" else start
+
+
+def by_weights(
+    observation: Observation, settings: EstimateSettings, options: LinearOptions
+) -> System:
+    """The rows as `settings.weights` asks, as they are for "none"."""
+    rows = ordinary if settings.weights == "none" else weighted
+    return rows(observation, settings, options)
+
+
+def common_scales(raw: Factor, X: np.ndarray, rank: int) -> np.ndarray:
+    """s_j, shape (n,), of the residuals of X: each joint carries its share b N_j/r of the lost
+    degrees of freedom.
+    """
+    share = max(1 - rank / raw.rows, 1 / raw.rows)
+    return np.array(
+        [joint.residual_norm(X) / np.sqrt(max(joint.rows, 1) * share) for joint in raw.joints]
+    )
+
+
+def floored(raw: Factor, scales: np.ndarray) -> np.ndarray:
+    """Scales not below LIMIT.EXACT_FIT times the rms of Y_j: an exact fit of a joint must not weigh
+    infinitely.
+    """
+    rounding = [
+        LIMIT.EXACT_FIT * joint.measured_norm / np.sqrt(max(joint.rows, 1)) for joint in raw.joints
+    ]
+    least = np.maximum(scales, rounding)
+    smallest = least[least > 0].min(initial=np.inf)
+    return np.where(least > 0, least, smallest if np.isfinite(smallest) else 1.0)
+
+
+def _iterated(start: System) -> System:
+    raw, tolerance = start.raw, start.options.rank_tolerance
+    limit = start.options.passes
+    scales, change, done, rank = np.array(start.scales), np.inf, 0, solve(raw, tolerance).rank
+    while change >= LIMIT.WLS_CONVERGED and done < limit:
+        new = floored(raw, common_scales(raw, solve(raw.weighted(1 / scales), tolerance).X, rank))
+        change = float(np.max(np.abs(new / scales - 1)))
+        scales, done = new, done + 1
+    status: Status = "ok"
+    message = ""
+    if change >= LIMIT.WLS_CONVERGED:
+        status = "not-converged"
+        message = (
+            f"The weights of the joints still change by {change:.1e} after {limit} passes (limit "
+            f"{LIMIT.WLS_CONVERGED}). "
+            "Raise estimate.options.passes, or use weights: joint, which needs none."
+        )
+    return replace(
+        start,
+        weighted=raw.weighted(1 / scales),
+        scales=tuple(scales.tolist()),
+        iterations=done,
+        status=status,
+        message=message,
+    )
+
+
+def _covariance(start: System) -> System:
+    """The rows of one instant times L^-1; those of `start` where the residuals are dependent."""
+    observation, raw = start.observation, start.raw
+    n, N = observation.n, observation.rows[0]
+    same = set(observation.rows) == {N} and all(
+        np.array_equal(observation.t[:N], observation.t[observation.joint(j)]) for j in range(n)
+    )
+    if not same:
+        counts = ", ".join(map(str, observation.rows))
+        message = (
+            f"covariance needs every joint at every instant; rows per joint are {counts}. "
+            "Use weights: joint, or rows.low_speed: 0"
+        )
+        raise SettingsError(message, path=("estimate", "weights"))
+    W = observation.columns(raw.names).W
+    fit = solve(raw, start.options.rank_tolerance)
+    E = (observation.Y - W @ fit.X).reshape(n, N)
+    Omega = E @ E.T / max(N - fit.rank / n, 1)
+    try:
+        whitener = solve_triangular(cholesky(Omega, lower=True), np.eye(n), lower=True)
+    except LinAlgError:
+        message = (
+            "The residuals of the joints are linearly dependent (an exact fit, or fewer "
+            "instants than joints); weights by joint were used instead."
+        )
+        return replace(start, status="singular-weights", message=message)
+    whole = whitened(np.column_stack([W, observation.Y]), whitener)
+    whole_factor = factor(whole[:, :-1], whole[:, -1], observation.rows, raw.names)
+    scales = tuple(np.sqrt(np.diag(Omega)).tolist())
+    return replace(start, weighted=whole_factor, scales=scales, whitener=whitener)

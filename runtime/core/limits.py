@@ -1,0 +1,30 @@
+"""Limits and thresholds of judgement, in one table: runtime/core/limits.toml says of each its value,
+its unit, what it means, and where it was measured.
+
+    LIMIT.DECISIVE           the value
+"""
+
+import tomllib
+from importlib.resources import files
+from typing import Any
+
+ENTRIES: dict[str, dict[str, Any]] = {
+    name: limit
+    for module in tomllib.loads(
+        files("runtime.core").joinpath("limits.toml").read_text("utf-8")
+    ).values()
+    for name, limit in module.items()
+}
+
+
+class LimitValues:
+    """The values of ENTRIES by their names."""
+
+    def __init__(self) -> None:
+        self.__dict__.update({name: limit["value"] for name, limit in ENTRIES.items()})
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"no limit {name} in runtime/core/limits.toml")
+
+
+LIMIT = LimitValues()

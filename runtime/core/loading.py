@@ -1,0 +1,107 @@
+"""Emitted files as modules: a module is code, and runs with every right of who runs it.
+
+    generated/tx40.py, tx40.c
+            run where this installation has emitted and certified them, or where their reader trusts
+            them
+
+symgen keeps each text that it emits and certifies in a cache by content: `cache_folder("modules")`
+holds a folder of the first 32 digits of the SHA-256 of the text. What runs is the text that was
+looked up: it is read once, and nothing of it is kept.
+"""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.util
+import os
+import sys
+from hashlib import sha256
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+from runtime.core.errors import ModelError
+
+KEY = 32  # digits of the SHA-256 that name a text in the cache
+UNTRUSTED = (
+    "is code that this installation has not emitted and certified; pass trust=True (--trust) if "
+    "you "
+    "would run any program of its author, or emit it here with `symgen generate`"
+)
+
+
+def cache_folder(of: str = "compiled") -> Path:
+    """The folder `of` ("modules", "compiled") in SYMGEN_CACHE, or in that of the platform for files
+    that can be made again.
+    """
+    if given := os.environ.get("SYMGEN_CACHE"):
+        return Path(given) / of
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "symgen" / of
+
+
+def is_writable_by_all(folder: Path) -> bool:
+    """Whether anyone may write to the folder: what lies there proves nothing."""
+    return os.name == "posix" and bool(folder.stat().st_mode & 0o002)
+
+
+def is_emitted(text: bytes) -> bool:
+    """Whether this installation has emitted and certified the text."""
+    try:
+        folder = cache_folder("modules")
+        return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_all(folder)
+    except (OSError, RuntimeError):  # no home folder
+        return False
+
+
+def is_trusted(model: object) -> bool:
+    """Whether the files beside a module may run: not if `load_model` looked it up in the cache."""
+    return bool(getattr(model, "__trusted__", True))
+
+
+class _Text(importlib.abc.InspectLoader):
+    """Loader of a text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def get_source(self, fullname: str) -> str:
+        return self.text
+
+
+def module_of(path: Path, *, trust: bool = False) -> ModuleType:
+    """The module of an emitted file; ModelError for one that was not emitted here, unless
+    `trust`.
+    """
+    try:
+        data = path.read_bytes()
+        text = data.decode("utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise ModelError(f"cannot be read: {e}", file=str(path)) from e
+    if not (trust or is_emitted(data)):
+        raise ModelError(UNTRUSTED, file=str(path))
+    module = run(text, path)
+    vars(module)["__trusted__"] = trust
+    return module
+
+
+def run(text: str, path: Path) -> ModuleType:
+    """The module of a text; `path` is where it stands."""
+    name = f"generated_{path.stem}"
+    loader = _Text(text)
+    module = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=str(path)))
+    module.__file__ = str(path)
+    try:
+        loader.exec_module(module)
+    except ModuleNotFoundError as e:
+        raise ModelError(f"needs {e.name}, which is not installed", file=str(path)) from e
+    except Exception as e:  # whatever a broken file raises becomes one kind of error
+        raise ModelError(
+            f"fails on import with {type(e).__name__}: {e}; emit it again", file=str(path)
+        ) from e
+    return module

@@ -1,0 +1,92 @@
+"""Positions that a record does not hold: where they were measured, and at which encoders they are
+missing (`signals.reader: counts` takes them).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+
+Array = np.ndarray
+
+COUNTS = (
+    "where positions are counts of encoders, signals: {reader: counts} takes such samples as "
+    "missing"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Missing:
+    """Samples of a record without a position, by the columns that were recorded.
+
+    Attributes
+    ----------
+    samples : ndarray of bool, shape (N, n)
+        True: the column holds no position there. The record holds a straight line between its
+        neighbours.
+    follows : ndarray of bool, shape (n, n), or None
+        Joint j follows from column i (R^-1 of the drives is not zero there); None: columns are
+        joints.
+    """
+
+    samples: Array
+    follows: Array | None = None
+
+    def at_joints(self) -> Array:
+        """Joints whose position is not known, bool, shape (N, n)."""
+        return self.samples if self.follows is None else self.samples @ self.follows.T
+
+    def at_encoders(self, drives: Drives | None) -> Array:
+        """Encoders without a count, bool, shape (N, n), at the joints (None) or at the motors of
+        `drives`.
+
+        A motor that turns with two joints has none where either joint has none; where motors were
+        recorded each stands for itself.
+        """
+        if drives is None:
+            return self.at_joints()
+        return self.samples if self.follows is not None else self.samples @ (drives.motion != 0).T
+
+    def near_gaps(self, longest: int, reach: int) -> Array:
+        """Samples in gaps of any joint of more than `longest` samples and within `reach` samples of
+        these, bool, shape (N,).
+        """
+        ends = np.flatnonzero(
+            np.diff(self.at_joints().any(axis=1), prepend=False, append=False)
+        ).reshape(-1, 2)
+        near = np.zeros(len(self.samples), dtype=bool)
+        for a, b in ends[ends[:, 1] - ends[:, 0] > longest]:
+            near[max(a - reach, 0) : b + reach] = True
+        return near
+
+
+def bridged(q: Array, missing: Array) -> Array:
+    """q, shape (N, n), with straight lines where samples are missing: between their neighbours, and
+    held at the ends.
+    """
+    q, at = np.array(q), np.arange(len(q))
+    for j in np.flatnonzero(missing.any(axis=0)):
+        known = np.flatnonzero(~missing[:, j])
+        if len(known):
+            q[missing[:, j], j] = np.interp(at[missing[:, j]], known, q[known, j])
+        else:
+            q[:, j] = 0.0
+    return q
+
+
+def require_positions(missing: Missing | None, who: str, file: str, hint: str = "") -> None:
+    """Raise InputError where positions are missing, which `who` needs; hint : what else may be
+    done.
+    """
+    if missing is not None and missing.samples.any():
+        i, j = np.argwhere(missing.samples)[0]
+        raise InputError(
+            f"{missing.samples.sum()} positions are missing, the first of column {j + 1} at sample "
+            f"{i + 1}; {who} needs all of them: "
+            f"repair or cut the record{f'; {hint}' if hint else ''}",
+            file=file,
+        )

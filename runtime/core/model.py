@@ -1,0 +1,392 @@
+"""The border to emitted modules: their functions, loading and checking one, and checks of the
+states given to it.
+
+A model is a plain Python module written by the generator (NumPy only): `load_model("tx40")` reads
+generated/tx40.py of the current folder. A module is code: a file runs where this installation has
+emitted and certified it, or with trust=True (`runtime.core.loading`).
+"""
+
+from __future__ import annotations
+
+import copyreg
+import re
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError, ModelError, SettingsError
+from runtime.core.loading import module_of, run
+
+Array = np.ndarray
+
+FOLDER = Path("generated")  # of the current folder
+CONSTANTS = (
+    "NAME",
+    "JOINTS",
+    "BASE_PARAMETERS",
+    "STRUCTURE",
+    "DRIVES",
+    "LIMITS",
+    "VALUES",
+    "CONSTANTS",
+    "SOURCE_SHA256",
+)
+TRANSMITTED = "tau_model"
+"""Beginning of the channels that are torques of the model, before the number of the joint."""
+OWN_KINDS = ("column", "dissipative")  # of the user's own columns
+SLIDING = frozenset({"kg", "N", "N*s/m", "N/m"})  # units of elements along a joint that slides
+FUNCTIONS = (
+    "store",
+    "regressor",
+    "observation_matrix",
+)  # what identification needs; `require` checks others where they are used
+
+
+class GeneratedModel(Protocol):
+    """What `runtime` uses of an emitted module: n joints, b base parameters, q, qd, qdd of shape
+    (N, n); `require` checks the dynamics before use.
+    """
+
+    NAME: str
+    JOINTS: tuple[int, ...]
+    BASE_PARAMETERS: tuple[str, ...]
+    STRUCTURE: Array  # bool (b, n): False where the entry is identically zero
+    DRIVES: Mapping[str, Any] | None
+    LIMITS: Mapping[str, Any]
+    VALUES: Mapping[str, float]
+    CONSTANTS: Mapping[str, float]
+    SOURCE_SHA256: str
+    inverse_dynamics: Callable[..., Array]  # GAM (N, n) of q, qd, qdd, X
+    inertia_matrix: Callable[..., Array]  # A (N, n, n) of q, X
+    bias: Callable[..., Array]  # GAM (N, n) of q, qd, X
+    gravity: Callable[..., Array]  # GAM (N, n) of q, X
+    casadi: Callable[..., Any]  # casadi.Function of a function of the module, by name
+
+    def store(self, N: int) -> Array:
+        """Workspace of shape (b, n, N) for `out`, structural zeros written."""
+
+    def regressor(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
+        """D, shape (N, n, b), eq. (5)."""
+
+    def observation_matrix(
+        self, q: Array, qd: Array, qdd: Array, *, out: Array | None = None, **constants: float
+    ) -> Array:
+        """W, shape (n*N, b), rows joint-major, Fortran order, eq. (6)."""
+
+
+def load_model(
+    model: str | Path | ModuleType, *, folder: str | Path | None = None, trust: bool = False
+) -> GeneratedModel:
+    """The emitted model of a name (generated/NAME.py), of a path to a .py file, or of an imported
+    module, checked before use.
+
+    Parameters
+    ----------
+    model : str, Path or module
+    folder : str or Path, optional
+        Where names are looked up; default: ./generated.
+    trust : bool
+        Run a file that this installation has not emitted and certified, and the C file beside it:
+        a module is code (`runtime.core.loading`).
+
+    Raises
+    ------
+    ModelError
+        No such file, one that was not emitted here, or no such model.
+    """
+    if isinstance(model, ModuleType):
+        return checked_model(model)
+    path = Path(model)
+    if isinstance(model, str) and re.fullmatch(r"\w+", model):
+        path = Path(folder or FOLDER) / f"{model}.py"
+    if not path.is_file():
+        present = (
+            sorted(p.stem for p in path.parent.glob("*.py") if p.stem != "__init__")
+            if path.parent.is_dir()
+            else []
+        )
+        raise ModelError(
+            f"no emitted model {path}; {path.parent} holds {', '.join(present) or 'none'}: emit it "
+            f"with `symgen generate {path.stem}`"
+        )
+    return checked_model(module_of(path, trust=trust))
+
+
+def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
+    """How modules are pickled: an emitted one as text, since the process that receives it trusts
+    the one
+    that sends it; any other by name. InputError for an emitted one without a file.
+    """
+    if not hasattr(module, "SOURCE_SHA256"):
+        return import_module, (module.__name__,)
+    file = getattr(module, "__file__", None)
+    if not file:
+        raise InputError(
+            "this model was not loaded from a file, which other processes need; use one process alone"
+        )
+    return run, (Path(file).read_text(encoding="utf-8"), Path(file))
+
+
+copyreg.pickle(ModuleType, _reduced)
+
+
+def checked_model(module: ModuleType) -> GeneratedModel:
+    """The module itself if it is an emitted model with n, b and shapes that agree; ModelError
+    otherwise.
+    """
+    label = module.__name__
+    missing = [name for name in (*CONSTANTS, *FUNCTIONS) if not hasattr(module, name)]
+    if missing:
+        raise ModelError(
+            f"no {', '.join(missing)}; expected an emitted model, emit it again", file=label
+        )
+    model = cast(GeneratedModel, module)
+    _check_names(model, label)
+    require(model, *FUNCTIONS)
+    n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
+    if n == 0 or b == 0 or len(set(model.BASE_PARAMETERS)) != b:
+        raise ModelError(
+            (
+                f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least "
+                "one "
+                "of "
+                "each, names once"
+            ),
+            file=label,
+        )
+    structure = np.asarray(model.STRUCTURE)
+    if structure.shape != (b, n) or structure.dtype != np.bool_:
+        raise ModelError(
+            (
+                f"STRUCTURE is {structure.dtype} {structure.shape}; expected bool {(b, n)}, base "
+                "parameters by joints"
+            ),
+            file=label,
+        )
+    drives = drives_of(model)
+    if drives is not None and drives.n != n:
+        raise ModelError(f"DRIVES of {drives.n} joints; expected {n}", file=label)
+    _check_store(model, b, n, label)
+    return model
+
+
+def require(model: GeneratedModel, *functions: str) -> None:
+    """Raise ModelError unless the model offers all the named functions."""
+    missing = [name for name in functions if not callable(getattr(model, name, None))]
+    if "forward_dynamics" in missing and any(c.startswith(TRANSMITTED) for c in channels_of(model)):
+        raise ModelError(
+            "no forward_dynamics: laws read tau_model, the torque that it would change",
+            file=model.NAME,
+        )
+    if missing == ["casadi"]:
+        raise ModelError(
+            "no casadi(): its loops are closed by iteration, which no expression says, or another "
+            "version emitted the module; emit it again",
+            file=model.NAME,
+        )
+    if missing:
+        raise ModelError(
+            f"no function {', '.join(missing)}; emit the model again with the target that has them",
+            file=model.NAME,
+        )
+
+
+def drives_of(model: GeneratedModel) -> Drives | None:
+    """The drives of a model; None where it has none."""
+    return None if model.DRIVES is None else Drives.from_mapping(model.DRIVES)
+
+
+def constants_of(model: GeneratedModel, constants: Mapping[str, float]) -> dict[str, float]:
+    """Geometry and gravity in the order of CONSTANTS, `constants` in place of the robot file's;
+    InputError for names that the model does not have.
+    """
+    if unknown := sorted(constants.keys() - model.CONSTANTS.keys()):
+        raise InputError(
+            f"{model.NAME} has no constant {', '.join(unknown)}; there are "
+            f"{', '.join(model.CONSTANTS) or 'none'}"
+        )
+    return {**model.CONSTANTS, **constants}
+
+
+def channels_of(model: GeneratedModel) -> Mapping[str, tuple[str, ...]]:
+    """{constant that is a function of time: base parameters whose columns read it}."""
+    return cast(Mapping[str, tuple[str, ...]], getattr(model, "CHANNELS", {}))
+
+
+def require_no_channels(model: GeneratedModel, what: str) -> None:
+    """InputError, in one sentence, where laws of the model read functions of time, which `what`
+    does not have.
+    """
+    if channels := channels_of(model):
+        names = sorted({name for own in channels.values() for name in own})
+        raise InputError(
+            f"{what} does not have {', '.join(channels)}, which {', '.join(names)} of "
+            f"{model.NAME} read at every sample; take these laws out of the robot file for it"
+        )
+
+
+def joint_labels(model: GeneratedModel) -> tuple[str, ...]:
+    """What results call the joints: the number of each, and its name where the robot file has one
+    that says more ("2 elbow", but "2" of "joint_2").
+    """
+    names = getattr(model, "LABELS", {})
+    more = {
+        j: f" {name}"
+        for j, name in names.items()
+        if isinstance(name, str) and not re.fullmatch(rf"(?i)(joint|axis|[ajq])[ _-]?0*{j}", name)
+    }
+    return tuple(f"{j}{more.get(j, '')}" for j in model.JOINTS)
+
+
+def is_axis(joint: int | str) -> bool:
+    """Whether an entry of JOINTS is an axis of a force sensor (`runtime.wrench`), no joint."""
+    return isinstance(joint, str)
+
+
+def elements_of(
+    model: GeneratedModel, constants: Mapping[str, float] | None = None
+) -> Mapping[str, Any]:
+    """Elements of a model (friction, inertia, springs): kind, direction of motion, and row or form
+    by joint, of each parameter.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    constants : mapping, optional
+        Values in place of the robot file's.
+
+    Raises
+    ------
+    ModelError
+        A model of an older version, without this table.
+    """
+    table = "elements" if constants else "ELEMENTS"
+    if not hasattr(model, table):
+        raise ModelError(
+            (
+                f"no {table}, which say what friction acts along; emit it again with this version "
+                "of "
+                "symgen"
+            ),
+            file=model.NAME,
+        )
+    emitted = cast(Any, model)
+    return cast(Mapping[str, Any], emitted.elements(**constants) if constants else emitted.ELEMENTS)
+
+
+def base_columns(
+    model: GeneratedModel, names: str | Sequence[str], essential: Sequence[str], *path: str
+) -> tuple[str, ...]:
+    """Columns of the setting at `path`: the `essential` ones, "all", or names; SettingsError for a
+    name that is no base parameter.
+    """
+    wanted = (
+        {"essential": essential, "all": model.BASE_PARAMETERS}[names]
+        if isinstance(names, str)
+        else names
+    )
+    if unknown := [name for name in wanted if name not in model.BASE_PARAMETERS]:
+        raise SettingsError(
+            (
+                f"no parameter {', '.join(unknown)}; {model.NAME} has "
+                f"{', '.join(model.BASE_PARAMETERS)}"
+            ),
+            path=path,
+        )
+    return tuple(wanted)
+
+
+def joint_units(model: GeneratedModel) -> tuple[str, ...]:
+    """Unit of each joint position, "rad" or "m", in the order of JOINTS.
+
+    A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of
+    one that slides; without such elements, where no
+    moment of inertia acts on it, since a force depends on masses and first moments alone. The unit
+    of a column of the user's own says nothing: that of its law is his.
+    """
+    units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
+    result = []
+    for row, joint in enumerate(model.JOINTS):
+        acting = [name for k, name in enumerate(model.BASE_PARAMETERS) if model.STRUCTURE[k, row]]
+        own = {
+            units.get(name, "")
+            for name in acting
+            if set((element := elements.get(name.removesuffix("R"), (0, 0, ())))[2]) == {joint}
+            and element[0] not in OWN_KINDS
+        }
+        slides = (
+            bool(own & SLIDING) if own else not any(units.get(name) == "kg*m**2" for name in acting)
+        )
+        result.append("m" if slides else "rad")
+    return tuple(result)
+
+
+def _check_names(model: GeneratedModel, label: str) -> None:
+    """Names enter messages, tables, file names and symbols of compiled files: identifiers, and
+    joints whole numbers.
+    """
+    names = (model.NAME, *model.BASE_PARAMETERS)
+    if wrong := [
+        name
+        for name in names
+        if not (isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII))
+    ]:
+        raise ModelError(
+            f"NAME or BASE_PARAMETERS hold {wrong[0]!r:.60}; expected identifiers", file=label
+        )
+    if strange := [j for j in model.JOINTS if type(j) is not int or j < 1]:
+        raise ModelError(f"JOINTS hold {strange[0]!r:.60}; expected numbers of joints", file=label)
+
+
+def _check_store(model: GeneratedModel, b: int, n: int, label: str) -> None:
+    """Two samples at rest through `store` and `observation_matrix`, general loops at their
+    start.
+    """
+    N = 2
+    rest = np.zeros((N, n))
+    q = rest + getattr(model, "_START", rest[0])[:n]
+    try:
+        shape = np.shape(model.store(N))
+        with np.errstate(all="ignore"):
+            shapes = (
+                np.shape(model.regressor(q, rest, rest)),
+                np.shape(model.observation_matrix(q, rest, rest)),
+            )
+    except Exception as e:  # whatever a broken file raises becomes one kind of error
+        raise ModelError(
+            f"fails on two samples at rest with {type(e).__name__}: {e}; emit it again", file=label
+        ) from e
+    if shape != (b, n, N):
+        raise ModelError(f"store({N}) has shape {shape}; expected {(b, n, N)}", file=label)
+    if shapes != ((N, n, b), (n * N, b)):
+        raise ModelError(
+            (
+                f"regressor {shapes[0]}, observation_matrix {shapes[1]}; expected {(N, n, b)} and "
+                f"{(n * N, b)}"
+            ),
+            file=label,
+        )
+
+
+def check_states(model: GeneratedModel, **states: Array) -> None:
+    """Raise ValueError unless the states, by name, are real arrays of one shape (N, n) or (n,), n
+    the joints of the model.
+    """
+    n = len(model.JOINTS)
+    first, shape = next((name, np.shape(x)) for name, x in states.items())
+    for name, x in states.items():
+        x = np.asarray(x)
+        if x.ndim not in (1, 2) or x.shape[-1] != n or x.shape != shape:
+            raise InputError(
+                f"{model.NAME}: {name} has shape {x.shape}, {first} {shape}; expected (N, {n}) or "
+                f"({n},), the same for {', '.join(states)}"
+            )
+        if not np.issubdtype(x.dtype, np.floating) and not np.issubdtype(x.dtype, np.integer):
+            raise InputError(f"{model.NAME}: {name} has dtype {x.dtype}; expected real numbers")

@@ -1,0 +1,59 @@
+"""Where results come from: the names of the records, their time stamps, and whether anything was
+measured.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from runtime.core.record import Record
+
+
+def record_names(records: Sequence[Record]) -> tuple[str, ...]:
+    """The name of each record, each name once: of equal ones the second is called "name (2)"."""
+    names: list[str] = []
+    for record in records:
+        name, k = record.name, 1
+        while name in names:
+            k += 1
+            name = f"{record.name} ({k})"
+        names.append(name)
+    return tuple(names)
+
+
+def origin(records: Sequence[Record]) -> dict[str, Any]:
+    """Provenance of a result on `records`: their names, whether one of them was simulated, and
+    their time stamps in words.
+    """
+    names = record_names(records)
+    simulated = any(record.origin.simulated for record in records)
+    note = {"note": "SIMULATED record: nothing was measured"} if simulated else {}
+    named = list(zip(names, records, strict=True))
+    said = {
+        "time": {name: record.origin.time for name, record in named if record.origin.time},
+        "known_torques": {name: record.subtracted for name, record in named if record.subtracted},
+    }
+    return {
+        "records": list(names),
+        "simulated": simulated,
+        **{key: texts for key, texts in said.items() if texts},
+        **note,
+    }
+
+
+def processor() -> str:
+    """Machine and name of the processor, as far as the system tells: what results depend on in
+    their last bits.
+    """
+    name = cpuinfo("model name").partition(":")[2].strip() or platform.processor()
+    return f"{platform.machine()} {name}".strip()
+
+
+def cpuinfo(*starts: str) -> str:
+    """First line about the processor that starts so; empty where the system has none."""
+    info = Path("/proc/cpuinfo")
+    text = info.read_text(errors="replace") if info.is_file() else platform.processor()
+    return next((line for line in text.splitlines() if line.startswith(starts)), "")

@@ -1,0 +1,171 @@
+"""Are the residuals white? Joint by joint, in time and in frequency.
+
+Eqs. (9), (10) take the residuals of a joint as independent. With rho_k their correlation at a
+distance of k rows,
+
+    Q = N (N + 2) sum_k rho_k^2 / (N - k),  k = 1 ... m
+            chi^2 with m degrees of freedom if they are         Ljung and Box (1978)
+    N_eff = N / (1 + 2 sum_k rho_k)
+            rows that say as much about a mean; the sum ends before the first rho_k <= 0
+
+Rows left out and other records are gaps: a pair counts only where both its rows exist, in one
+record. The spectrum tells what is left over: a peak at the frequency
+of the motion is model error, one near the cut-off is filtered noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import welch
+from scipy.special import chdtrc
+from scipy.stats import f as fisher
+
+from runtime.core.limits import LIMIT
+from runtime.core.validation import JointComparison
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Whiteness:
+    """Residuals of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Label of the joint.
+    rows : int
+        Number of residuals, N.
+    correlation : ndarray, shape (lags,)
+        rho_k, k = 1 ... lags.
+    Q, p : float
+        Ljung-Box statistic and its probability.
+    effective_rows : float
+        N_eff.
+    frequency : ndarray, shape (f,), Hz
+        Frequencies of the spectrum.
+    density : ndarray, shape (f,), (N m)^2/Hz or N^2/Hz
+        Power density.
+    peak : float, Hz
+        Frequency of the largest density.
+    half : float, Hz
+        Frequency below which half of the power lies.
+    """
+
+    joint: str
+    rows: int
+    correlation: Array
+    Q: float
+    p: float
+    effective_rows: float
+    frequency: Array
+    density: Array
+    peak: float
+    half: float
+
+    @property
+    def white(self) -> bool:
+        """Ljung-Box does not reject independence at 5 %."""
+        return bool(self.p >= LIMIT.SIGNIFICANT)
+
+
+def whiteness(comparison: Sequence[JointComparison], rate: float) -> tuple[Whiteness, ...]:
+    """Whiteness of every joint; rate : rows per second of one joint, Hz."""
+    return tuple(joint_whiteness(joint, rate) for joint in comparison if len(joint.t))
+
+
+def joint_whiteness(joint: JointComparison, rate: float, lags: int = LIMIT.LAGS) -> Whiteness:
+    """Correlation, Ljung-Box and spectrum of one joint's residuals."""
+    N = len(joint.t)
+    m = max(1, min(lags, N // 5))
+    error = joint.error - joint.error.mean()
+    steps = np.rint(np.diff(joint.t) * rate).astype(np.intp)
+    apart = (steps <= 0) | (steps > LIMIT.SEPARATE)  # other records: time goes back, or much later
+    place = np.concatenate(
+        [[0], np.cumsum(np.where(apart, m + 1, steps))]
+    )  # on a grid of period 1/rate
+    products, pairs = _lagged(error, place, np.flatnonzero(apart) + 1)
+    rho, pairs = correlation(products, pairs), pairs[1 : m + 1]
+    first, used = rho[:m], pairs > 0
+    Q = float(
+        N
+        * (N + 2)
+        * np.sum(first[: len(pairs)][used] ** 2 / np.maximum(N - np.flatnonzero(used) - 1, 1))
+    )
+    grid = np.zeros(place[-1] + 1)
+    grid[place] = error
+    frequency, density = welch(
+        grid, fs=rate, nperseg=min(LIMIT.SPECTRUM_SEGMENT, len(grid)), detrend=False
+    )
+    power = np.cumsum(density)
+    return Whiteness(
+        joint=joint.joint,
+        rows=N,
+        correlation=first,
+        Q=Q,
+        p=float(chdtrc(int(used.sum()), Q)),
+        effective_rows=N / correlation_time(rho),
+        frequency=frequency,
+        density=density,
+        peak=float(frequency[int(np.argmax(density))]),
+        half=float(frequency[int(np.searchsorted(power, power[-1] / 2))]) if power[-1] > 0 else 0.0,
+    )
+
+
+def residual_correlation(residual: Array) -> Array:
+    """rho_k, k = 1 ... N - 1, of residuals, shape (N,), at even distances."""
+    return correlation(
+        *_lagged(residual - residual.mean(), np.arange(len(residual)), np.empty(0, dtype=np.intp))
+    )
+
+
+def correlation(products: Array, pairs: Array) -> Array:
+    """rho_k, k = 1, 2 ..., from sums of products at distances k = 0, 1 ... and the numbers of their
+    pairs; 0 where there is no pair.
+    """
+    if not products[0] > 0:
+        return np.zeros(len(products) - 1)
+    return np.asarray(products[1:] / np.maximum(pairs[1:], 1) / (products[0] / pairs[0]))
+
+
+def correlation_time(rho: Array) -> float:
+    """1 + 2 sum of rho_k, k = 1, 2 ..., before the first that is not positive, in rows: at
+    least 1.
+    """
+    end = np.flatnonzero(rho <= 0)
+    return float(1 + 2 * rho[: end[0] if len(end) else len(rho)].sum())
+
+
+def effective_share(joints: Sequence[Whiteness]) -> float:
+    """Rows that count over rows, all joints together, at most 1."""
+    return min(1.0, sum(w.effective_rows for w in joints) / max(sum(w.rows for w in joints), 1))
+
+
+def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
+    """Sums of x_t x_(t+k), k = 0, 1 ..., and the number of pairs; x, shape (N,), at places on a
+    grid. No pair spans `starts` of other records.
+    """
+    records = np.split(np.arange(len(x)), starts)
+    longest = max(int(place[rows[-1]] - place[rows[0]]) + 1 for rows in records)
+    sums = np.zeros((2, longest))
+    for rows in records:
+        own = place[rows] - place[rows[0]]
+        grid = np.zeros((2, own[-1] + 1))
+        grid[:, own] = x[rows], np.ones(len(rows))
+        spectrum = np.abs(rfft(grid, length := next_fast_len(2 * grid.shape[1], real=True))) ** 2
+        sums[:, : grid.shape[1]] += irfft(spectrum, length)[:, : grid.shape[1]]
+    return sums[0], np.rint(sums[1])
+
+
+def p_value(
+    squares_first: float, squares: float, terms_first: int, terms: int, count: float
+) -> float:
+    """Of the F-test of a model of more terms against the first one, from their squared residuals, numbers of terms, and independent samples."""
+    if terms == terms_first or squares <= 0 or count <= terms:
+        return 1.0
+    F = max(squares_first / squares - 1, 0.0) * (count - terms) / (terms - terms_first)
+    return float(fisher.sf(F, terms - terms_first, count - terms))

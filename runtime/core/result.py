@@ -1,0 +1,610 @@
+"""What `identify` returns: the parameters of one robot, and everything that its records say about
+them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from runtime.advisor.advice import Advice
+from runtime.agreement import Homogeneity
+from runtime.core.cestac.result import Cestac
+from runtime.core.checklist import Checklist, checklist_of, lost_joints
+from runtime.core.documents import json_text
+from runtime.core.errors import InputError
+from runtime.core.essential import Essential
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import LINEAR
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.parameter_sets import (
+    ORDER,
+    SetName,
+    best_set,
+    physical_possible,
+    physical_set,
+    ranking_text,
+    whole_set,
+)
+from runtime.core.problem import Problem
+from runtime.core.provenance import record_names
+from runtime.core.record import UNNAMED, Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared
+from runtime.core.rows.selection import unused_joints
+from runtime.core.study import Study
+from runtime.core.table import IN_LINE, Table, in_lines, notebook, with_intervals
+from runtime.core.uncertainty import Uncertainty
+from runtime.core.validation import (
+    CrossValidation,
+    JointComparison,
+    RecordError,
+    WeakDirections,
+    record_errors,
+)
+from runtime.counts.encoder_advice import acceleration_error, encoder_sentences
+from runtime.expected import Expected, expected_error
+from runtime.friction.curves import FrictionCurve
+from runtime.laws.scalars import FittedLaws
+from runtime.payload.study import PayloadStudy
+from runtime.physical.signs import negative_elements
+from runtime.plausible.known import torque_unit_doubt
+from runtime.plausible.plausibility import Plausibility
+
+if TYPE_CHECKING:
+    from runtime.physical.feasibility import Feasibility
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Parameters of one robot from one record or several.
+
+    Attributes
+    ----------
+    problem : Problem
+        Prepared: model, records, settings.
+    observation : Observation
+        Y = W X + rho of all records.
+    estimate : Estimate
+        All parameters, by the method of the study.
+    essential : Essential
+        The essential parameters and the trail from all parameters to them; by the linear companion
+        of a method that is not linear.
+    comparison : tuple of JointComparison
+        Torques by joint beside W X of `model_estimate`.
+    validation : tuple of CrossValidation
+        One part of the data predicts the others: windows of the records first, or each fifth by
+        the other four (`parameter_sets`), then further records.
+    correlations : WeakDirections
+        Parameters that trade against each other.
+    uncertainty : Uncertainty
+        Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
+    payload : PayloadStudy or None
+        The load of study.payload.
+    feasibility : Feasibility or None
+        Whether a physical robot can have the parameters of `estimate`.
+    friction : tuple of FrictionCurve
+        Friction against velocity, one curve per joint; empty where it was not asked for.
+    advice : Advice or None
+        The coarsest encoders.
+    resolution : Cestac or None
+        The resolution study at the steps of study.cestac.
+    plausibility : Plausibility or None
+        Whether record, study and robot file suit each other; None where it was not asked for.
+    sets : mapping of str to Estimate
+        The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
+        empty where the method of the study is not linear.
+    homogeneity : Homogeneity or None
+        Whether several records, further ones included, agree; None for one record.
+    laws : FittedLaws or None
+        Scalars of the laws of the model; None where it has none.
+    missing : tuple of str
+        Parts that were asked for and could not be done, each with its reason.
+    """
+
+    problem: Problem
+    observation: Observation
+    estimate: Estimate
+    essential: Essential
+    comparison: tuple[JointComparison, ...]
+    validation: tuple[CrossValidation, ...]
+    correlations: WeakDirections
+    uncertainty: Uncertainty
+    payload: PayloadStudy | None = None
+    feasibility: Feasibility | None = None
+    friction: tuple[FrictionCurve, ...] = ()
+    advice: Advice | None = None
+    resolution: Cestac | None = None
+    plausibility: Plausibility | None = None
+    sets: Mapping[SetName, Estimate] = field(default_factory=dict)
+    homogeneity: Homogeneity | None = None
+    laws: FittedLaws | None = None
+    missing: tuple[str, ...] = ()
+
+    @property
+    def model(self) -> GeneratedModel:
+        """The model, with scalars of laws as fitted and with the axes of force sensors."""
+        return self.problem.model
+
+    @property
+    def study(self) -> Study:
+        """Settings, complete; files relative to the current folder."""
+        return self.problem.settings
+
+    @property
+    def prepared(self) -> tuple[Prepared, ...]:
+        """The records as the settings read them."""
+        return self.problem.prepared
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The records, joint side, SI."""
+        return self.problem.records
+
+    @property
+    def name(self) -> str:
+        """Names of the records."""
+        return ", ".join(record_names(self.records))
+
+    @property
+    def _of_record(self) -> str:
+        """The record by its name, in a sentence; one without a name is "record" alone."""
+        return (
+            "record"
+            if self.name == UNNAMED
+            else f"record{'s' if len(self.records) > 1 else ''} {self.name}"
+        )
+
+    @property
+    def source(self) -> Literal["measured", "simulated"]:
+        """Where the data come from, as the provenance says."""
+        return "simulated" if self.estimate.provenance.get("simulated") else "measured"
+
+    @property
+    def determined(self) -> bool:
+        """Whether the records determine all parameters: full rank of W."""
+        return self.estimate.status != "rank-deficient"
+
+    @property
+    def usable(self) -> bool:
+        """Whether the estimator ended well: status ok."""
+        return self.estimate.status == "ok"
+
+    @property
+    def set_errors(self) -> dict[SetName, float]:
+        """Largest error on unseen data, %, by set of parameters; empty where nothing was
+        predicted.
+        """
+        judged = self.validation[-1].errors() if self.validation else {}
+        return {name: judged[name] for name in ORDER if name in judged}
+
+    @property
+    def unseen(self) -> str:
+        """The data that the sets are judged by, in words: the validation records of the study where
+        it has some, else a part of the records.
+        """
+        parts = dict.fromkeys(
+            p.part for part in self.validation[-1:] for p in part.predictions if not p.fitted
+        )
+        return ", ".join(parts) if self.by_records else "a part of the record that it has not seen"
+
+    @property
+    def by_records(self) -> bool:
+        """Whether the sets are judged by records of their own, not by a part of the records."""
+        return bool(self.validation) and self.validation[-1].further
+
+    @property
+    def model_columns(self) -> SetName:
+        """Which parameters stand for the robot (`runtime.core.parameter_sets`); all where
+        the method of the study is not linear.
+        """
+        if self.study.estimate.method not in LINEAR:
+            return "all"
+        return best_set(self.set_errors, self.study.essential.first)
+
+    @property
+    def model_estimate(self) -> Estimate:
+        """The estimate that stands for the robot: that of `model_columns`, or `estimate` where the
+        method of the study is not linear.
+        """
+        return self.sets.get(self.model_columns, self.estimate)
+
+    @property
+    def whole_estimate(self) -> Estimate:
+        """All base parameters, for a robot file or a program: `model_estimate`, or the physical
+        ones where the essential ones stand for the robot.
+        """
+        return self.written_sets.get(
+            whole_set(self.written_sets, self.model_columns), self.estimate
+        )
+
+    @cached_property
+    def written_sets(self) -> Mapping[SetName, Estimate]:
+        """`sets`, and the physical set where the essential one stands for the robot: a robot file or a program is given all parameters."""
+        linear = self.study.estimate.method in LINEAR
+        if self.model_columns != "essential" or "feasible" in self.sets or not linear:
+            return self.sets
+        if not physical_possible(self.observation, self.study.estimate, self.estimate):
+            return self.sets
+        try:
+            fit, _ = physical_set(self.problem, self.observation)
+        except InputError:
+            return self.sets
+        return {**self.sets, "feasible": fit} if fit.status == "ok" else self.sets
+
+    @property
+    def torque_unit(self) -> str:
+        """N of a robot whose joints are all prismatic by the units of its parameters, else N m."""
+        units = set(dict(getattr(self.model, "UNITS", {})).values())
+        return "N" if "N" in units and "N*m" not in units else "N m"
+
+    @cached_property
+    def record_errors(self) -> tuple[RecordError, ...]:
+        """Error of each record with the parameters that stand for the robot; empty where there is
+        one record.
+        """
+        names = record_names(self.records)
+        return record_errors(self.observation, self.model_estimate, names) if len(names) > 1 else ()
+
+    @cached_property
+    def time_stamps(self) -> tuple[str, ...]:
+        """What time stamps and encoders of the records were like, those of one file once, and the
+        known torques that were subtracted.
+        """
+        texts = {
+            (record.origin.whole or record.name, record.origin.time): None
+            for record in self.records
+            if record.origin.time
+        }
+        known = [f"{r.name}: {r.subtracted}." for r in self.records if r.subtracted]
+        encoders = [
+            text
+            for own in self.prepared
+            if own.study.signals.reader == "lowpass"
+            for text in encoder_sentences(own.record, own.states, own.study.signals, own.drives)
+        ]
+        return (
+            *(f"Time stamps of {name}: {text}." for name, text in texts),
+            *known,
+            *filter(None, [self.estimate.provenance.get("lowpass")]),
+            *self.observation.findings,
+            *encoders,
+        )
+
+    @property
+    def prediction_error(self) -> float:
+        """Largest relative error, %, of `model_estimate` on the validation records, or else on
+        parts of the records that did not give it; nan: on none.
+        """
+        return self.set_errors.get(self.model_columns, float("nan"))
+
+    @property
+    def negative(self) -> tuple[str, ...]:
+        """Motor inertias and frictions of `model_estimate` that are certainly below zero."""
+        return negative_elements(self.model, self.model_estimate)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the parameters that stand for the robot were fitted under the conditions of a
+        physical one.
+        """
+        return "standard" in self.model_estimate.details
+
+    @property
+    def expected_error(self) -> float:
+        """Expected error of predictions of other motions, %, of `model_estimate`; nan where it is
+        not known (`runtime.expected`), LIMIT.LARGEST_EXPECTED where the
+        records do not determine the parameters.
+        """
+        return self.expected.error
+
+    @cached_property
+    def expected(self) -> Expected:
+        """`expected_error`, and the interval in which it is likely, %."""
+        if not (self.determined and self.usable):
+            return Expected(*3 * (float("nan") if self.determined else LIMIT.LARGEST_EXPECTED,))
+        by_lowpass = [r for r in self.prepared if r.study.signals.reader == "lowpass"]
+        steps = [
+            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
+        ]
+        return expected_error(
+            self.model,
+            self.observation,
+            self.study.estimate,
+            self.model_estimate,
+            self.prepared,
+            max(steps, default=0.0),
+        )
+
+    @cached_property
+    def checklist(self) -> Checklist:
+        """Whether the values can be used, question by question."""
+        drawn = self.uncertainty.bootstrap
+        return checklist_of(
+            self.estimate,
+            self.model_estimate,
+            self.verdict,
+            bootstrap=dict(zip(drawn.names, drawn.drawn, strict=True))
+            if self.model_columns == "essential"
+            else {},
+            prediction_error=self.prediction_error,
+            halves=bool(self.validation) and not self.by_records,
+            negative=self.negative if self.determined else (),
+            feasibility=self.feasibility,
+            homogeneity=self.homogeneity,
+            expected=self.expected,
+            single=self.study.validate.values,
+            advice=self.advice,
+            plausible=self.plausibility.checks() if self.plausibility is not None else (),
+        )
+
+    @property
+    def verdict(self) -> str:
+        """One sentence."""
+        if not self.determined:
+            names = "; ".join(", ".join(group) for group in self.estimate.groups)
+            return (
+                f"The {self._of_record} does not determine {self.model.NAME}: rank "
+                f"{self.estimate.rank} for {len(self.estimate.names)} "
+                f"parameters, cannot be told apart: {names}."
+            )
+        fit = self.model_estimate
+        if not self.usable:
+            reason = self.estimate.message.split(". ")[0].rstrip(".")
+            return (
+                f"No values of {self.model.NAME}: {self.estimate.method} ended with status "
+                f"{self.estimate.status}. {reason}."
+            )
+        worst = fit.worst_joint
+        by_joint = (
+            f" (joint {worst.joint} worst, {worst.relative_error:.1f} %)"
+            if self.observation.n > 1
+            else ""
+        )
+        most = "at most " if ", " in self.unseen else ""  # the largest of several records
+        unseen = (
+            f", and {most}{self.prediction_error:.1f} % of {self.unseen}"
+            if np.isfinite(self.prediction_error)
+            else ""
+        )
+        return (
+            f"The model of {self.model.NAME} with {len(fit.names)} of {len(self.estimate.names)} "
+            f"parameters leaves {fit.relative_error:.1f} % "
+            f"of the torques of the {self._of_record} unexplained{by_joint}{unseen}."
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to look at before the values are used, in sentences: `own_warnings`, then parameters
+        that trade.
+        """
+        return (*self.own_warnings, *self.correlations.warnings)
+
+    @property
+    def own_warnings(self) -> tuple[str, ...]:
+        """Joints without rows, signs that no drive has, doubtful units of torque, lost joints."""
+        by_law = any(one.by_law for one in self.study.record)
+        signs = (
+            f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
+            f"{'kd of the law is larger than that of the drive, or ' * by_law}a "
+            "sign of the joint is wrong (ratio, torque constant or "
+            "column), or its coupling, unit or frame."
+        )
+        lost = lost_joints(self.estimate, self.model_estimate)
+        unit = torque_unit_doubt(self.model, self.observation, by_law)
+        joints = joint_labels(self.model)
+        unused = unused_joints(self.observation.rows, self.observation.dropped, joints)
+        sentences = (
+            unused,
+            signs if self.negative else "",
+            f"{unit}." if unit else "",
+            f"{lost}." if lost else "",
+        )
+        return tuple(sentence for sentence in sentences if sentence)
+
+    def __str__(self) -> str:
+        return self.brief()
+
+    def brief(self, above: int = 0) -> str:
+        """Values with their 95 % intervals, errors by joint, what to look at, what was asked for
+        besides; the verdict with its largest doubt and the next step last.
+
+        Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; above : so
+        many lines are printed ahead of these.
+        """
+        fit = self.model_estimate
+        by_joint = ", ".join(
+            f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint if one.rows
+        )
+        notes = [*self.observation.findings, *self.own_warnings, *self.missing]
+        if len(notes) > LIMIT.NOTES_PRINTED:
+            more = len(notes) - LIMIT.NOTES_PRINTED + 1
+            notes = [*notes[:-more], f"{more} more by --verbose"]
+        others = [
+            "\n".join(f"note: {note}" for note in notes),
+            self.laws.line if self.laws else "",
+            self.payload.brief() if self.payload else "",
+            *(curve.to_table() for curve in self.friction),
+            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
+            self.checklist.to_text(),
+        ]
+        text = "\n\n".join(part for part in others if part)
+        if not (self.determined and self.usable):
+            return text
+        values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
+        room = max(LIMIT.LINES_PRINTED - above - len(text.splitlines()) - 3, LIMIT.LINES_OF_VALUES)
+        more = len(fit.names) - IN_LINE * room
+        head = (
+            f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
+            f"{fit.method}, SI units, +- 95 %"
+        )
+        head += f"; {more} more by --verbose" if more > 0 else ""
+        return "\n".join([head, *values[:room], f"Unexplained by joint: {by_joint}", "", text])
+
+    def _repr_html_(self) -> str:
+        parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()
+        return notebook([self.verdict, *self.warnings], parameters, joints)
+
+    def to_text(self) -> str:
+        """Parameters, trail, validation, parameters that trade, uncertainty, what was
+        asked for besides, then the verdict: all that `brief` leaves out.
+        """
+        fit = self.model_estimate if self.determined else self.estimate
+        trade = [f"warning: {sentence}" for sentence in self.warnings] or [
+            f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
+        ]
+        records = [
+            f"error in {one.name}: {one.relative_error:.2f} % in total, per joint "
+            + _percents(one.per_joint)
+            for one in self.record_errors
+        ]
+        weak = [
+            f"{d.ratio:.1e}  " + " ".join(f"{w:+.2f} {name}" for name, w in d.weights.items())
+            for d in self.correlations.directions
+        ]
+        head = "directions that W sees least (singular value over the largest, unit columns)"
+        tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
+        last: tuple[Any, ...] = (self.laws, self.payload, *self.friction)
+        parts = [
+            *(table.to_table() for table in tables),
+            "\n".join([*records, *self.time_stamps]),
+            "\n".join(trade),
+            "\n".join([head, *weak]),
+            self.ranking,
+            self.homogeneity.text if self.homogeneity else "",
+            self.motion_table().to_text() if self.motion_table().rows else "",
+            self.uncertainty.to_text(),
+            self.eigenvalue_table().to_text() if self.feasible else "",
+            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
+            *(table.to_table() for table in last if table is not None),
+            self.advice.verdict if self.advice else "",
+            self.resolution.to_table() if self.resolution else "",
+            *self.missing,
+            self.plausibility.line if self.plausibility else "",
+            self.checklist.to_text(),
+        ]
+        return "\n\n".join(part for part in parts if part)
+
+    @property
+    def ranking(self) -> str:
+        """Which set of parameters predicts best, a sentence; "" where there is one set."""
+        return (
+            ranking_text(
+                self.set_errors,
+                {name: len(fit.names) for name, fit in self.sets.items()},
+                self.unseen,
+            )
+            if self.sets
+            else ""
+        )
+
+    def motion_table(self) -> Table:
+        """Simulated minus measured motion, joint by joint, of a method that simulates the loop;
+        else without rows.
+        """
+        rows = [
+            (
+                m["joint"],
+                f"{m['rms']:.3g}",
+                *(number(m[key], ".3g") for key in ("position", "tracking", "torque")),
+            )
+            for m in self.estimate.details.get("motion", ())
+        ]
+        header = (
+            "joint",
+            "rms of q_s - q, rad or m",
+            "of the motion, %",
+            "of the tracking error, %",
+            "torque, %",
+        )
+        return Table("Simulated minus measured motion", header, rows)
+
+    def eigenvalue_table(self) -> Table:
+        """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that
+        was made under them.
+        """
+        details = self.model_estimate.details
+        return Table(
+            "Conditions of a physical robot",
+            ("condition", "smallest eigenvalue", "at its limit"),
+            [
+                (name, number(value, ".3e"), "yes" if name in details["active"] else "")
+                for name, value in details["smallest_eigenvalues"].items()
+            ],
+        )
+
+    def to_json(self) -> str:
+        """estimate.json: the Estimate of all parameters, and beside it everything else that was
+        computed.
+        """
+        return json_text({**json.loads(self.estimate.to_json()), **self.summary()})
+
+    def summary(self) -> dict[str, Any]:
+        """What estimate.json holds beside the Estimate of all parameters."""
+        fit = self.essential.estimate
+        summary: dict[str, Any] = {
+            "essential": {
+                **self.essential.summary(),
+                "X": fit.X,
+                "sigma": fit.sigma,
+                "relative_sigma": fit.relative_sigma,
+                "sigma_corrected": fit.sigma_corrected,
+                "relative_error": fit.relative_error,
+                "per_joint": fit.per_joint,
+            },
+            "validation": self.validation,
+            "weak_directions": {
+                name: getattr(self.correlations, name)
+                for name in ("threshold", "pairs", "groups", "directions")
+            },
+            "warnings": self.warnings,
+            "trust": self.uncertainty,
+            **({"by_record": self.record_errors} if self.record_errors else {}),
+            "verdict": self.verdict,
+            "checklist": self.checklist,
+            "sets": [
+                {
+                    "name": name,
+                    "count": len(fit.names),
+                    "relative_error": fit.relative_error,
+                    "unseen": self.set_errors.get(name),
+                    "names": fit.names,
+                    "X": fit.X,
+                    "sigma_corrected": fit.sigma_corrected,
+                    "standard": fit.details.get("standard", {}),
+                }
+                for name, fit in self.written_sets.items()
+            ],
+            "model_columns": self.model_columns,
+        }
+        if self.homogeneity is not None:
+            summary["homogeneity"] = self.homogeneity
+        if self.feasibility is not None:
+            blocking = [
+                {"condition": name, "margin": margin} for name, margin in self.feasibility.blocking
+            ]
+            summary["feasibility"] = {
+                "feasible": self.feasibility.feasible,
+                "margin": self.feasibility.margin,
+                "blocking": blocking,
+            }
+        if self.payload is not None:
+            summary |= self.payload.summary()
+        if self.plausibility is not None:
+            summary["plausibility"] = self.plausibility
+        return {
+            **summary,
+            **({"laws": self.laws.summary()} if self.laws else {}),
+            **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {}),
+        }
+
+
+def _percents(errors: tuple[float, ...]) -> str:
+    return " ".join(f"{error:.2f}" for error in errors)

@@ -1,0 +1,350 @@
+"""The observed linear system Y = W X + rho, eqs. (6) and (14), with the bookkeeping of its rows.
+
+Estimators read `factor`, `norms`, `block_rows`, `columns`, `between` and `of_record`. Where a record
+is long, the rows of every block of residuals are factored on their own:
+
+    ||Y_j - W_j X||            ||R_j [X[C_j]; -1]||
+    Gram matrix of a block     sum of R_j'R_j over the joints
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.rows.factor import Factor, JointFactor, factor, joint_factors, merged, selected
+
+Array = np.ndarray
+Window = tuple[float | None, float | None]
+"""[t0, t1], s; None leaves an end open."""
+
+BLOCKS = 50
+"""Blocks of residuals that the record is cut into by default: their number alone makes sigma
+uncertain by 1/sqrt(2*50) = 10 %.
+"""
+SHORTEST = 5
+"""Shortest default block of residuals, rows of one joint: 2/cutoff, the memory of the low-pass
+filter, at the rate of eq. (13).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopRows:
+    """The closed loop that made the records (`runtime.loop.closed_loop`), and which of its
+    rows an observation holds, shape (r,).
+    """
+
+    loop: Any
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """The decimated system Y = W X + rho with its row bookkeeping.
+
+    Attributes
+    ----------
+    W : ndarray, shape (r, b)
+        Rows joint-major: all rows of joint 1 first.
+    Y : ndarray, shape (r,), N m or N
+    rows : tuple of int
+        Number of rows of each joint.
+    names : tuple of str
+        The b columns.
+    t : ndarray, shape (r,), s
+        Time of each row.
+    record : ndarray of int, shape (r,)
+        Number of the record of each row, from 0.
+    rate : float, Hz
+        Rows per second of one joint after decimation.
+    dropped : mapping of str to tuple of int
+        Rows left out, per joint, by reason ("trim", "low_speed", "mask"), counted after decimation.
+    settings : mapping
+        Signals and rows used, complete (to_mapping), with the factor that "auto" became.
+    files : mapping of str to str
+        SHA-256 of the measured files, by name.
+    closed_loop : LoopRows or None
+        What can simulate the same rows with other parameters, where it is known.
+    findings : tuple of str
+        What the reader of counts says of the encoders, a sentence each.
+    """
+
+    W: Array
+    Y: Array
+    rows: tuple[int, ...]
+    names: tuple[str, ...]
+    t: Array
+    record: Array
+    rate: float
+    dropped: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+    closed_loop: LoopRows | None = None
+    findings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        r = sum(self.rows)
+        if (
+            self.W.shape != (r, len(self.names))
+            or self.Y.shape != (r,)
+            or self.t.shape != (r,)
+            or self.record.shape != (r,)
+        ):
+            shapes = (
+                f"W {self.W.shape}, Y {self.Y.shape}, t {self.t.shape}, record {self.record.shape}"
+            )
+            raise InputError(
+                f"{shapes}; expected {r} rows, the sum of {self.rows}, and {len(self.names)} "
+                "columns"
+            )
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.rows)
+
+    @property
+    def joints(self) -> Array:
+        """Joint of each row, from 0, shape (r,)."""
+        return np.repeat(np.arange(self.n), self.rows)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Time of the first and of the last row, s."""
+        return float(self.t.min()), float(self.t.max())
+
+    def joint(self, j: int) -> slice:
+        """Rows of the j-th joint, j from 0."""
+        start = sum(self.rows[:j])
+        return slice(start, start + self.rows[j])
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Triangular factor of [W Y], joint by joint; made once."""
+        if self.block_factors is None:
+            return factor(self.W, self.Y, self.rows, self.names)
+        return Factor.of(self.names, merged(self.block_factors))
+
+    @cached_property
+    def block_factors(self) -> list[tuple[JointFactor, ...]] | None:
+        """Triangular factors, joint by joint, of every block of residuals, made once; None where
+        such a block of one joint has hardly more rows than columns.
+        """
+        if max(self.rows) < 2 * BLOCKS * (len(self.names) + 1):
+            return None
+        return joint_factors(self.W, self.Y, self.rows, self.blocks())
+
+    def columns(self, names: Sequence[str]) -> Observation:
+        """The same rows with the named columns alone, in the order given."""
+        if tuple(names) == self.names:
+            return self
+        kept = column_numbers(names, self.names)
+        return replace(self, W=np.asfortranarray(self.W[:, kept]), names=tuple(names))
+
+    def equal_parts(self, count: int) -> Array:
+        """Of `count` parts of the span, of equal length, that of each row, from 0, shape (r,)."""
+        start, end = self.span  # the same of rows of one instant
+        return np.asarray(
+            (count * (self.t - start) / ((end - start) or 1.0)).astype(int).clip(max=count - 1)
+        )
+
+    def where(self, mask: Array) -> Observation:
+        """The rows where `mask`, bool of shape (r,), is true."""
+        if mask.shape != self.Y.shape or mask.dtype != np.bool_:
+            raise InputError(f"mask {mask.dtype} {mask.shape}; expected bool {self.Y.shape}")
+        rows = tuple(int(np.count_nonzero(mask[self.joint(j)])) for j in range(self.n))
+        loop = (
+            None
+            if self.closed_loop is None
+            else replace(self.closed_loop, rows=self.closed_loop.rows[mask])
+        )
+        W = np.compress(mask, self.W.T, axis=1).T
+        return replace(
+            self,
+            W=W,
+            Y=self.Y[mask],
+            t=self.t[mask],
+            record=self.record[mask],
+            rows=rows,
+            closed_loop=loop,
+        )
+
+    def between(self, t0: float | None, t1: float | None) -> Observation:
+        """The rows with t0 <= t <= t1, s; None leaves an end open."""
+        first = -np.inf if t0 is None else t0
+        last = np.inf if t1 is None else t1
+        part = self.where((self.t >= first) & (self.t <= last))
+        if not any(part.rows):
+            raise InputError(
+                f"no row in [{t0}, {t1}] s; the rows lie in [{self.span[0]:g}, {self.span[1]:g}] s"
+            )
+        return part
+
+    def of_record(self, number: int) -> Observation:
+        """The rows of one record, number from 0."""
+        return self.where(self.record == number)
+
+    def norms(self, names: Sequence[str], X: Array) -> tuple[Array, Array]:
+        """||Y_j - W_j X|| with the columns `names`, and ||Y_j||, of every joint, N m or N, shape
+        (n,) each.
+        """
+        whole = np.zeros(len(self.names))
+        whole[column_numbers(names, self.names)] = X
+        residual = self.Y - self.W @ whole
+        return (
+            np.array([np.linalg.norm(residual[self.joint(j)]) for j in range(self.n)]),
+            np.array([np.linalg.norm(self.Y[self.joint(j)]) for j in range(self.n)]),
+        )
+
+    @property
+    def residual_block(self) -> float:
+        """Length of a block of residuals, s, where none is given: a 50th of the record, at least
+        five rows.
+        """
+        return float(max(max(self.rows) / BLOCKS, SHORTEST) / self.rate)
+
+    def blocks(self, length: float | None = None) -> Array:
+        """Number of the block of residuals (from 0) of every row, shape (r,): same record, same
+        interval of `length` seconds.
+        """
+        _, record = np.unique(self.record, return_inverse=True)
+        first = np.full(record.max() + 1, np.inf)
+        np.minimum.at(first, record, self.t)
+        interval = np.floor(
+            (self.t - first[record]) / (length or self.residual_block) + 1e-9
+        ).astype(np.intp)
+        return np.asarray(
+            np.unique(record * (interval.max() + 1) + interval, return_inverse=True)[1]
+        )
+
+    def block_rows(
+        self, names: Sequence[str], weights: Array, length: float, whitener: Array | None = None
+    ) -> Iterator[Array]:
+        """Weighted rows [W Y] of every block of residuals, shape (rows, b + 1); of `block_factors`,
+        rows with the same Gram matrix.
+
+        Parameters
+        ----------
+        names : sequence of str
+            The b columns of W.
+        weights : ndarray, shape (n,)
+            Factors of the rows of each joint.
+        length : float, s
+            Length of a block.
+        whitener : ndarray, shape (n, n), optional
+            Multiplies the n rows of one instant, in place of the weights.
+        """
+        kept = column_numbers(names, self.names)
+        if whitener is not None:
+            A = np.column_stack([self.W[:, kept], self.Y])
+            yield from split_rows(whitened(A, whitener), self.blocks(length))
+        elif self.block_factors is None or length != self.residual_block:
+            row_weights = np.repeat(weights, self.rows)
+            for rows in rows_by_block(self.blocks(length)):
+                A = np.column_stack([self.W[rows][:, kept], self.Y[rows]])
+                yield A * row_weights[rows, None]
+        else:
+            for joints in self.block_factors:
+                yield np.vstack(
+                    [
+                        weight * selected(joint, kept).spread(len(kept))
+                        for joint, weight in zip(joints, weights, strict=True)
+                        if joint.rows
+                    ]
+                )
+
+
+def split_rows(A: Array, blocks: Array) -> Iterator[Array]:
+    """Rows of A, shape (r, c), of every block; blocks : number of the block of each row, shape
+    (r,).
+    """
+    return (A[rows] for rows in rows_by_block(blocks))
+
+
+def rows_by_block(blocks: Array) -> list[Array]:
+    """Numbers of the rows of every block; blocks : number of the block of each row, shape (r,)."""
+    order = np.argsort(blocks, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
+
+
+def whitened(A: Array, whitener: Array) -> Array:
+    """A, shape (n*N, c) joint-major, with the n rows of each instant multiplied by `whitener`,
+    shape (n, n).
+    """
+    n = len(whitener)
+    return np.asarray(
+        np.einsum("ij,jNc->iNc", whitener, A.reshape(n, -1, A.shape[1])).reshape(A.shape)
+    )
+
+
+def halves(t0: float, t1: float) -> tuple[Window, Window]:
+    """The two halves of [t0, t1], s; no instant belongs to both."""
+    middle = (t0 + t1) / 2
+    return (t0, middle), (float(np.nextafter(middle, t1)), t1)
+
+
+def stack(observations: Sequence[Observation]) -> Observation:
+    """Several records of one robot as one system, joint-major; `record` tells the rows apart."""
+    if not observations:
+        raise InputError("no observation to stack")
+    first = observations[0]
+    for o in observations:
+        if o.names != first.names or o.n != first.n:
+            raise InputError(
+                f"columns {o.names} on {o.n} joints; expected those of the first record, "
+                f"{first.names} on {first.n} joints"
+            )
+    offsets = np.cumsum([0] + [int(o.record.max(initial=0)) + 1 for o in observations])
+    numbered = [
+        replace(o, record=o.record + k) for o, k in zip(observations, offsets, strict=False)
+    ]
+    order = [(o, o.joint(j)) for j in range(first.n) for o in numbered]
+    W = np.empty((sum(sum(o.rows) for o in observations), len(first.names)), order="F")
+    np.concatenate([o.W[rows] for o, rows in order], out=W)
+    return Observation(
+        W=W,
+        Y=np.concatenate([o.Y[rows] for o, rows in order]),
+        rows=tuple(sum(o.rows[j] for o in observations) for j in range(first.n)),
+        names=first.names,
+        t=np.concatenate([o.t[rows] for o, rows in order]),
+        record=np.concatenate([o.record[rows] for o, rows in order]),
+        rate=max(o.rate for o in observations),
+        dropped={
+            reason: tuple(
+                sum(o.dropped.get(reason, (0,) * first.n)[j] for o in observations)
+                for j in range(first.n)
+            )
+            for reason in first.dropped
+        },
+        settings=same_settings([o.settings for o in observations]),
+        files=all_files([o.files for o in observations]),
+        findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
+    )
+
+
+def same_settings(settings: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Settings of all records, one by one where they differ."""
+    return settings[0] if all(s == settings[0] for s in settings) else {"records": list(settings)}
+
+
+def all_files(hashes: Sequence[Mapping[str, str]]) -> dict[str, str]:
+    """Hashes by file name; a name that stands for another file in a later record gets the number of
+    that record.
+    """
+    files: dict[str, str] = {}
+    for k, of_record in enumerate(hashes, start=1):
+        for name, digest in of_record.items():
+            files[name if files.get(name, digest) == digest else f"{name} ({k})"] = digest
+    return files
+
+
+def column_numbers(names: Sequence[str], among: Sequence[str]) -> list[int]:
+    unknown = [name for name in names if name not in among]
+    if unknown:
+        raise InputError(f"no column {', '.join(unknown)}; there are {', '.join(among)}")
+    return [list(among).index(name) for name in names]

@@ -1,0 +1,249 @@
+"""One record as a study reads it: filtered, selected and decimated once, for whoever asks.
+
+    own = problem.prepared[0]
+    own.states                                q, qd, qdd, by the reader of the study
+    own.selection                             window, decimated instants, rows left out
+    own.torque                                Y before rows are left out, shape (n, K)
+    own.observation(model)                    Y = W X + rho
+
+A study that perturbs the positions (CESTAC) takes `selection` and `torque` of the measured record
+and repeats `observed_states` and `observation_from_states` with perturbed positions: Y and the
+choice of rows stay those of the record, so that a row is never kept or dropped because of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel, check_states, drives_of
+from runtime.core.record import JOINT_CHANNELS, Record
+from runtime.core.rows.observation import Observation, stack
+from runtime.core.rows.regressor import Columns
+from runtime.core.rows.selection import Selection, certain_rows, nothing_left, select_rows
+from runtime.core.signals.decimation import decimate
+from runtime.core.signals.filters import States, median_filtered
+from runtime.core.signals.states import Reader
+from runtime.core.study import Study
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A record, and what the settings of a study make of it; each is made when first asked for.
+
+    Attributes
+    ----------
+    record : Record
+        Joint side, SI.
+    study : Study
+        Signals and rows, with numbers for what was automatic.
+    reader : Reader
+        States of the record.
+    keep : ndarray of bool, shape (N,) or (N, n), or None
+        Samples (and joints) that may be used; None: all.
+    """
+
+    record: Record
+    study: Study
+    reader: Reader
+    keep: Array | None = None
+
+    @property
+    def drives(self) -> Drives | None:
+        """Motor side: the drives by which the record was read."""
+        return self.record.origin.drives
+
+    @cached_property
+    def states(self) -> States:
+        """q, qd, qdd by the reader, shape (N, n) each."""
+        states = self.reader(self.record, self.study.signals)
+        return replace(states, channels=self.channels)
+
+    @property
+    def channels(self) -> dict[str, Array]:
+        """Channels of one column that are no joint's, shape (N,)."""
+        given = self.record.channels.items()
+        return {c: x[:, 0] for c, x in given if c not in JOINT_CHANNELS and x.shape[1] == 1}
+
+    @cached_property
+    def selection(self) -> Selection:
+        """Window, decimated instants, and the rows left out by trim, low speed and `keep`."""
+        signals, rows = self.study.signals, self.study.rows
+        return select_rows(self.record, self.states.qd, signals, rows, keep=self.keep)
+
+    @cached_property
+    def torque(self) -> Array:
+        """Y before rows are left out, shape (n, K), N m or N."""
+        return decimated_torque(self.record.torque, self.selection)
+
+    def certain(self, model: GeneratedModel) -> Selection:
+        """The selection without rows of unknown state or of uncertain direction of friction."""
+        return certain(model, self.states, self.selection)
+
+    def observation(
+        self, model: GeneratedModel, columns: Sequence[str] | None = None
+    ) -> Observation:
+        """Y = W X + rho of the rows that are used."""
+        return observation_from_states(
+            model,
+            self.states,
+            self.torque,
+            self.selection,
+            files=self.record.files,
+            columns=columns,
+        )
+
+    def by(self, study: Study) -> Prepared:
+        """The same record by another study; what both make alike is shared."""
+        if study.signals == self.study.signals and study.rows == self.study.rows:
+            return self
+        other = replace(self, study=study)
+        if study.signals == self.study.signals:
+            other.take_states(self)
+        return other
+
+    def take_states(self, other: Prepared) -> None:
+        """Take the states that another reading of the same positions has made, if it has."""
+        same = self.record.q is other.record.q and self.record.missing is other.record.missing
+        same &= self.record.channels.get("qd") is other.record.channels.get("qd")
+        same &= self.reader is other.reader and self.study.signals == other.study.signals
+        if same and "states" in vars(other):
+            vars(self)["states"] = replace(other.states, channels=self.channels)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: nothing of what was made."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def common_drives(model: GeneratedModel, records: Sequence[Prepared]) -> Drives | None:
+    """Drives of all records; InputError where these were read with different couplings. Without
+    records those of the model.
+    """
+    coupled = {own.drives.coupling for own in records if own.drives is not None}
+    if len(coupled) > 1:
+        raise InputError(f"records read with coupling {', '.join(sorted(coupled))}; expected one")
+    return records[0].drives if records else drives_of(model)
+
+
+def decimated_torque(tau: Array, selection: Selection) -> Array:
+    """Y before rows are left out, shape (n, K), of measured joint torques tau, shape (N, n): median
+    filter, window, decimation.
+    """
+    tau = median_filtered(tau, selection.signals.window_of_torques)
+    windowed = np.ascontiguousarray(tau[selection.samples].T)
+    return windowed if selection.plan is None else decimate(windowed, selection.plan)
+
+
+def observation_from_states(
+    model: GeneratedModel,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+    columns: Sequence[str] | None = None,
+) -> Observation:
+    """W of the given states, shape (N, n) each, beside Y = torque, shape (n, K), as decimated
+    before.
+
+    columns : names of the columns wanted; the others are neither filtered nor stored. Default: all.
+    """
+    wanted = Columns(model, columns)
+    return observation_of(wanted, states, torque, selection, files=files)
+
+
+def observation_of(
+    columns: Columns,
+    states: States,
+    torque: Array,
+    selection: Selection,
+    *,
+    files: Mapping[str, str] | None = None,
+) -> Observation:
+    """The same by columns that many records share.
+
+    Where errors of the velocities are known, rows in which missing positions leave the state
+    unknown ("missing") or the direction of dry friction is uncertain ("direction") are left out as
+    well.
+    """
+    model = columns.model
+    check_states(model, q=states.q, qd=states.qd, qdd=states.qdd)
+    n, K = selection.mask.shape
+    if torque.shape != (n, K) or len(model.JOINTS) != n:
+        raise InputError(
+            f"torque {torque.shape}, model {model.NAME} with {len(model.JOINTS)} joints; expected "
+            f"{(n, K)} and {n} joints"
+        )
+    window = states[selection.samples]
+    used = np.flatnonzero(selection.mask.any(axis=0))
+    inside = slice(used[0], used[-1] + 1)
+    store = columns.decimated(window, selection.plan, inside)
+    selection = certain(model, states, selection)
+    if not selection.mask.any():
+        left_out = nothing_left(selection.dropped, K)
+        raise InputError(left_out, file=", ".join(files or ()) or None)
+    mask = selection.mask[:, inside].ravel()
+    rows = store.reshape(len(columns.names), len(mask))
+    return Observation(
+        W=(rows if mask.all() else np.compress(mask, rows, axis=1)).T,
+        Y=torque[:, inside].ravel()[mask],
+        rows=tuple(int(k) for k in selection.mask.sum(axis=1)),
+        names=columns.names,
+        t=np.tile(selection.t[inside], n)[mask],
+        record=np.zeros(int(mask.sum()), dtype=int),
+        rate=selection.rate,
+        dropped=selection.dropped,
+        settings=selection.settings,
+        files=dict(files or {}),
+        findings=states.findings,
+    )
+
+
+def certain(
+    model: GeneratedModel,
+    states: States,
+    selection: Selection,
+) -> Selection:
+    """The selection without rows in which missing positions leave the state unknown ("missing") or
+    the direction of dry friction is uncertain
+    ("direction"); the same where errors of the velocities are not known."""
+    if states.errors is None:
+        return selection
+    known = selection.mask & states.errors[selection.samples][selection.kept].known
+    mask = known & certain_rows(model, states[selection.samples][selection.kept])
+    dropped = dict(selection.dropped)
+    for reason, before, after in (("missing", selection.mask, known), ("direction", known, mask)):
+        left_out = before.sum(axis=1) - after.sum(axis=1) + np.array(dropped.get(reason, 0))
+        dropped[reason] = tuple(left_out.tolist())
+    return replace(selection, mask=mask, dropped=dropped)
+
+
+def stacked(
+    model: GeneratedModel, records: Sequence[Prepared], columns: Sequence[str] | None = None
+) -> Observation:
+    """Y = W X + rho of several records as one system; columns : default: all."""
+    if not records:
+        raise InputError("no record to observe")
+    parts = [record.observation(model, columns) for record in records]
+    return parts[0] if len(parts) == 1 else stack(parts)
+
+
+def with_torques(
+    observation: Observation, records: Sequence[Prepared], torques: Sequence[Array]
+) -> Observation:
+    """The same rows of W beside other torques, shape (N, n), of the records observed."""
+    Y = np.empty_like(observation.Y)
+    for number, (own, tau) in enumerate(zip(records, torques, strict=True)):
+        rows = observation.record == number
+        Y[rows] = decimated_torque(tau, own.selection)[
+            observation.joints[rows], np.searchsorted(own.selection.t, observation.t[rows])
+        ]
+    return replace(observation, Y=Y)

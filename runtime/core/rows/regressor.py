@@ -1,0 +1,177 @@
+"""The columns of W, decimated: only the entries of the regressor that are not identically zero, and
+equal ones once.
+
+Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
+linear: filter
+the signals, then place them. The regressor is evaluated in pieces of samples on one reused store and
+decimated piece by piece: the signals are not stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel, channels_of
+from runtime.core.rows.observation import column_numbers
+from runtime.core.signals.decimation import PIECE, Plan, decimated_parts
+from runtime.core.signals.filters import States
+
+Array = np.ndarray
+
+PROBES = 64  # random states that tell signals apart
+
+
+@dataclass(frozen=True, eq=False)
+class Entries:
+    """Where the signals stand: model store[k[m], j[m]] = sign[m] * signal[which[m]]; signal s is
+    first met at entry source[s].
+
+    row : row of each entry in the wanted store; row = k where every column is wanted.
+    place : row of each signal in the store, shape (b n, N).
+    """
+
+    row: Array
+    k: Array
+    j: Array
+    which: Array
+    sign: Array
+    source: Array
+    place: Array
+
+
+class Columns:
+    """Columns of W of one model; what does not change from record to record is made once.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    names : sequence of str, optional
+        Base parameters of the columns wanted, in the order wanted; default: all b. Others are not
+        filtered.
+    """
+
+    def __init__(
+        self,
+        model: GeneratedModel,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        self.model = model
+        self.names = tuple(model.BASE_PARAMETERS) if names is None else tuple(names)
+        self._rooms: dict[int, tuple[Array, Array]] = {}
+
+    @cached_property
+    def entries(self) -> Entries:
+        """Where the distinct signals of these columns stand."""
+        numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
+        return distinct_entries(self.model, numbers)
+
+    def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
+        """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of
+        the window.
+
+        plan : of the decimation; None keeps every sample.
+        instants : those of the K that are stored.
+        """
+        entries = self.entries
+        first, last, _ = instants.indices(len(states) if plan is None else plan.K)
+        store = np.zeros((len(self.names), len(self.model.JOINTS), last - first))
+        for part, signals in self.signals(states, plan):
+            a, b = max(part.start, first), min(part.stop, last)
+            if a < b:
+                values = signals[entries.which, a - part.start : b - part.start]
+                store[entries.row, entries.j, a - first : b - first] = (
+                    entries.sign[:, None] * values
+                )
+        return store
+
+    def signals(self, states: States, plan: Plan | None) -> Iterator[tuple[slice, Array]]:
+        """Consecutive instants of the window, and the distinct signals of its states (N, n) there,
+        decimated, shape (S, instants), until the next are asked for.
+
+        plan : None keeps every sample.
+        """
+        if plan is not None:
+            yield from decimated_parts(
+                lambda t0, t1: self._evaluated(states[t0:t1]), len(self.entries.source), plan
+            )
+            return
+        for t0 in range(0, len(states), PIECE):
+            t1 = min(t0 + PIECE, len(states))
+            yield slice(t0, t1), self._evaluated(states[t0:t1])
+
+    def _evaluated(self, states: States) -> Array:
+        """Distinct signals of the states (B, n), shape (S, B), until the next call."""
+        B = len(states)
+        if B not in self._rooms:
+            self._rooms[B] = self.model.store(B), np.empty((len(self.entries.place), B))
+        store, signals = self._rooms[B]
+        timed = in_time(self.model, states)
+        try:
+            D = self.model.regressor(states.q, states.qd, states.qdd, out=store, **timed)
+        except ValueError as e:  # what an emitted module of a general loop raises
+            raise InputError(
+                f"{self.model.NAME}: {e}; look at units and zeros of the positions, and at the "
+                "lengths of the robot file"
+            ) from None
+        rows = D.transpose(2, 1, 0).reshape(-1, B)
+        return np.take(rows, self.entries.place, axis=0, out=signals, mode="clip")
+
+
+def in_time(model: GeneratedModel, states: States) -> dict[str, Any]:
+    """The channels that laws of the model read, shape (N,); InputError where the states have
+    none.
+    """
+    channels = channels_of(model)
+    if missing := [c for c in channels if c not in states.channels]:
+        read = ", ".join(channels[missing[0]])
+        raise InputError(
+            f"{model.NAME}: {read} read {missing[0]}, which these states do not have; "
+            f"name its column, record.columns: {{channels: {{{missing[0]}: COLUMN}}}}"
+        )
+    return {c: states.channels[c] for c in channels}
+
+
+def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Entries:
+    """Entries of STRUCTURE in the columns (default: all) grouped by equal values, up to the sign,
+    at random states.
+
+    The emitted text copies equal rows, so equal signals agree in every bit; different ones do not
+    agree at 64 random states. Where the random
+    states are out of reach (loops that do not close), every entry stands for itself.
+    """
+    columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
+    row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])
+    k = columns[row]
+    place = k * len(model.JOINTS) + j
+    values = _probed(model)[k, j]
+    if not np.isfinite(values).all():
+        every = np.arange(len(k))
+        return Entries(row, k, j, every, np.ones(len(k)), every, place)
+    sign = np.where(values[:, 0] < 0, -1.0, 1.0)
+    _, source, which = np.unique(
+        sign[:, None] * values + 0.0, axis=0, return_index=True, return_inverse=True
+    )
+    which = which.reshape(-1)
+    return Entries(row, k, j, which, sign * sign[source][which], source, place[source])
+
+
+def _probed(model: GeneratedModel) -> Array:
+    """The store at random states, shape (b, n, PROBES); nan where a loop does not close at one of
+    them.
+    """
+    rng = np.random.default_rng(0)
+    q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))
+    timed: dict[str, Any] = {c: rng.uniform(0.5, 2, PROBES) for c in channels_of(model)}
+    try:
+        with np.errstate(all="ignore"):
+            return np.asarray(
+                model.regressor(q, qd, qdd, out=model.store(PROBES), **timed).transpose(2, 1, 0)
+            )
+    except ValueError:  # what an emitted module of a general loop raises
+        return np.full((len(model.BASE_PARAMETERS), len(model.JOINTS), PROBES), np.nan)

@@ -1,0 +1,274 @@
+"""Which rows of Y = W X + rho are used: a window before evaluation, then decimated rows by their
+place and speed.
+
+The choice is made once, on the measured record, and shared by every run of a study, so that a row
+is never kept or dropped because of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from runtime.advisor.sign_errors import switches
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel
+from runtime.core.record import Record
+from runtime.core.signals.decimation import Plan
+from runtime.core.signals.filters import States, decimation_factor, decimation_plan, kept_samples
+from runtime.core.study import Rows, Signals, to_mapping
+
+Array = np.ndarray
+
+LEAVES_OUT = {
+    "trim": "rows.trim",
+    "low_speed": "rows.low_speed",
+    "mask": "the choice of samples",
+    "missing": "positions that are missing",
+    "direction": "an uncertain direction of dry friction",
+    "torque": "a torque that was not measured",
+}
+UNMEASURED = 1e9
+"""rows.low_speed of a joint whose torque was not measured, beside what else was."""
+
+
+UNCERTAIN = 0.5
+"""Deviations of a speed below which its sign is not used: wrong in 31 % of the cases or more.
+Chosen on simulated records (docs/theory/counts.md).
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Which samples are evaluated and which decimated rows are kept; shared by every run of a
+    study.
+
+    samples : the window, in raw samples.
+    kept : shape (K,), kept instants, from the start of the window.
+    mask : bool (n, K), rows used.
+    """
+
+    samples: slice
+    kept: Array
+    mask: Array
+    factor: int
+    t: Array
+    rate: float
+    signals: Signals
+    rows: Rows
+    dropped: Mapping[str, tuple[int, ...]]
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """Signals and rows, complete, with the factor that "auto" became."""
+        signals, rows = to_mapping(self.signals), to_mapping(self.rows)
+        return {"signals": signals, "rows": rows, "factor": self.factor}
+
+    @property
+    def plan(self) -> Plan | None:
+        """The decimation of the window; None where every sample is kept."""
+        window, settings = self.samples, self.signals.decimate
+        return decimation_plan(window.stop - window.start, self.factor, settings, int(self.kept[0]))
+
+
+@dataclass(frozen=True)
+class Instants:
+    """Which samples of a record are kept.
+
+    Attributes
+    ----------
+    start, stop : int
+        Raw samples of the window, [start, stop).
+    factor, first, kept : int
+        Decimation keeps one sample in `factor` from `first` on, counted from `start`, `kept` in
+        all.
+    trim : int
+        Kept instants whose rows are left out at each end.
+    """
+
+    start: int
+    stop: int
+    factor: int
+    first: int
+    kept: int
+    trim: int
+
+
+def window_of(
+    t: Array, window: tuple[float | None, float | None], file: str, margin: int = 0
+) -> tuple[int, int]:
+    """Samples [start, stop) with t0 <= t <= t1, s; None leaves an end open.
+    margin : samples left out at each end of the record, a tenth of it at most.
+    """
+    t0, t1 = window
+    start = 0 if t0 is None else int(np.searchsorted(t, t0, side="left"))
+    stop = len(t) if t1 is None else int(np.searchsorted(t, t1, side="right"))
+    if stop <= start:
+        raise InputError(
+            f"no sample in rows.window [{t0}, {t1}] s; the record spans [{t[0]:g}, {t[-1]:g}] s",
+            file=file,
+        )
+    margin = min(margin, len(t) // 10)
+    return max(start, margin), min(stop, len(t) - margin)
+
+
+EXCERPT = 2**16
+"""Samples of a record by which settings that are automatic are found."""
+
+
+def excerpt(record: Record, rows: Rows) -> slice:
+    """The first EXCERPT samples of a record in the window of the rows."""
+    start, stop = window_of(record.t, rows.window, record.name)
+    return slice(start, min(stop, start + EXCERPT))
+
+
+def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) -> Instants:
+    """Window and decimation of a record at the times t, shape (N,), s, at a rate, Hz.
+
+    The regressor near an end of the record is that of a low-pass which starts there. Decimation
+    spreads it over 27 instants (docs/truth.md, Ends of records), so that rows.trim: auto leaves
+    out END_PERIODS/cutoff ahead of the decimation, and TRIM instants after it.
+    """
+    auto, low = rows.trim == "auto", signals.lowpass
+    trim = LIMIT.TRIM if rows.trim == "auto" else rows.trim
+    trim = 0 if signals.reader == "static" else trim
+    margin = ceil(LIMIT.END_PERIODS * rate / low.hertz) if auto and low is not None else 0
+    start, stop = window_of(t, rows.window, file, margin)
+    factor = decimation_factor(signals, rate)
+    kept = kept_samples(
+        stop - start, factor, signals.decimate.phase if signals.decimate else "first"
+    )
+    K = len(kept)
+    if 2 * trim >= K:
+        raise InputError(
+            f"{K} rows per joint after decimation by {factor}, of which rows.trim leaves "
+            f"out {2 * trim}; "
+            "use a longer record or window, or a smaller rows.trim",
+            file=file,
+        )
+    return Instants(start, stop, factor, int(kept[0]), K, trim)
+
+
+def select_rows(
+    record: Record, qd: Array, signals: Signals, rows: Rows, *, keep: Array | None = None
+) -> Selection:
+    """Window, decimated instants, and the rows left out by trim, low speed and `keep`; qd, shape
+    (N, n), are the filtered velocities.
+    """
+    at = instants_of(record.t, record.rate, signals, rows, record.file)
+    usable = None if keep is None else _keep(keep, record)
+    kept = np.arange(at.first, at.stop - at.start, at.factor)
+    instants, number = kept + at.start, np.arange(at.kept)
+    mask = np.ones((record.n, len(kept)), dtype=bool)
+    dropped, slow = {}, per_joint(rows.low_speed, record.n, "rows.low_speed")[:, None]
+    for reason, allowed in (
+        ("trim", (number >= at.trim) & (number < at.kept - at.trim)),
+        *([("torque", slow < UNMEASURED)] if slow.max() >= UNMEASURED else ()),
+        ("low_speed", np.abs(qd[instants].T) >= slow),
+        ("mask", True if usable is None else usable[instants].T),
+    ):
+        before = mask.sum(axis=1)
+        mask &= allowed
+        dropped[reason] = tuple(int(k) for k in before - mask.sum(axis=1))
+    if not mask.any():
+        raise InputError(nothing_left(dropped, at.kept), file=record.file)
+    return Selection(
+        samples=slice(at.start, at.stop),
+        kept=kept,
+        mask=mask,
+        factor=at.factor,
+        t=record.t[instants],
+        rate=record.rate / at.factor,
+        signals=signals,
+        rows=rows,
+        dropped=dropped,
+    )
+
+
+def nothing_left(dropped: Mapping[str, Sequence[int]], K: int) -> str:
+    """Why none of the K rows of every joint is used, in words. dropped : rows left out by reason
+    and joint.
+    """
+    left_out = ", ".join(
+        f"{LEAVES_OUT.get(reason, reason)} leaves out {max(counts)}"
+        for reason, counts in dropped.items()
+        if any(counts)
+    )
+    return (
+        f"none of its {K} rows per joint is used: {left_out}; choose these settings anew, or "
+        "leave this record out"
+    )
+
+
+def unused_joints(
+    rows: Sequence[int], dropped: Mapping[str, Sequence[int]], joints: Sequence[str]
+) -> str:
+    """The joints of which no row is used, and what leaves most of them out, a sentence; "" where
+    every joint has rows.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Rows used, by joint.
+    dropped : mapping of str to sequence of int
+        Rows left out, by reason and joint.
+    joints : sequence of str
+        What results call them.
+    """
+    bare = [j for j, count in enumerate(rows) if not count]
+    if not bare or not dropped:
+        return ""
+    reason = max(dropped, key=lambda name: sum(dropped[name][j] for j in bare))
+    return (
+        f"No row of joint {', '.join(joints[j] for j in bare)} is used: "
+        f"{LEAVES_OUT.get(reason, reason)} leaves them out."
+    )
+
+
+def _keep(keep: Array, record: Record) -> Array:
+    keep = keep[:, None] if keep.ndim == 1 else keep
+    if keep.dtype != np.bool_ or keep.shape not in {(len(record), 1), (len(record), record.n)}:
+        raise InputError(
+            (
+                f"keep {keep.dtype} {keep.shape}; expected bool {(len(record),)} or "
+                f"{(len(record), record.n)}"
+            ),
+            file=record.file,
+        )
+    return keep
+
+
+def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
+    """A setting that is one number or one per joint, shape (n,)."""
+    values = np.atleast_1d(np.asarray(value, dtype=float))
+    if values.shape not in {(1,), (n,)}:
+        raise InputError(f"{name} has {len(values)} values; expected one or {n}, one per joint")
+    return np.broadcast_to(values, (n,))
+
+
+def certain_rows(
+    model: GeneratedModel,
+    states: States,
+    *,
+    deviations: float = UNCERTAIN,
+) -> Array:
+    """Rows of every joint in which the state and each direction of dry friction are known, bool,
+    shape (n, K), of states (K, n) with known errors.
+
+    A row of joint j is uncertain where |s| is below `deviations` of s, s = G qd the speed of a
+    column that switches and acts on j.
+    """
+    certain = np.ones(states.q.T.shape, dtype=bool)
+    if states.errors is not None:
+        certain &= states.errors.known
+        for switch in switches(model, model.BASE_PARAMETERS, passive="left out"):
+            certain[list(switch.joints)] &= np.abs(
+                states.qd @ switch.G
+            ) >= deviations * states.errors.along(switch.G)
+    return certain

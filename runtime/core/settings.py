@@ -1,0 +1,264 @@
+"""Settings as frozen dataclasses that pydantic checks: their base, the types of their fields,
+mappings in and out.
+
+    class Lowpass(Settings):
+        cutoff: Positive = 50.0
+
+    Lowpass(cutoff=-1)                       # SettingsError: cutoff: -1; expected more than 0
+    structure(Lowpass, {"cutoff": "2*50"})   # Lowpass(cutoff=100.0)
+
+A number may be an arithmetic text (`2*pi/10000`), one value stands for a list of one, an integer
+stands for its text.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, fields
+from functools import cache
+from numbers import Integral
+from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs
+
+from runtime.core.arithmetic import number
+from runtime.core.documents import plain
+from runtime.core.errors import SettingsError
+from runtime.core.gone import gone
+from runtime.core.settings_errors import settings_error, shown
+
+T = TypeVar("T")
+Path = tuple[str | int, ...]
+CONFIG = ConfigDict(extra="forbid", defer_build=True)  # built when the first instance is made
+
+
+LIMITS = {
+    "gt": "exclusiveMinimum",
+    "ge": "minimum",
+    "lt": "exclusiveMaximum",
+    "le": "maximum",
+}
+"""Names of pydantic, which it leaves beside a type of its users, and of JSON Schema."""
+
+
+class Written:
+    """Annotation of a type that a file may write in a further way: what the JSON Schema of the type
+    says in its place.
+
+    Parameters
+    ----------
+    form : callable
+        From the JSON Schema of the type to that of everything a file may write.
+    """
+
+    def __init__(self, form: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+        self.form = form
+
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: Callable[[Any], dict[str, Any]]
+    ) -> dict[str, Any]:
+        return self.form(handler(schema))
+
+
+def _number(value: Any) -> Any:
+    try:
+        return number(value) if isinstance(value, str) else value
+    except ValueError as e:
+        raise ValueError(f"{e}; expected a number") from None
+
+
+def _whole(value: Any) -> Any:
+    return int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
+
+
+def _text(value: Any) -> Any:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _list(value: Any) -> Any:
+    several = value is None or (
+        isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    )
+    return value if several else (value,)
+
+
+Real = Annotated[
+    float,
+    Field(strict=True, allow_inf_nan=False),
+    BeforeValidator(_number),
+    Written(lambda s: {**s, "type": ["number", "string"]}),
+]
+Positive = Annotated[Real, Field(gt=0)]
+NotNegative = Annotated[Real, Field(ge=0)]
+Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
+Count = Annotated[Whole, Field(ge=1)]
+Seed = Annotated[Whole, Field(ge=0)]
+Flag = Annotated[bool, Field(strict=True)]
+Text = Annotated[
+    str, BeforeValidator(_text), Written(lambda s: {**s, "type": ["string", "integer"]})
+]
+PerJoint: TypeAlias = T | tuple[T, ...]
+"""One value for all joints, or one per joint."""
+Many = Annotated[
+    tuple[T, ...], BeforeValidator(_list), Written(lambda s: {"anyOf": [s, s["items"]]})
+]
+"""A list; one value stands for a list of one."""
+
+
+def require(ok: bool, message: str, *path: str | int) -> None:
+    """SettingsError about the key at `path` unless `ok`; from __post_init__, `path` starts at the
+    settings that call this function.
+    """
+    if not ok:
+        raise SettingsError(message, path=path)
+
+
+def _odd(value: int) -> int:
+    require(value % 2 == 1, f"{value}; expected an odd window, 1 for no median filter")
+    return value
+
+
+def _in_order(window: tuple[float | None, float | None]) -> tuple[float | None, float | None]:
+    t0, t1 = window
+    require(t0 is None or t1 is None or t0 < t1, f"[{t0}, {t1}]; expected the earlier time first")
+    return window
+
+
+def _not_one(runs: int) -> int:
+    require(runs != 1, "1 run; expected 0 or at least 2")
+    return runs
+
+
+Resamples = Annotated[Seed, AfterValidator(_not_one)]
+OddWindow = Annotated[Count, AfterValidator(_odd)]
+Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
+"""[t0, t1] in s; null leaves an end open."""
+
+
+class SettingsType(type):
+    """Type of settings: values that pydantic refuses become a SettingsError, which names the key
+    and what it expects.
+    """
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as e:
+            problem = settings_error(e, {**dict(enumerate(args)), **kwargs})
+            names: dict[str | int, str | int] = dict(enumerate(f.name for f in fields(cls)))  # type: ignore[arg-type]
+            raise SettingsError(
+                problem.reason,
+                path=tuple(names.get(k, k) for k in problem.path[:1]) + problem.path[1:],
+            ) from None
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass(frozen=True, config=CONFIG)
+class Settings(metaclass=SettingsType):
+    """Base of all settings. A subclass is a frozen dataclass of which only instances with valid
+    values can be made.
+    """
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, config=CONFIG)(cls)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
+        """That of pydantic, with what the docstring says of each key."""
+        made: dict[str, Any] = _with_limits(handler.resolve_ref_schema(handler(schema)))
+        text, _, attributes = inspect.getdoc(cls).partition("\n\nAttributes\n----------\n")  # type: ignore[union-attr]
+        made["description"] = " ".join(text.split())
+        entries = re.findall(r"^(\w[\w, ]*) : (.*)\n((?: +.*\n?)*)", attributes, re.MULTILINE)
+        for keys, form, meaning in entries:
+            unit = form.partition(", ")[2]
+            said = " ".join(meaning.split()) + (f" [{unit}]" if unit else "")
+            for key in keys.split(", "):
+                made["properties"][key] = {**made["properties"][key], "description": said}
+        return made
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value: Any) -> Any:
+        given = value.kwargs or {} if isinstance(value, ArgsKwargs) else value
+        if isinstance(given, cls):
+            return given
+        names = [f.name for f in fields(cls)]
+        if not isinstance(given, Mapping):
+            raise SettingsError(
+                f"{shown(given)}; expected a mapping with some of {', '.join(names)}"
+            )
+        if unknown := [str(k) for k in given if k not in names]:
+            several = "s" if len(unknown) > 1 else ""
+            raise SettingsError(
+                f"unknown key{several} {', '.join(unknown)}; known: {', '.join(names)}",
+                path=(unknown[0],),
+            )
+        return value
+
+
+def _with_limits(schema: Any) -> Any:
+    """A JSON Schema whose limits have the names of JSON Schema."""
+    if isinstance(schema, dict):
+        return {LIMITS.get(key, key): _with_limits(value) for key, value in schema.items()}
+    return [_with_limits(item) for item in schema] if isinstance(schema, list) else schema
+
+
+_adapter = cache(TypeAdapter)  # what checks mappings against a class of settings
+
+
+def structure(cls: type[T], value: Any, path: Path = ()) -> T:
+    """The settings of a mapping.
+
+    Parameters
+    ----------
+    cls : type
+        A subclass of Settings.
+    value : mapping
+        As read from a file.
+    path : tuple of str and int
+        Keys that lead to `value` in its file.
+
+    Raises
+    ------
+    SettingsError
+        For unknown keys, other types and values out of range, with the path of the key.
+    """
+    try:
+        return _adapter(cls).validate_python(value)  # type: ignore[arg-type, no-any-return]
+    except ValidationError as e:
+        error = settings_error(e, value, path)
+        reason = gone(error.path, _value_at(error.path[len(path) :], value)) or error.reason
+        raise SettingsError(reason, path=error.path) from None
+
+
+def _value_at(path: Path, value: Any) -> Any:
+    """What these keys lead to in a mapping as read from a file; None where it has no such keys."""
+    for key in path:
+        if isinstance(value, Mapping):
+            value = (
+                value if isinstance(key, int) else value.get(key)
+            )  # one stands for a list of one
+        elif isinstance(value, list | tuple) and isinstance(key, int) and key < len(value):
+            value = value[key]
+        else:
+            return None
+    return value
+
+
+def to_mapping(settings: Any) -> dict[str, Any]:
+    """Complete plain mapping (dicts, lists, numbers, texts) of a Study or of one of its sections;
+    study_from_mapping(to_mapping(s)) == s.
+    """
+    return plain(settings)  # type: ignore[no-any-return]

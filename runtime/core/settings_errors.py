@@ -1,0 +1,88 @@
+"""What pydantic finds wrong with settings or with a JSON result, as one SettingsError: the value that was given, what was expected, and the keys that lead there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from runtime.core.errors import InputError, SettingsError
+
+Path = tuple[str | int, ...]
+
+EXPECTED = {  # by the type of an error of pydantic
+    "bool_type": "true or false",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "int_type": "an integer",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "list_type": "a list",
+    "mapping_type": "a mapping",
+    "dict_type": "a mapping",
+    "dataclass_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "union_tag_not_found": "a mapping with the key {discriminator}",
+    "string_type": "a text",
+    "tuple_type": "a list",
+    "literal_error": "{expected}",
+}
+
+
+def shown(value: Any) -> str:
+    """The first 80 characters of a value as Python writes it."""
+    return repr(value)[:80]
+
+
+def settings_error(error: ValidationError, given: Any, path: Path = ()) -> SettingsError:
+    """The first problem of a validation of the value `given`, to which the keys `path` lead.
+
+    Every member of a union has its own error. The member that took most of the value knows best; members that took equally much are named together.
+    """
+    problems = [_problem(details, given) for details in error.errors(include_url=False)]
+    first = problems[0][0]
+    alike = [problem for problem in problems if problem[0][: len(first)] == first]
+    deepest = max((place for place, _ in alike), key=len)
+    reasons = [reason for place, reason in alike if place == deepest]
+    prefix = f"{reasons[0].partition('; expected ')[0]}; expected "
+    expected = [reason.removeprefix(prefix) for reason in reasons if reason.startswith(prefix)]
+    message = prefix + " or ".join(dict.fromkeys(expected)) if expected else reasons[0]
+    return SettingsError(message, path=(*path, *deepest))
+
+
+def _problem(details: ErrorDetails, given: Any) -> tuple[Path, str]:
+    """Path and reason of one error; its `loc` also names members of unions, which are no keys."""
+    path: Path = ()
+    for key in details["loc"]:
+        try:
+            holds_items = isinstance(given, Mapping | Sequence) and not isinstance(given, str)
+            given = given[key] if holds_items else getattr(given, key)  # type: ignore[arg-type]
+            path = (*path, key)
+        except (LookupError, TypeError, AttributeError):
+            continue
+    kind = details["type"]
+    context = details.get("ctx", {})
+    cause = context.get("error")
+    last = details["loc"][-1] if details["loc"] else ""
+    if isinstance(cause, SettingsError):
+        return (*path, *cause.path), cause.reason
+    if isinstance(cause, InputError):
+        return path, cause.message
+    if kind == "union_tag_invalid":
+        key = context["discriminator"].strip("'")
+        names = context["expected_tags"].replace("'", "")
+        return (*path, key), f"no {key} {context['tag']!r}; there are {names}"
+    if kind == "missing" and isinstance(last, str):
+        return path, f"no key {last}; add it"
+    if kind == "missing":
+        return path, f"{len(given)} values; expected at least {int(last) + 1}"
+    if kind == "too_long":
+        return path, f"{context['actual_length']} values; expected {context['max_length']}"
+    if kind in EXPECTED:
+        expected = EXPECTED[kind].format(**context).replace("'", "")
+        return path, f"{shown(details['input'])}; expected {expected}"
+    return path, details["msg"].removeprefix("Value error, ")

@@ -1,0 +1,116 @@
+"""The cut-off of the low-pass that suits a record: `signals.lowpass.cutoff: auto`.
+
+Of every joint, with S the spectrum of the acceleration and N that of the noise of the positions as
+seen in it, G the gain of the low-pass on the acceleration,
+
+    bias(fc) = sum_f [G (1 - G) S + G^2 N] / sum_f S
+
+is the share by which least squares misjudges the acceleration: what the low-pass takes from the
+columns but not from the torques, and the power of noise in the columns. fc minimises that of the
+worst joint. One pass forward and backward has the gain 1/(1 + (w/wc)^(2 order)), with
+w = tan(pi f/rate); the acceleration goes through one for each of `lowpass.on`.
+
+N is flat in the positions: the median of the spectrum in the upper band, and at least that of the
+steps that the positions show, step^2/12 over the band. The spectrum is one of second differences,
+so that little leaks from the motion to the noise; it counts as motion where its running mean is
+above LIMIT.MOTION times the noise. Positions read as counts have less noise: twice that cut-off.
+Measured: docs/counts.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from runtime.core.limits import LIMIT
+from runtime.core.signals.filters import median_filtered
+from runtime.core.study import CHAPTER_CUTOFF, Lowpass, Signals
+
+Array = np.ndarray
+
+
+def cutoff(
+    positions: Sequence[tuple[Array, float]],
+    signals: Signals,
+    crossing: float | tuple[float, ...] = np.inf,
+) -> tuple[float, str]:
+    """The cut-off, Hz, to two digits, of records that are fitted together, and why, in words.
+
+    positions : q, shape (N, n), rad or m, and rate, Hz, of each record.
+    crossing : Hz, from which on recorded velocities stand for differences of q
+        (`runtime.speeds`).
+    """
+    low, parts = signals.lowpass or Lowpass(), []
+    highest = LIMIT.HIGHEST_CUTOFF * min((rate for _, rate in positions), default=np.inf)
+    positions = [(q, rate) for q, rate in positions if len(q) > LIMIT.FEWEST_LINES]
+    counts = signals.reader == "counts"
+    if not positions or (counts and not all(np.isfinite(q).all() for q, _ in positions)):
+        return min(CHAPTER_CUTOFF, highest), "the value of the chapter"
+    lowest = max(
+        LIMIT.LOWEST_CUTOFF, *(LIMIT.CUTOFF_PERIODS * rate / len(q) for q, rate in positions)
+    )
+    grid = np.geomspace(min(lowest, highest), highest, LIMIT.CUTOFF_GRID)
+    for q, rate in positions:
+        f, motion, noise = spectra(q, rate, signals.median)
+        noise = noise / (1 + (f[:, None] / crossing) ** 2)
+        ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * grid / rate)[:, None]
+        G = (1 + ratio ** (2 * low.order)) ** -float(max(len(set(low.on)), 1))
+        parts.append((G * (1 - G) @ motion, G**2 @ noise, motion.sum(axis=0)))
+    distorted, noisy, power = (np.sum(part, axis=0) for part in zip(*parts, strict=True))
+    moving = np.flatnonzero(power > 0)
+    if not len(moving):
+        return min(CHAPTER_CUTOFF, highest), "no joint moves above the noise of its position"
+    bias = ((distorted + noisy) / np.where(power > 0, power, np.inf))[:, moving]
+    worst = bias.max(axis=1)
+    best = int(np.flatnonzero(worst <= max(worst.min(), LIMIT.NO_BIAS))[0])
+    hertz, joint = grid[best], 1 + int(moving[np.argmax(bias[best])])
+    why = f"least bias by motion and noise, joint {joint} decides"
+    if counts:
+        hertz, why = min(2 * hertz, CHAPTER_CUTOFF, highest), f"counts, twice that of {why}"
+    return float(f"{hertz:.2g}"), why
+
+
+def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array]:
+    """Frequencies, shape (m,), Hz, and power of the acceleration there, shape (m, n): of the motion
+    and of the noise. median : window that finds spikes, 1 for none.
+    """
+    f, power, gain, level = _spectrum(q, rate, median)
+    noise = gain * level
+    moves = uniform_filter1d(power, LIMIT.SMOOTHED_LINES, axis=0) > LIMIT.MOTION * noise
+    central = (np.cos(np.pi * f / rate) ** 4)[:, None]  # two central differences
+    starts = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], LIMIT.CUTOFF_BINS)))
+    motion = np.where(moves, np.maximum(power - noise, 0.0), 0.0)
+    motion, noise = (np.add.reduceat(central * x, starts, axis=0) for x in (motion, noise))
+    return np.add.reduceat(f, starts) / np.diff([*starts, len(f)]), motion, noise
+
+
+def white_noise(x: Array, rate: float, median: int = 1) -> Array:
+    """Variance of a sample of the white noise of each column of x, shape (n,)."""
+    return _spectrum(x, rate, median)[3]
+
+
+def _spectrum(x: Array, rate: float, median: int) -> tuple[Array, Array, Array, Array]:
+    """Frequencies (m,), power (m, n) of second differences there, that of white noise of variance
+    1, shape (m, 1), and the variance of the white noise of x, shape (n,).
+    """
+    smooth = median_filtered(x, median)
+    away = np.abs(x - smooth)
+    x = np.where(away > LIMIT.SPIKE * np.sqrt(np.mean(away**2, axis=0)), smooth, x)
+    a = np.diff(x, 2, axis=0)
+    a = np.hanning(len(a) + 2)[1:-1, None] * (a - a.mean(axis=0))
+    f = np.fft.rfftfreq(len(a), 1 / rate)[1:-1]
+    power = np.abs(np.fft.rfft(a, axis=0)[1:-1]) ** 2 / (0.375 * len(a))  # of one sample
+    gain = ((2 * np.sin(np.pi * f / rate)) ** 4)[:, None]
+    upper = (f > LIMIT.UPPER_BAND[0] * rate) & (f < LIMIT.UPPER_BAND[1] * rate)
+    level = np.median((power / gain)[upper], axis=0) / np.log(2)
+    steps = np.array([step(column) ** 2 for column in x.T]) / 12
+    return f, power, gain, np.maximum(level, steps)
+
+
+def step(x: Array) -> float:
+    """Smallest step between the values of x, shape (N,), above rounding; small where x has no
+    steps."""
+    steps = np.diff(np.unique(x))
+    return float(min(steps[steps > 1e-6 * np.ptp(x)], default=0.0))

@@ -1,0 +1,269 @@
+"""Filters of an off-line identification, none of which shifts the phase (chapter 2.2.2).
+
+    median -> Butterworth forward and backward -> central differences        q  -> q, qd, qdd
+    Chebyshev I forward and backward -> one sample in n_d, eq. (13)          Y and every column of W
+
+Never the (b, a) form: for decimation it is wrong by 2e-3 at a factor of 40 and diverges at 100.
+Both ends are extended by odd reflection;
+MATLAB's filtfilt takes 3*(filter length - 1) samples, scipy's default 3*(filter length).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import floor
+
+import numpy as np
+from scipy import ndimage
+from scipy.signal import butter, sosfiltfilt
+
+from runtime.core.errors import InputError
+from runtime.core.signals.decimation import CUTOFF, ORDER, Plan, decimate, plan
+from runtime.core.study import Decimate, Lowpass, Signals
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedErrors:
+    """What is known of errors of the velocities: those of the encoders are independent.
+
+    deviation : ndarray, shape (N, encoders), per s; infinite where counts are missing and the state
+        is unknown.
+    root : ndarray, shape (n, encoders), joint velocity per encoder velocity.
+    """
+
+    deviation: Array
+    root: Array
+
+    def __getitem__(self, samples: slice | Array) -> SpeedErrors:
+        return SpeedErrors(self.deviation[samples], self.root)
+
+    def along(self, G: Array) -> Array:
+        """Deviation of s = G qd, shape (N,); G, shape (n,)."""
+        finite = np.where(self.known[:, None], self.deviation, 0.0)
+        return np.where(self.known, np.sqrt(finite**2 @ (G @ self.root) ** 2), np.inf)
+
+    @property
+    def known(self) -> Array:
+        """Samples at which the state of every joint is known, bool, shape (N,)."""
+        return np.asarray(np.isfinite(self.deviation).all(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """Joint positions, velocities and accelerations, each of shape (N, n), rad or m, per s, per
+    s^2.
+
+    errors : what is known of errors of the velocities; None: they count as exact.
+    findings : what the reader says of the encoders.
+    channels : functions of time that laws of the model read, (N,) by name.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+    errors: SpeedErrors | None = None
+    findings: tuple[str, ...] = ()
+    channels: Mapping[str, Array] = field(default_factory=dict)
+
+    def __getitem__(self, samples: slice | Array) -> States:
+        errors = None if self.errors is None else self.errors[samples]
+        states, channels = (self.q, self.qd, self.qdd), self.channels.items()
+        q, qd, qdd = (x[samples] for x in states)
+        return States(q, qd, qdd, errors, self.findings, {c: x[samples] for c, x in channels})
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+
+def filtered_states(q: Array, rate: float, signals: Signals, v: Array | None = None) -> States:
+    """q, qd, qdd of measured positions: median, low-pass on q, difference, low-pass on qd,
+    difference.
+
+    q : ndarray, shape (N, n), rad or m.   rate : Hz.   v : recorded velocities, shape (N, n), which
+    take over from the differences where signals.velocity says.
+    """
+    q = median_filtered(q, signals.median)
+    low = signals.lowpass
+    if low is not None and "q" in low.on:
+        q = lowpass_filtered(q, rate, low)
+    qd = derivative(q, rate, signals.ends)
+    if v is not None and not isinstance(signals.velocity, str):
+        v = median_filtered(v, signals.median)
+        if low is not None and "q" in low.on:
+            v = lowpass_filtered(v, rate, low)
+        qd = blended(qd, v, rate, signals.velocity)
+    if low is not None and "qd" in low.on:
+        qd = lowpass_filtered(qd, rate, low)
+    return States(q, qd, derivative(qd, rate, signals.ends))
+
+
+def blended(qd: Array, v: Array, rate: float, crossing: float | tuple[float, ...]) -> Array:
+    """v + L (qd - v), shape (N, n), of differences qd and recorded velocities v; L the zero-phase
+    first-order low-pass at `crossing`, Hz (`runtime.speeds`).
+    """
+    mixed = qd.copy()
+    for j, f in enumerate(np.broadcast_to(crossing, qd.shape[1:]).tolist()):
+        if f < rate / 2:
+            low = Lowpass(cutoff=f, order=1)
+            mixed[:, j] = v[:, j] + lowpass_filtered(qd[:, j] - v[:, j], rate, low)
+    return mixed
+
+
+IN_CACHE = 4096
+"""Samples of a running median computed at a time."""
+
+
+def median_filtered(x: Array, window: int) -> Array:
+    """Running median over `window` samples of each column of x, shape (N, n); the ends repeat the
+    end value, never zeros.
+    """
+    if window == 1:
+        return x
+    if window not in (3, 5):
+        return np.asarray(ndimage.median_filter(x, size=(window, 1), mode="nearest"))
+    extended = np.concatenate(
+        [np.repeat(x[:1], window // 2, axis=0), x, np.repeat(x[-1:], window // 2, axis=0)]
+    )
+    found = np.empty_like(x)
+    for start in range(0, len(x), IN_CACHE):
+        count = min(IN_CACHE, len(x) - start)
+        shifted = [extended[start + k : start + k + count] for k in range(window)]
+        a, b = (shifted[0], shifted[1]) if window == 3 else _inner(*shifted[:4])
+        middle = np.minimum(np.maximum(a, b), shifted[-1])
+        np.maximum(np.minimum(a, b), middle, out=found[start : start + count])
+    return found
+
+
+def _inner(a: Array, b: Array, c: Array, d: Array) -> tuple[Array, Array]:
+    """The two middle ones of four values: their median with a fifth value is that of all five."""
+    return np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(
+        np.maximum(a, b), np.maximum(c, d)
+    )
+
+
+def lowpass_filtered(x: Array, rate: float, low: Lowpass) -> Array:
+    """Zero-phase Butterworth along the first axis of x, shape (N, n); each pass is 3 dB down at the
+    cut-off.
+    """
+    return zero_phase(*butterworth(rate, low), x, axis=0)
+
+
+@lru_cache(maxsize=32)
+def butterworth(rate: float, low: Lowpass) -> tuple[Array, int]:
+    """Second-order sections of the low-pass, shape (sections, 6), and the samples by which its ends
+    are extended.
+    """
+    if low.hertz >= rate / 2:
+        raise InputError(
+            f"low-pass at {low.hertz:g} Hz for a record at {rate:g} Hz; expected less than the "
+            f"Nyquist frequency {rate / 2:g} Hz, "
+            "set signals.lowpass.cutoff (or record.units.t, where the rate is not that of the "
+            "record)"
+        )
+    sos = butter(low.order, low.hertz, fs=rate, output="sos")
+    length = low.order + 1
+    return sos, 3 * (length - 1) if low.padding == "matlab" else 3 * length
+
+
+def derivative(x: Array, rate: float, ends: str = "one-sided") -> Array:
+    """Central differences (x_(k+1) - x_(k-1)) rate/2 along the first axis; at both ends a one-sided
+    difference.
+    """
+    return np.asarray(np.gradient(x, 1 / rate, axis=0, edge_order=1 if ends == "one-sided" else 2))
+
+
+CLOCK = 1e-6
+"""Relative error of a rate that comes from a time column: 20 stays 20."""
+
+
+def decimation_factor(signals: Signals, rate: float) -> int:
+    """n_d = 0.8 ws/(2 wf), eq. (13), rounded down so that the band up to wf is kept; 1 without
+    decimation.
+    """
+    if signals.decimate is None:
+        return 1
+    if signals.decimate.factor != "auto":
+        return signals.decimate.factor
+    if signals.lowpass is None:
+        raise InputError(
+            "signals.decimate.factor is auto but there is no low-pass to take the cut-off from, "
+            "eq. (13); give a number"
+        )
+    return max(1, floor(CUTOFF * rate / (2 * signals.lowpass.hertz) * (1 + CLOCK)))
+
+
+def kept_samples(N: int, factor: int, phase: str) -> Array:
+    """Indices of the samples that decimation keeps: from the first one on, or such that the last
+    one is kept (MATLAB).
+    """
+    first = 0 if phase == "first" else factor - 1 - (factor * -(-N // factor) - N)
+    return np.arange(first, N, factor)
+
+
+def decimated(x: Array, factor: int, settings: Decimate | None) -> Array:
+    """Zero-phase Chebyshev I filter along the last axis of x, shape (..., N), then one sample in
+    `factor`; x itself for a factor of 1.
+
+    Of even order, the filter has gain 10**(-2*0.05/20) = 0.98855 at zero frequency: Y and every
+    column of W need it alike, offsets too.
+    """
+    how = decimation_plan(x.shape[-1], factor, settings)
+    return (
+        x if how is None else decimate(x.reshape(-1, x.shape[-1]), how).reshape(*x.shape[:-1], -1)
+    )
+
+
+def decimation_plan(
+    N: int, factor: int, settings: Decimate | None, first: int | None = None
+) -> Plan | None:
+    """The decimation of N samples; None for a factor of 1. first : first sample kept; default: by
+    the settings.
+    """
+    if factor == 1 or settings is None:
+        return None
+    pad = 3 * ORDER if settings.padding == "matlab" else 3 * (ORDER + 1)
+    require_longer(N, pad)
+    return plan(
+        N, factor, int(kept_samples(N, factor, settings.phase)[0]) if first is None else first, pad
+    )
+
+
+def zero_phase(sos: Array, pad: int, x: Array, axis: int) -> Array:
+    """Filter forward and backward after odd reflection of `pad` samples at each end, started in the
+    steady state of the first value.
+    """
+    require_longer(x.shape[axis], pad)
+    return np.asarray(sosfiltfilt(sos, x, axis=axis, padtype="odd", padlen=pad))
+
+
+def require_longer(samples: int, pad: int) -> None:
+    """Raise InputError unless there are more than `pad` samples to reflect."""
+    if samples <= pad:
+        raise InputError(
+            f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "
+            "or window, or a lower order"
+        )
+
+
+__all__ = [
+    "Decimate",
+    "Lowpass",
+    "Signals",
+    "SpeedErrors",
+    "States",
+    "butterworth",
+    "decimated",
+    "decimation_factor",
+    "decimation_plan",
+    "derivative",
+    "filtered_states",
+    "kept_samples",
+    "lowpass_filtered",
+    "median_filtered",
+    "require_longer",
+    "zero_phase",
+]

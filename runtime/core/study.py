@@ -1,0 +1,473 @@
+"""Everything about an experiment that is not the robot: the study file as frozen settings.
+
+    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 100}}})
+    study.signals.lowpass.order        # 4, the default
+    to_mapping(study)                  # complete, defaults filled: written into every result
+
+Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) but for the cut-off, which
+follows from the record: Butterworth of order 4 forward and backward on q and qd, central
+differences, parallel decimation by eq. (13), ordinary least squares, essential parameters by the
+threshold 1.04, five CESTAC runs.
+Units: SI, rad, Hz. Values are checked where they are made, so a Study that exists is a valid one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field, replace
+from math import pi
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from runtime.core.settings import (
+    Count,
+    Flag,
+    Interval,
+    Many,
+    NotNegative,
+    OddWindow,
+    PerJoint,
+    Positive,
+    Real,
+    Seed,
+    Settings,
+    Text,
+    Whole,
+    require,
+    structure,
+    to_mapping,
+)
+from runtime.excitation.settings import ExcitationSettings
+from runtime.loop.settings import Controller
+from runtime.reading.settings import (
+    Columns,
+    Records,
+    RecordSettings,
+    Resample,
+    Scale,
+    Units,
+    with_law,
+)
+from runtime.reading.units import speed
+
+SCHEMA = 1
+LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+"""Standard parameters of a load."""
+
+
+def version(number: int) -> int:
+    """The version of a study file; SettingsError where it is not SCHEMA."""
+    require(number == SCHEMA, f"schema {number}; this version reads {SCHEMA}")
+    return number
+
+
+Version = Annotated[Whole, AfterValidator(version)]
+CHAPTER_CUTOFF = 50.0
+"""Cut-off of the low-pass in the chapter, Hz."""
+
+
+class Lowpass(Settings):
+    """Butterworth low-pass filter, forward and backward, in second-order sections.
+
+    Attributes
+    ----------
+    cutoff : float or str, Hz
+        Cutoff frequency; auto: from the motion and the noise of the records
+        (`runtime.core.signals.cutoff`), twice that for counts, 50 at most, as in the chapter, and 50
+        where no record is.
+    order : int
+        Order of the filter.
+    on : tuple of str
+        Signals that are filtered before they are differentiated, of q and qd.
+    padding : str
+        Samples added at each end: matlab, 3*order, or scipy, 3*(order + 1) for an even order.
+    """
+
+    cutoff: Positive | Literal["auto"] = "auto"
+    order: Annotated[Whole, Field(ge=1, le=20)] = 4
+    on: Many[Literal["q", "qd"]] = ("q", "qd")
+    padding: Literal["matlab", "scipy"] = "matlab"
+
+    @property
+    def hertz(self) -> float:
+        """The cut-off as a number; that of the chapter where auto has no record to follow."""
+        return CHAPTER_CUTOFF if self.cutoff == "auto" else float(self.cutoff)
+
+
+class Decimate(Settings):
+    """Parallel decimation of Y and of every column of W: Chebyshev I of order 8, 0.05 dB,
+    0.8/factor, zero phase, one sample kept in `factor`.
+
+    Attributes
+    ----------
+    factor : int or str
+        Samples for one that is kept; auto is eq. (13), n_d = 0.8 ws/(2 wf), rounded down.
+    phase : str
+        Sample kept: the first (scipy) or the last (MATLAB's decimate).
+    padding : str
+        Samples added at each end: scipy, 27, or matlab, 24.
+    """
+
+    factor: Count | Literal["auto"] = "auto"
+    phase: Literal["first", "last"] = "first"
+    padding: Literal["scipy", "matlab"] = "scipy"
+
+
+class Signals(Settings):
+    """From measured positions to q, qd, qdd.
+
+    Attributes
+    ----------
+    median : int
+        Window of the median filter on positions and torques, odd number of samples; 1 switches it
+        off.
+    lowpass : Lowpass or None
+        Low-pass filter; null switches it off.
+    ends : str
+        Derivative at the two ends: a one-sided difference, or one of second order.
+    decimate : Decimate or None
+        Decimation; null switches it off.
+    reader : str
+        Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of
+        an encoder, which bound the motion, and
+        needs no median; static takes each row as a pose at rest, with the mean of its torques: no
+        filter, no decimation, no trim, whatever their settings say.
+    step : float or tuple of float or None, rad or m
+        Step of the encoders, for counts; null: from the record.
+    side : str
+        Side of the encoders, for counts: joint, or motor by the drives of the robot.
+    velocity : str or float or tuple of float, Hz
+        Where record.columns.qd are velocities that were recorded: from which frequency on they
+        stand for differences of q; auto: where the noise of both is alike, and not where they
+        disagree with the positions; differences: they are not used. For reader lowpass.
+    torque_median : int or str
+        Window of the median filter on torques; auto: as on positions, but none where it would take
+        torque that goes with the motion, as from a controller that answers every count
+        (`runtime.median`).
+    """
+
+    median: OddWindow = 5
+    lowpass: Lowpass | None = field(default_factory=Lowpass)
+    ends: Literal["one-sided", "second-order"] = "one-sided"
+    decimate: Decimate | None = field(default_factory=Decimate)
+    reader: Literal["lowpass", "counts", "static"] = "lowpass"
+    step: PerJoint[Positive] | None = None
+    side: Literal["joint", "motor"] = "joint"
+    velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
+    torque_median: OddWindow | Literal["auto"] = "auto"
+
+    def __post_init__(self) -> None:
+        for key, given in (
+            ("step", self.step is not None),
+            ("side", self.side != "joint"),
+        ):
+            require(
+                self.reader == "counts" or not given,
+                f"given, but reader is {self.reader}; it is a setting of reader: counts",
+                key,
+            )
+        if self.reader == "static":
+            single = {"median": 1, "torque_median": 1, "lowpass": None, "decimate": None}
+            for key, value in single.items():
+                object.__setattr__(self, key, value)
+
+    @property
+    def window_of_torques(self) -> int:
+        """Window of the median on torques; that on positions where auto has no record to follow."""
+        return self.median if isinstance(self.torque_median, str) else self.torque_median
+
+    @property
+    def admits_missing(self) -> bool:
+        """Whether positions of a record may be missing: the reader of counts fills them."""
+        return self.reader == "counts"
+
+
+class Rows(Settings):
+    """Rows of W and Y that are used.
+
+    Attributes
+    ----------
+    window : pair of float or None, s
+        [t0, t1], applied before the regressor is evaluated; null leaves an end open.
+    trim : int or str
+        Decimated samples left out at each end of the window, where the filters start; auto: 3, and
+        ahead of the decimation the samples within 3/cutoff of an end of the record, at most a
+        tenth of it.
+    low_speed : float or tuple of float, rad/s or m/s
+        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
+        have another unit: 2 rpm.
+    """
+
+    window: Interval = (None, None)
+    trim: Annotated[Whole, Field(ge=0)] | Literal["auto"] = "auto"
+    low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
+
+
+SIMULATING = ("iv", "didim")
+"""Methods that simulate the closed loop."""
+
+
+class EstimateSettings(Settings):
+    """The estimator and its columns.
+
+    Attributes
+    ----------
+    method : str
+        Estimator.
+    weights : str
+        Weights of the rows by joint.
+    columns : str or tuple of str
+        all, or the names of the columns kept.
+    options : mapping
+        Options of the method.
+    """
+
+    method: Literal["ols", "wls", "irls", "iv", "didim", "feasible"] = "ols"
+    weights: Literal["none", "joint", "iterated", "covariance"] = "none"
+    columns: Literal["all"] | Many[Text] = "all"
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+class EssentialSettings(Settings):
+    """Parameters are removed while sigma_rho stays below a threshold (chapter, section 4.1.1).
+
+    Attributes
+    ----------
+    threshold : float
+        Largest ratio of sigma_rho to its first value.
+    first : bool
+        Whether the essential parameters may stand for the robot, as in the chapter; their
+        deviations take those that were removed as zero. Default: physical or all parameters.
+    """
+
+    threshold: Annotated[Real, Field(gt=1)] = 1.04
+    first: Flag = False
+
+
+class ValidateSettings(Settings):
+    """Data that the parameters are fitted on, and data that they predict.
+
+    Attributes
+    ----------
+    split : tuple of pairs of float or None, s
+        Windows: the first is fitted, the others are predicted.
+    record : tuple of RecordSettings
+        Further records, predicted with the parameters of the study.
+    values : bool
+        Whether parameters are to be used one by one: the verdict then asks for small deviations and
+        for parameters that can be told apart.
+    """
+
+    split: tuple[Interval, ...] = ()
+    record: Records = ()
+    values: Flag = False
+
+    def __post_init__(self) -> None:
+        require(
+            len(self.split) != 1,
+            "one window; expected at least two, the first to fit, the others to predict",
+            "split",
+        )
+
+
+class PayloadSettings(Settings):
+    """Records with a load fixed to a link; the records of the study are those without it.
+
+    Attributes
+    ----------
+    record : tuple of RecordSettings
+        Records with the load.
+    link : int or None
+        Number of the link with the load; default: the last, or that of the frame.
+    frame : int or None
+        Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
+        load are meant; default: that of the link.
+    known : mapping of float, SI
+        Those of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at that frame, that were weighed or
+        computed.
+    friction : bool
+        The records with the load have friction of their own.
+    gains : bool
+        Also estimate the torque constants of the drives from the load; its M must be known.
+    """
+
+    record: Records = ()
+    link: Whole | None = None
+    frame: Whole | None = None
+    known: Mapping[Text, Real] = field(default_factory=dict)
+    friction: Flag = False
+    gains: Flag = False
+
+    def __post_init__(self) -> None:
+        for family in self.known:
+            require(
+                family in LOAD, f"unknown parameter; a load has {', '.join(LOAD)}", "known", family
+            )
+        require(
+            self.known.get("M", 1.0) > 0,
+            f"{self.known.get('M')} kg; expected a positive mass",
+            "known",
+            "M",
+        )
+        require(
+            not self.gains or "M" in self.known,
+            "torque constants need a weighed load: set known: {M: ...}",
+            "gains",
+        )
+
+
+class CestacSettings(Settings):
+    """Encoder-resolution study, eqs. (15)-(22), (28).
+
+    Attributes
+    ----------
+    side : str
+        Side of the encoder: joint or motor.
+    rounding : str
+        Law of the perturbations; phase is that of a real encoder: counts of steps whose phase is
+        random by joint and run.
+    uneven : float
+        Deviation of the lines of law phase from even spacing, in steps.
+    place : str
+        What is rounded: the positions of the record, or, in the closed loop of study.controller
+        simulated anew in every run, its encoder.
+    delta : tuple of float, rad or m
+        Steps of the perturbed position.
+    runs : int
+        Runs for each step; eq. (19) divides by runs - 1.
+    seed : int
+        Seed of the random numbers.
+    columns : str or tuple of str
+        essential, all, or names.
+    torque : tuple of float or None, N m or N
+        Steps of the perturbed motor torque (Table 4); null: none.
+    common : bool
+        The same random numbers for every delta.
+    median : int
+        Window of the median filter in this study, 1 for none: a median enlarges the bias.
+    """
+
+    side: Literal["joint", "motor"] = "joint"
+    rounding: Literal["two-point", "uniform", "gaussian", "quantise", "phase"] = "two-point"
+    uneven: Annotated[Real, Field(ge=0, le=0.5)] = 0.0
+    place: Literal["record", "loop"] = "record"
+    delta: Many[Positive] = (2 * pi / 10000, 2 * pi / 5000, 2 * pi / 2000, 2 * pi / 1000)
+    runs: Annotated[Whole, Field(ge=2)] = 5
+    seed: Seed = 1
+    columns: Literal["essential", "all"] | Many[Text] = "essential"
+    torque: Many[Real] | None = None
+    common: Flag = False
+    median: OddWindow = 1
+
+    def __post_init__(self) -> None:
+        law, loop = self.rounding, self.place == "loop"
+        require(
+            not self.uneven or law == "phase",
+            f"{self.uneven} with rounding: {law}; uneven lines belong to rounding: phase",
+            "uneven",
+        )
+        require(
+            not (self.common and law == "phase"),
+            "the phase of rounding: phase is drawn anew for every step; set common: false",
+            "common",
+        )
+        require(
+            not loop or law == "phase",
+            f"{law} with place: loop; the encoder in the loop rounds by the law phase alone",
+            "rounding",
+        )
+        require(
+            not (loop and self.uneven),
+            f"{self.uneven} with place: loop; the encoder in the loop has even lines",
+            "uneven",
+        )
+        require(
+            not (loop and self.torque),
+            "with place: loop; steps of the torque there are controller.torque.step",
+            "torque",
+        )
+
+
+class Study(Settings):
+    """All settings of an experiment.
+
+    Attributes
+    ----------
+    symgen : int
+        Version of the study file.
+    record : tuple of RecordSettings
+        One or several records of one robot.
+    signals : Signals
+        Filters of the measured signals.
+    rows : Rows
+        Rows of W and Y that are used.
+    estimate : EstimateSettings
+        Estimator.
+    essential : EssentialSettings
+        Choice of the essential parameters.
+    validate : ValidateSettings
+        Validation.
+    cestac : CestacSettings
+        Encoder-resolution study.
+    payload : PayloadSettings or None
+        Records with a load.
+    controller : Controller or None
+        Closed loop of simulation, IV and DIDIM.
+    excitation : ExcitationSettings or None
+        Search for an exciting motion.
+    """
+
+    symgen: Version = SCHEMA
+    record: Records = ()
+    signals: Signals = field(default_factory=Signals)
+    rows: Rows = field(default_factory=Rows)
+    estimate: EstimateSettings = field(default_factory=EstimateSettings)
+    essential: EssentialSettings = field(default_factory=EssentialSettings)
+    validate: ValidateSettings = field(default_factory=ValidateSettings)
+    cestac: CestacSettings = field(default_factory=CestacSettings)
+    payload: PayloadSettings | None = None
+    controller: Controller | None = None
+    excitation: ExcitationSettings | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "record", with_law(self.record, self.controller))
+        for section in ("validate", "payload"):
+            given = getattr(self, section)
+            if given is not None and any(record.by_law for record in given.record):
+                own = replace(given, record=with_law(given.record, self.controller))
+                object.__setattr__(self, section, own)
+
+
+def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
+    """The Study of a mapping as read from a study file; raises SettingsError with the path of the
+    offending key.
+
+    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
+    record).
+    """
+    return structure(Study, mapping)
+
+
+__all__ = [
+    "LOAD",
+    "SCHEMA",
+    "CestacSettings",
+    "Columns",
+    "Decimate",
+    "EssentialSettings",
+    "EstimateSettings",
+    "Lowpass",
+    "PayloadSettings",
+    "RecordSettings",
+    "Resample",
+    "Rows",
+    "Scale",
+    "Signals",
+    "Study",
+    "Units",
+    "ValidateSettings",
+    "Version",
+    "study_from_mapping",
+    "to_mapping",
+]

@@ -1,0 +1,146 @@
+"""A table of texts, made once per result and printed as aligned text, as HTML of a notebook, or on
+the page of a report.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any
+
+from runtime.core.markup import Markup, element, symbol, unit
+
+IN_LINE = 4  # of values in a line
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text or Markup under a header.
+
+    Attributes
+    ----------
+    caption : str
+    header : sequence of str
+    rows : sequence of sequences of str
+        The first cell names the row and stands to the left, the others to the right.
+    note : str
+        Text that follows the table.
+    wide : sequence of int
+        Numbers, from 0, of columns of words, which stand to the left.
+    sortable : bool
+        By any column, where scripts run.
+    kinds : sequence of str
+        One word per row; a button `only` then leaves the rows of the first kind.
+    only : str
+        Label of that button.
+    stacked : bool
+        On a narrow screen every row is a block of lines.
+    symbols : bool
+        The first cells are names of parameters, which HTML prints with their subscripts.
+    """
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    wide: Sequence[int] = ()
+    sortable: bool = False
+    kinds: Sequence[str] = ()
+    only: str = ""
+    stacked: bool = False
+    symbols: bool = False
+
+    def __post_init__(self) -> None:
+        wrong = [row for row in self.rows if len(row) != len(self.header)]
+        if wrong:
+            raise ValueError(
+                f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected "
+                f"{len(self.header)}, {self.header}"
+            )
+        if self.kinds and len(self.kinds) != len(self.rows):
+            raise ValueError(
+                f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one "
+                "per row"
+            )
+
+    def to_text(self) -> str:
+        """Columns of text under the header, without the caption."""
+        return aligned([self.header, *self.rows])
+
+    def to_html(self) -> Markup:
+        """A table element that needs no style sheet."""
+        written = [
+            symbol if k == 0 and self.symbols else unit if name == "unit" else str
+            for k, name in enumerate(self.header)
+        ]
+        body = [
+            [
+                write(cell) if type(cell) is str else cell
+                for write, cell in zip(written, row, strict=True)
+            ]
+            for row in self.rows
+        ]
+        head = element("thead", self._row("th", self.header))
+        return element("table", head, element("tbody", *(self._row("td", row) for row in body)))
+
+    def _row(self, tag: str, cells: Sequence[str]) -> Markup:
+        sides = ("left" if k == 0 or k in self.wide else "right" for k in range(len(cells)))
+        return element(
+            "tr",
+            *(
+                element(tag, c, style=f"padding:0 0.6em;text-align:{side}")
+                for c, side in zip(cells, sides, strict=True)
+            ),
+        )
+
+
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """Columns of text under a header: the first column to the left, numbers to the right."""
+    widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
+    text = []
+    for line in lines:
+        cells = [
+            line[0].ljust(widths[0]),
+            *(cell.rjust(width) for cell, width in zip(line[1:], widths[1:], strict=True)),
+        ]
+        text.append("  ".join(cells).rstrip())
+    return "\n".join(text)
+
+
+def in_lines(cells: Sequence[str]) -> list[str]:
+    """Cells of one width, IN_LINE to a line."""
+    width = max(map(len, cells), default=0) + 2
+    rows = [cells[k : k + IN_LINE] for k in range(0, len(cells), IN_LINE)]
+    return ["".join(cell.ljust(width) for cell in row).rstrip() for row in rows]
+
+
+def with_intervals(
+    names: Iterable[str], values: Iterable[float], sigma: Iterable[float]
+) -> list[str]:
+    """Values with their 95 % intervals, such as ZZ1R 1.79 +- 0.02, from their deviations."""
+    return [f"{n} {x:.4g} +- {1.96 * s:.2g}" for n, x, s in zip(names, values, sigma, strict=True)]
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Comma separated values under a header; a number as Python reads it back, None empty."""
+    stream = StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([header, *rows])
+    return stream.getvalue()
+
+
+def notebook(paragraphs: Sequence[str], *tables: Table) -> Markup:
+    """Paragraphs, the first table, and further ones behind a fold with their captions: a result in
+    a notebook. Every text is escaped.
+    """
+    folds = [
+        element("details", element("summary", table.caption), table.to_html())
+        for table in tables[1:]
+    ]
+    return element(
+        "div",
+        *(element("p", text) for text in paragraphs),
+        *(table.to_html() for table in tables[:1]),
+        *folds,
+    )

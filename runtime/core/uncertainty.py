@@ -1,0 +1,355 @@
+"""What eqs. (9)-(11) and the threshold 1.04 take for granted, checked on the record.
+
+    bootstrap     blocks of time drawn again with replacement, least squares each time: deviations
+                  without the assumption of independent residuals,
+                  beside sigma (10) and the corrected one
+    whiteness     are the residuals of every joint independent (`runtime.core.residuals`)?
+    F-test        does a parameter that was removed carry something? Removing q of b raises the
+                  squared residual norm S from S_0 to S_q:
+                  F = (S_q - S_0)/q / (S_0/(r - b)), F(q, r - b) without effect; r counts only the
+                  rows that are worth one (N_eff)
+    sensitivity   which parameters come and go when the threshold on sigma_rho moves
+
+S_q = ratio^2 (r - b + q) S_0/(r - b), with the ratio of sigma_rho that the trail of
+`runtime.core.essential` holds.
+
+References: Seber and Lee (2003), section 4.3, for F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import fdtrc
+
+from runtime.core.documents import Result
+from runtime.core.essential import Essential
+from runtime.core.least_squares.block_covariance import gram_solution, scatter
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.limits import LIMIT
+from runtime.core.residuals import Whiteness, effective_share, whiteness
+from runtime.core.rows.observation import Observation
+from runtime.core.study import EstimateSettings
+from runtime.core.table import Table
+from runtime.core.validation import JointComparison
+
+Array = np.ndarray
+
+SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class BlockBootstrap:
+    """Deviations of the essential parameters three ways.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The b parameters.
+    sigma : ndarray, shape (b,), SI
+        Eq. (10).
+    corrected : ndarray, shape (b,), SI
+        Jackknife over blocks of time.
+    drawn : ndarray, shape (b,), SI
+        Blocks of time drawn again with replacement.
+    blocks : int
+        Number of blocks.
+    length : float, s
+        Length of a block.
+    runs, seed : int
+        Draws, and the seed of their random numbers.
+    """
+
+    names: tuple[str, ...]
+    sigma: Array
+    corrected: Array
+    drawn: Array
+    blocks: int
+    length: float
+    runs: int = LIMIT.BOOTSTRAP_RUNS
+    seed: int = SEED
+
+    @property
+    def ratio(self) -> Array:
+        """Drawn over eq. (10), shape (b,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.drawn / self.sigma)
+
+
+@dataclass(frozen=True)
+class FTest:
+    """One step of the trail, tested.
+
+    Attributes
+    ----------
+    name : str
+        Parameter removed.
+    ratio : float
+        sigma_rho over its first value.
+    F, p : float
+        Statistic and probability of all removals up to this one.
+    F_step, p_step : float
+        Those of this removal against the step before.
+    removed : bool
+        Whether the threshold allowed it.
+    """
+
+    name: str
+    ratio: float
+    F: float
+    p: float
+    F_step: float
+    p_step: float
+    removed: bool
+
+    @property
+    def significant(self) -> bool:
+        """p below 5 %: the parameters removed so far carry something."""
+        return bool(self.p < LIMIT.SIGNIFICANT)
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty(Result):
+    """Checks of the essential parameters of one identification.
+
+    Attributes
+    ----------
+    bootstrap : BlockBootstrap
+        Deviations three ways.
+    whiteness : tuple of Whiteness
+        Residuals by joint.
+    f_tests : tuple of FTest
+        Steps of the trail.
+    sets : tuple of (float, int, tuple of str)
+        By threshold: count, and names that differ from the set used ("-": removed besides, "+":
+        kept besides).
+    all_count : int
+        Number of all parameters.
+    memory : float, s
+        How long the residuals remember: rows over those that count, in time.
+    """
+
+    bootstrap: BlockBootstrap
+    whiteness: tuple[Whiteness, ...]
+    f_tests: tuple[FTest, ...]
+    sets: tuple[tuple[float, int, tuple[str, ...]], ...]
+    all_count: int
+    memory: float
+
+    @property
+    def kept_by_f_test(self) -> int:
+        """Parameters left before the first significant removal."""
+        return self.all_count - next(
+            (k for k, test in enumerate(self.f_tests) if test.significant), len(self.f_tests)
+        )
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """One sentence for each check."""
+        ratio = self.bootstrap.ratio[np.isfinite(self.bootstrap.ratio)]
+        spread = (
+            f"from {ratio.min():.1f} to {ratio.max():.1f}, median {np.median(ratio):.1f}"
+            if len(ratio)
+            else "unknown"
+        )
+        coloured = [w.joint for w in self.whiteness if not w.white]
+        white = f"not white on joint {', '.join(coloured)}" if coloured else "white on every joint"
+        share = 100 * effective_share(self.whiteness)
+        kept = self.all_count - sum(test.removed for test in self.f_tests)
+        long = self.memory > LIMIT.BLOCK_MEMORY * self.bootstrap.length
+        return (
+            *((self.too_short,) if long else ()),
+            (
+                f"Deviations by blocks drawn again are {spread} times sigma (10): "
+                f"{self.bootstrap.blocks} blocks of {self.bootstrap.length:.3g} s, "
+                f"{self.bootstrap.runs} draws."
+            ),
+            (
+                f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of "
+                "their "
+                "number."
+            ),
+            (
+                f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count "
+                "keeps "
+                f"{self.kept_by_f_test}."
+            ),
+        )
+
+    @property
+    def too_short(self) -> str:
+        """That blocks do not see how long the residuals remember, a sentence."""
+        return (
+            f"The residuals remember {self.memory:.2g} s, the blocks last "
+            f"{self.bootstrap.length:.2g} s: the corrected deviations may be too small. Find what "
+            "errs so slowly (friction, temperature, an offset), record for longer, or set longer "
+            "blocks: estimate: {options: {block: ...}}, s."
+        )
+
+    def to_table(self) -> str:
+        """Sentences, then every table."""
+        return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
+
+    def to_text(self) -> str:
+        """Sentences, deviations and whiteness."""
+        return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
+
+    def tables(self) -> tuple[Table, ...]:
+        """Deviations, residuals by joint, F-tests along the trail, sets by threshold."""
+        drawn = self.bootstrap
+        deviations = (drawn.sigma, drawn.corrected, drawn.drawn)
+        columns = [[f"{x:.3g}" for x in own] for own in deviations]
+        columns.append([f"{x:.2f}" for x in drawn.ratio])
+        return (
+            Table(
+                "Deviations: eq. (10), corrected for correlation, blocks of time drawn again",
+                ("parameter", "sigma (10)", "corrected", "drawn", "drawn / (10)"),
+                list(zip(drawn.names, *columns, strict=True)),
+            ),
+            Table(
+                "Residuals by joint: correlation of neighbours, Ljung-Box, rows that count, "
+                "spectrum",
+                (
+                    *("joint", "rows", "rho_1", "Q", "p", "worth rows", "peak Hz"),
+                    "half of the power below Hz",
+                ),
+                [
+                    (
+                        *(w.joint, str(w.rows), f"{w.correlation[0]:+.2f}", f"{w.Q:.4g}"),
+                        *(f"{w.p:.2g}", f"{w.effective_rows:.0f}", f"{w.peak:.3g}"),
+                        f"{w.half:.3g}",
+                    )
+                    for w in self.whiteness
+                ],
+            ),
+            Table(
+                "F-tests along the trail; rows that count instead of rows",
+                ("removed", "sigma_rho ratio", "F", "p", "F of this one", "p of this one"),
+                [
+                    (
+                        t.name if t.removed else f"{t.name} (kept)",
+                        *(f"{t.ratio:.5f}", f"{t.F:.3g}", f"{t.p:.2g}"),
+                        *(f"{t.F_step:.3g}", f"{t.p_step:.2g}"),
+                    )
+                    for t in self.f_tests
+                ],
+            ),
+            Table(
+                "Essential parameters by threshold; - removed besides, + kept besides",
+                ("threshold", "parameters", "against the set used"),
+                [
+                    (f"{threshold:g}", str(count), " ".join(names) or "the same")
+                    for threshold, count, names in self.sets
+                ],
+            ),
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "verdict": self.verdict,
+            "scatter": {**vars(self.bootstrap), "ratio": self.bootstrap.ratio},
+            "whiteness": [{**vars(w), "white": w.white} for w in self.whiteness],
+            "f_tests": self.f_tests,
+            "kept_by_f_test": self.kept_by_f_test,
+            "sets": [
+                {"threshold": threshold, "count": count, "difference": names}
+                for threshold, count, names in self.sets
+            ],
+        }
+
+
+def uncertainty(
+    observation: Observation,
+    settings: EstimateSettings,
+    essential: Essential,
+    comparison: Sequence[JointComparison],
+) -> Uncertainty:
+    """Checks of the essential parameters of an observation.
+
+    Parameters
+    ----------
+    observation : Observation
+        Rows that gave them.
+    settings : EstimateSettings
+        Method of the study; the checks are those of its linear companion.
+    essential : Essential
+        Parameters, and the trail to them.
+    comparison : sequence of JointComparison
+        Residuals whose whiteness is tested.
+    """
+    by_joint = whiteness(comparison, observation.rate)
+    share = effective_share(by_joint)
+    return Uncertainty(
+        bootstrap=block_bootstrap(observation, settings, essential.estimate),
+        whiteness=by_joint,
+        f_tests=f_tests(essential, share),
+        sets=sets(essential),
+        all_count=len(essential.all_parameters.names),
+        memory=1 / (share * observation.rate) if share > 0 else 0.0,
+    )
+
+
+def block_bootstrap(
+    observation: Observation,
+    settings: EstimateSettings,
+    fit: Estimate,
+    *,
+    runs: int = LIMIT.BOOTSTRAP_RUNS,
+    seed: int = SEED,
+) -> BlockBootstrap:
+    """Deviations of `fit` by `runs` draws of its blocks of residuals; weights stay."""
+    system = linear_system(observation, linear_companion(settings)).select(fit.names)
+    blocks, drawn = list(system.block_rows()), np.full(len(fit.names), np.nan)
+    if len(blocks) > 1 and fit.status == "ok":
+        drawn = scatter(blocks, gram_solution, runs, seed)
+    length = float(fit.settings["residual_block"])
+    return BlockBootstrap(
+        fit.names, fit.sigma, fit.sigma_corrected, drawn, len(blocks), length, runs, seed
+    )
+
+
+def f_tests(essential: Essential, share: float = 1.0) -> tuple[FTest, ...]:
+    """Tests along the trail, none where there are no more rows than parameters; share : rows that
+    count over rows.
+    """
+    r, b = essential.all_parameters.rows, len(essential.all_parameters.names)
+    if r <= b:
+        return ()
+    tests = []
+    before = 1.0  # S over S_0
+    for q, step in enumerate(essential.trail, start=1):
+        S = step.ratio**2 * (r - b + q) / max(r - b, 1)
+        free = max(share * r - b, 1.0)
+        F, F_step = (S - 1) / q * free, (S - before) / before * (free + q - 1)
+        tests.append(
+            FTest(
+                step.name,
+                step.ratio,
+                F,
+                float(fdtrc(q, free, max(F, 0))),
+                F_step,
+                float(fdtrc(1, free + q - 1, max(F_step, 0))),
+                step.removed,
+            )
+        )
+        before = S
+    return tuple(tests)
+
+
+def sets(essential: Essential) -> tuple[tuple[float, int, tuple[str, ...]], ...]:
+    """By threshold: number of parameters, and what differs from the set used."""
+    steps = [*essential.trail, *essential.further]
+    names = essential.all_parameters.names
+    by_threshold = []
+    for threshold, count in essential.counts.items():
+        gone = [step.name for step in steps[: len(names) - count]]
+        differs = [f"-{name}" for name in gone if name in essential.names] + [
+            f"+{name}" for name in essential.removed if name not in gone
+        ]
+        by_threshold.append((threshold, count, tuple(differs)))
+    return tuple(by_threshold)

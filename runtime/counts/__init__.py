@@ -1,0 +1,1 @@
+"""Encoder counts read as counts."""

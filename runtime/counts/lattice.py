@@ -1,0 +1,313 @@
+"""Positions of an encoder as counts: position = count step + phase, with what contradicts that said
+or refused.
+
+The step comes from a data sheet or from the record, the phase from the record alone. Floor against
+round in a driver, and an offset of up to half a
+step of the zero of the joint, cannot be told from counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.core.errors import InputError
+
+Array = np.ndarray
+
+OFF = 0.1
+"""rms distance from the lattice, steps, from which positions are none of its points; positions
+anywhere have 0.29.
+"""
+WRAPS = (16, 32)
+"""Bits of counters."""
+INTERPOLATED = (1, 2, 4)
+"""Counts by which a count may change at least, where the step is that of the record."""
+FAST = 20
+"""Median change of the count from sample to sample, where it changes, above which a record tells of
+positions alone.
+"""
+FEW = 50
+"""Changes of a count below which little is known of its motion."""
+UNEQUAL = 1.01
+"""Ratio of the steps of two encoders above which they are not the same kind."""
+JUMP = 30
+"""A change of the count this many times its neighbours is none of a motion."""
+SHAKEN = 0.009
+"""Share of the changes of an encoder that cross a line the third time in a row, from which its
+motion counts as shaken.
+"""
+FEWEST = 1000
+"""Changes from which a share is one: nine such passages at least, since a coarse encoder sees one
+or two where a joint turns back near a line.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Counts of n encoders.
+
+    Attributes
+    ----------
+    step, phase : ndarray, shape (n,), rad or m
+    findings : tuple of str
+        Sentences about them.
+    counted : tuple of tuple of int
+        Counts of the device that one step may be, by encoder.
+    """
+
+    step: Array
+    phase: Array
+    findings: tuple[str, ...] = ()
+    counted: tuple[tuple[int, ...], ...] = ()
+    rounded: bool = False
+
+    def counts(self, position: Array) -> Array:
+        """Counts, shape (N, n), as floats; nan where the position is missing."""
+        return np.asarray(np.round((position - self.phase) / self.step))
+
+    def position(self, counts: Array) -> Array:
+        """Positions of counts, shape (N, n)."""
+        return np.asarray(counts * self.step + self.phase)
+
+
+def lattice(
+    position: Array,
+    step: Array | Sequence[float] | float | None = None,
+    *,
+    name: str = "record",
+) -> Lattice:
+    """The lattice of positions, shape (N, n), at the encoder side.
+
+    step : rad or m, one or one for each encoder; default: from the record.
+
+    Raises InputError where a step is not positive, is larger than the motion, or positions do not
+    lie on its lattice.
+    """
+    n = position.shape[1]
+    if step is not None:
+        given = np.atleast_1d(np.asarray(step, dtype=float))
+        if given.shape not in {(1,), (n,)} or not (np.isfinite(given).all() and (given > 0).all()):
+            raise InputError(
+                (
+                    f"step {step}; expected a positive number of rad or m, or {n}, one for each "
+                    "encoder"
+                ),
+                file=name,
+            )
+        step = np.broadcast_to(given, (n,))
+    if not any(np.nanmax(x) > np.nanmin(x) for x in position.T if np.isfinite(x).any()):
+        raise InputError(
+            "no position changes: counts that never change say nothing of a motion; record one",
+            file=name,
+        )
+    steps, phases, shares, findings = np.empty(n), np.empty(n), np.zeros(n), []
+    rounded = False
+    for j in range(n):
+        x, label = position[np.isfinite(position[:, j]), j], f"encoder {j + 1}"
+        if not len(x):
+            raise InputError(
+                (
+                    f"{label}: no sample is known; leave its joint out of the robot, or record its "
+                    "positions"
+                ),
+                file=name,
+            )
+        steps[j], said = _step(x, None if step is None else float(step[j]), label, name)
+        phases[j] = _phase(x, steps[j])
+        counts = np.round((x - phases[j]) / steps[j])
+        findings += [*said, *_speed(np.diff(counts), label)]
+        shares[j] = shaken_share(counts)
+        off = _distance(x, steps[j], phases[j])
+        if off > OFF:
+            raise InputError(f"{label}: {_off(x, off, steps[j], step is None)}", file=name)
+        if off > OFF / 5:
+            rounded = True
+            findings.append(
+                f"{label}: positions lie {off:.2g} steps (rms) off the lattice of step "
+                f"{steps[j]:.6g}, as if rounded to few digits"
+            )
+    if shares.max() > SHAKEN:
+        findings.append(
+            f"encoder {np.argmax(shares) + 1}: {100 * shares.max():.0f} % of its changes cross one "
+            "line to and fro; the motion shakes, as under a controller "
+            "that answers single counts. Counts do not show that: what is read, and its stated "
+            "deviations, are those of the smooth motion alone. Compare with signals: "
+            "{reader: lowpass}: neither is always nearer to the truth there"
+        )
+    if step is None:
+        moving = sum(bool(np.nanmax(x) > np.nanmin(x)) for x in position.T)
+        unequal = steps.max() > UNEQUAL * steps.min() and moving > 1
+        text = f"steps from the record: {', '.join(f'{x:.6g}' for x in steps)}"
+        findings.insert(
+            0, f"{text}; the encoders differ, compare with their data sheets" if unequal else text
+        )
+    counted = [INTERPOLATED] * n if step is None else [(round(x),) for x in steps / step]
+    return Lattice(steps, phases, tuple(findings), tuple(counted), rounded)
+
+
+def smallest_step(x: Array) -> float:
+    """The step of the lattice that distinct positions x, shape (N,), suggest; 0 where they never
+    change.
+    """
+    values = np.unique(x)
+    gaps = np.diff(values)
+    gaps = gaps[gaps > 1e-9 * max(np.ptp(values), np.abs(values).max() * 1e-5)]
+    if not len(gaps):
+        return 0.0
+    least = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    for _ in range(3):  # gaps are few steps each: their sum over their number of steps
+        near = gaps[gaps < 20.5 * least]
+        least = float(near.sum() / np.round(near / least).sum())
+    return least
+
+
+def to_and_fro(counts: Array) -> Array:
+    """Samples ahead of the first and behind the last of three changes in a row over one line, shape
+    (m, 2); counts, shape (N,), none missing.
+
+    A smooth motion crosses a line once, and twice where it turns back between two lines.
+    """
+    change = np.diff(counts)
+    at = np.flatnonzero(change)
+    same = np.diff(counts[at] + change[at] / 2) == 0
+    third = np.flatnonzero(same[1:] & same[:-1])
+    return np.stack([at[third], at[third + 2] + 1], axis=1)
+
+
+def shaken_share(counts: Array) -> float:
+    """Changes that end such a passage over all changes."""
+    return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
+
+
+def unwrapped_counts(
+    position: Array,
+    step: Array | Sequence[float] | float | None = None,
+    *,
+    name: str = "record",
+) -> tuple[Lattice, Array, tuple[str, ...]]:
+    """The lattice of positions (see `lattice`), their counts without wraps of counters of WRAPS
+    bits, shape (N, n), and what wrapped, a sentence for each encoder. InputError where counts jump
+    otherwise.
+    """
+    lattice_of_all = lattice(position, step, name=name)
+    counts = lattice_of_all.counts(position)
+    findings = []
+    for j, counted in enumerate(lattice_of_all.counted):
+        known = np.flatnonzero(np.isfinite(counts[:, j]))
+        k = counts[known, j]
+        change = np.diff(k)
+        near = np.maximum(np.abs(np.roll(change, 1)), np.abs(np.roll(change, -1)))
+        near = np.maximum(near, np.maximum(np.abs(np.roll(change, 2)), np.abs(np.roll(change, -2))))
+        near = (near + 2) * np.diff(known)
+        jumps = np.flatnonzero(np.abs(change) > JUMP * near)
+        if not len(jumps):
+            continue
+        size, moved, at = change[jumps], 2 * near[jumps], known[jumps + 1]
+        periods = {2**bits / steps: bits for bits in WRAPS for steps in counted}  # bits by steps
+        wrap = next((w for w in periods if (np.abs(np.abs(size) - w) <= moved).all()), None)
+        if wrap is None:
+            is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
+            first = int(np.argmin(is_wrap))
+            raise InputError(
+                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; "
+                "it was reset or lost there, cut the record at "
+                "such samples",
+                file=name,
+            )
+        turns = np.zeros(len(k))
+        turns[jumps + 1] = -np.sign(size) * wrap
+        counts[known, j] = k + np.cumsum(turns)
+        findings.append(
+            f"encoder {j + 1}: the count wraps at 2^{periods[wrap]} {len(jumps)} times; it was "
+            "unwrapped from the first sample on, whose turn the zero of the joint must suit"
+        )
+    return lattice_of_all, counts, tuple(findings)
+
+
+def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, list[str]]:
+    span = float(np.ptp(x))
+    if given is None:
+        own = smallest_step(x)
+        if own == 0:
+            return 1.0, [f"{label}: the count never changes; the position is taken as at rest"]
+        return own, []
+    if span == 0:
+        return given, [
+            (
+                f"{label}: the count never changes; the position is known to "
+                f"{given / np.sqrt(12):.3g} "
+                "and taken as at rest"
+            )
+        ]
+    if given > 1.5 * span:
+        raise InputError(
+            (
+                f"{label}: step {given:g} is larger than its motion, {span:g}; correct "
+                "signals.step "
+                f"(side: {label} sees the motor or the joint)"
+            ),
+            file=name,
+        )
+    changes = np.abs(np.round(np.diff(x) / given))
+    changes = changes[changes > 0].astype(np.int64)
+    common = int(np.gcd.reduce(changes)) if len(changes) >= 20 else 1
+    if common > 1:
+        return common * given, [
+            (
+                f"{label}: counts change by multiples of {common}; the step of the record is "
+                f"{common * given:.6g}, not {given:.6g}"
+            )
+        ]
+    return given, []
+
+
+def _phase(x: Array, step: float) -> float:
+    return float(step * np.angle(np.exp(2j * np.pi * (x / step)).mean()) / (2 * np.pi))
+
+
+def _distance(x: Array, step: float, phase: float) -> float:
+    cell = (x - phase) / step
+    return float(np.sqrt(np.mean((cell - np.round(cell)) ** 2)))
+
+
+def _off(x: Array, off: float, step: float, own: bool) -> str:
+    """What is wrong with positions that are `off` steps (rms) off their lattice, and what to do."""
+    text = f"positions lie {off:.2g} steps (rms) off the lattice of step {step:.6g}"
+    suggested = 0.0 if own else smallest_step(x)
+    if suggested and _distance(x, suggested, _phase(x, suggested)) < OFF / 5:
+        part, remedy = step / suggested, f"set signals.step to {suggested:.6g}, encoder by encoder"
+        if part > 1.5 and abs(part - round(part)) < 0.01:
+            return (
+                f"{text} and on one {round(part)} times finer: {remedy}, or, if a driver "
+                "averaged so many samples, record the counts"
+            )
+        return f"{text} and on one of step {suggested:.6g}: {remedy}"
+    return (
+        f"{text}; they were filtered, interpolated or converted by a driver or by record.resample, "
+        "or the step is another: correct signals.step, "
+        "record the counts, or use reader: lowpass"
+    )
+
+
+def _speed(change: Array, label: str) -> list[str]:
+    moving = np.abs(change[change != 0])
+    if 0 < len(moving) < FEW:
+        return [
+            (
+                f"{label}: the count changes {len(moving)} times only; the motion is known at "
+                "these "
+                "instants alone, move further or use a finer encoder"
+            )
+        ]
+    if len(moving) and (fast := float(np.median(moving))) > FAST:
+        return [
+            (
+                f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell "
+                "as "
+                "much as positions here, log faster"
+            )
+        ]
+    return []

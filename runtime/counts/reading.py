@@ -1,0 +1,339 @@
+"""From the counts of encoders to positions, velocities and accelerations with their deviations
+(docs/theory/counts.md).
+
+    reading = read_counts(position, rate, step)        encoder side, shape (N, n)
+    reading.q, reading.s_q, reading.findings
+
+Records longer than STRETCH samples are read in stretches that overlap by MARGIN samples on either
+side: memory and time are linear in their length.
+Samples without a count follow from their neighbours by the posterior; in gaps where it does not
+tell the position to half a step the state is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import binary_opening, binary_propagation, maximum_filter1d
+
+from runtime.counts.lattice import SHAKEN, Lattice, shaken_share, to_and_fro, unwrapped_counts
+from runtime.counts.sites import SearchStart, Smoothed, smoothed
+
+Array = np.ndarray
+# By the first sample of a stretch, and the encoder, from 0.
+Starts = Mapping[tuple[int, int], SearchStart]
+
+STRETCH, MARGIN = 65536, 4096
+# Error of a line where the motion shakes, steps: a change of the count then says as much as the
+# count itself, a position within one step.
+ANYWHERE = 12**-0.5
+# Time ahead of a count that goes to and fro and behind it in which both directions occur, s: a
+# quarter of a period of usual cut-offs.
+TURNED = 4e-3
+# Deviation of a missing position, steps, above which the state is unknown in the whole gap: the
+# bound that a count would be.
+UNKNOWN = 0.5
+# Time ahead of an unknown state and behind it that filters bring it to, s: a period of usual
+# cut-offs.
+REACH = 0.02
+# Longest gap, s, in which an encoder whose count never changes is taken as at rest.
+RESTS = 0.05
+# Time without a change of the count in which a joint may stand, s, and how many times the longest
+# turn between two lines at its usual acceleration a it must be, sqrt(8/a): no direction is known
+# there.
+STANDS, LONG = 0.1, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What counts say of a motion; arrays of shape (N, n) at the encoder side, rad or m, per s, per
+    s^2.
+
+    Attributes
+    ----------
+    q, qd, qdd : ndarray, shape (N, n)
+        Means of the posterior.
+    s_q, s_qd, s_qdd : ndarray, shape (N, n)
+        Its deviations.
+    jerk_density : ndarray, shape (n,), rad/s^3/sqrt(Hz) or m/s^3/sqrt(Hz)
+        Root of the mean density r of the white jerk.
+    unknown : ndarray of bool, shape (N, n)
+        Gaps in which the counts around them do not tell the state, and the samples that filters
+        bring it to.
+    step, phase : ndarray, shape (n,), rad or m
+        Lattice of the encoders.
+    findings : tuple of str
+        What the record shows of its encoders, a sentence each.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+    s_q: Array
+    s_qd: Array
+    s_qdd: Array
+    unknown: Array
+    jerk_density: Array
+    step: Array
+    phase: Array
+    findings: tuple[str, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """q, and s_qd, infinite where the state is unknown."""
+        return self.q, np.where(self.unknown, np.inf, self.s_qd)
+
+    @property
+    def starts(self) -> Starts:
+        """From where the same motion is sought at other phases of its encoders."""
+        return {
+            (part.begin, j): SearchStart(each.read.errors, each.basis.m, each.read.density)
+            for part in self.parts
+            for j, each in zip(part.moving.tolist(), part.smoothed, strict=True)
+        }
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """Positions drawn from the posterior, shape (N, n)."""
+        x = np.array(self.q)
+        for part in self.parts:
+            drawn = np.stack([each.draw(rng) for each in part.smoothed], axis=1)
+            drawn = drawn * self.step[part.moving] + self.phase[part.moving]
+            head = max(
+                part.first - part.begin, 0
+            )  # samples shared with the stretch before: from one draw to the next
+            w = np.ones(len(drawn))
+            if head:
+                w[:head], w[head : 2 * head] = 0.0, np.linspace(0, 1, len(w[head : 2 * head]))
+            at = np.ix_(np.arange(part.begin, part.begin + len(drawn)), part.moving)
+            x[at] += w[:, None] * (drawn - x[at])
+        return x
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A stretch: its samples start at `begin`, those that count are [first, stop).   moving :
+    encoders whose counts change in it.
+    """
+
+    smoothed: tuple[Smoothed, ...]
+    begin: int
+    first: int
+    stop: int
+    moving: Array
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Sentences about the lines of its encoders."""
+        return tuple(
+            f"encoder {j + 1}: {said}"
+            for j, said in zip(self.moving, (each.said for each in self.smoothed), strict=True)
+            if said
+        )
+
+
+def read_counts(
+    position: Array,
+    rate: float,
+    step: Array | Sequence[float] | float | None = None,
+    *,
+    uneven: float | None = None,
+    name: str = "record",
+    starts: Starts | None = None,
+) -> Reading:
+    """Positions, velocities and accelerations from counts, with deviations.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N, n), rad or m
+        At the encoder side: counts times step plus phase. nan: a sample that is missing.
+    rate : float, Hz
+        Sampling rate.
+    step : float or ndarray, shape (n,), rad or m, optional
+        Step of the encoders; default: from the record.
+    uneven : float, optional, steps
+        Deviation of lines at unequal distances, by which bounds are widened; default: as detected.
+    name : str
+        What errors call the record.
+    starts : mapping, optional
+        Reading.starts of the same motion at other phases of encoders of the same steps: errors of
+        counts, knots and first density of the jerk are these, in a tenth to a quarter of the time,
+        and sought anew where the counts contradict them.
+
+    Returns
+    -------
+    Reading
+
+    Raises
+    ------
+    InputError
+        No count changes; a step that is not positive or larger than the motion; positions off the
+        lattice; counts that jump.
+    """
+    known, counts, wraps = unwrapped_counts(position, step, name=name)
+    return _reading(counts, rate, known, uneven, wraps, starts or {})
+
+
+def _reading(
+    counts: Array,
+    rate: float,
+    known: Lattice,
+    uneven: float | None,
+    said: Sequence[str],
+    starts: Starts,
+) -> Reading:
+    N, n = counts.shape
+    states, unknown = [np.empty((N, n)) for _ in range(6)], np.empty((N, n), dtype=bool)
+    density, parts, found, gaps = np.zeros(n), [], dict.fromkeys((*known.findings, *said)), Gaps(n)
+    for begin, first, stop, end in stretches(N):
+        kept = slice(first - begin, stop - begin)
+        ahead = {j: starts[begin, j] for j in range(n) if (begin, j) in starts}
+        part, read, left = read_stretch(counts[begin:end], rate, uneven, gaps.rest(counts), ahead)
+        unknown[first:stop] = left[kept]
+        gaps.take(counts[first:stop], left[kept])
+        for x, own in zip(states, read, strict=True):
+            x[first:stop] = own[kept]
+        if part is not None:
+            part = replace(part, begin=begin, first=first, stop=stop)
+            density[part.moving] += [x.density * (stop - first) / N for x in part.smoothed]
+            parts.append(part)
+            found.update(dict.fromkeys(part.findings))
+    for i, x in enumerate(states):
+        x *= known.step
+        if i == 0:
+            x += known.phase
+    q, qd, qdd, s_q, s_qd, s_qdd = states
+    jerk, findings = np.sqrt(density) * known.step, (*found, *gaps.findings(rate))
+    return Reading(
+        q, qd, qdd, s_q, s_qd, s_qdd, unknown, jerk, known.step, known.phase, findings, tuple(parts)
+    )
+
+
+def read_stretch(
+    counts: Array,
+    rate: float,
+    uneven: float | None,
+    rest: Array,
+    starts: Mapping[int, SearchStart] | None = None,
+) -> tuple[Part | None, list[Array], Array]:
+    """Posterior of counts, shape (N, n), None where nothing moves; q, qd, qdd, s_q, s_qd, s_qdd in
+    steps, and where the state is unknown, (N, n) each.
+
+    An encoder whose count never changes rests in the middle of its interval, one without a count at
+    `rest`, shape (n,); `starts` by encoder. Where one count goes to and fro
+    the lines of all encoders are widened, since joints share a controller, and directions near such
+    passages are uncertain.
+    """
+    N, n = counts.shape
+    k = np.ascontiguousarray(counts.T)
+    least, most = (f.reduce(k, axis=1) for f in (np.fmin, np.fmax))  # nan: no count at all
+    moving = np.flatnonzero(most > least)
+    states = [np.full((N, n), value) for value in (0.0, 0.0, 0.0, 12**-0.5, 0.0, 0.0)]
+    states[0][:] = np.where(np.isfinite(least), least, rest)
+    part = _moved(k, moving, states, rate, uneven, starts or {}) if len(moving) else None
+    missing = np.isnan(counts)
+    unknown = missing & (states[3] > UNKNOWN)
+    for j in np.flatnonzero(missing.any(axis=0)):
+        if most[j] > least[j]:
+            unknown[:, j] = binary_propagation(unknown[:, j], mask=missing[:, j])
+        else:
+            unknown[:, j] = binary_opening(missing[:, j], np.ones(round(RESTS * rate) + 2))
+    if unknown.any():
+        unknown = maximum_filter1d(unknown, 2 * round(REACH * rate) + 1, axis=0)
+    return part, states, unknown
+
+
+def _moved(
+    k: Array,
+    moving: Array,
+    states: Sequence[Array],
+    rate: float,
+    uneven: float | None,
+    starts: Mapping[int, SearchStart],
+) -> Part:
+    """Posterior of the encoders that move, of counts k, shape (n, N), and their columns of the
+    states.
+    """
+    N = k.shape[1]
+    known = [np.flatnonzero(np.isfinite(k[j])) for j in moving]
+    shaken = (
+        uneven is None
+        and max(shaken_share(k[j, at]) for j, at in zip(moving, known, strict=True)) > SHAKEN
+    )
+    uneven = ANYWHERE if shaken else uneven
+    channels = tuple(smoothed(k[j], 1 / rate, uneven=uneven, start=starts.get(j)) for j in moving)
+    part = Part(channels, 0, 0, N, moving)
+    for order in range(3):
+        for j, each in zip(moving, channels, strict=True):
+            states[order][:, j], states[order + 3][:, j] = each.state(order)
+    for j, at in zip(moving, known, strict=True):
+        between = np.diff(at[1:][np.diff(k[j, at]) != 0], prepend=0, append=N)
+        turn = np.sqrt(8 / np.sqrt(np.mean(states[2][:, j] ** 2)))
+        turned = np.repeat(between > max(STANDS, LONG * turn) * rate, between)
+        for a, b in at[to_and_fro(k[j, at])] if shaken else ():
+            turned[max(a - round(TURNED * rate), 0) : b + round(TURNED * rate)] = True
+        deviation = 3 * np.abs(
+            states[1][turned, j]
+        )  # speeds of both signs: their deviation is above their mean
+        states[4][turned, j] = np.maximum(states[4][turned, j], deviation)
+    return part
+
+
+class Gaps:
+    """Samples without a count of n encoders, stretch by stretch."""
+
+    def __init__(self, n: int) -> None:
+        self.samples, self.unknown, self.run, self.longest = np.zeros((4, n), dtype=int)
+        self.last = np.full(n, np.nan)  # last count known
+
+    def rest(self, counts: Array) -> Array:
+        """The last counts known, shape (n,), ahead of the record the first of `counts`, shape (N,
+        n).
+        """
+        first = counts[np.isfinite(counts).argmax(axis=0), np.arange(counts.shape[1])]
+        return np.where(np.isnan(self.last), first, self.last)
+
+    def take(self, counts: Array, unknown: Array) -> None:
+        """The next counts and where the state is unknown, shape (B, n) each."""
+        missing = np.isnan(counts)
+        self.samples += missing.sum(axis=0)
+        self.unknown += unknown.sum(axis=0)
+        for j in range(counts.shape[1]):
+            known = np.flatnonzero(~missing[:, j])
+            between = np.diff(known, prepend=-1 - self.run[j], append=len(counts)) - 1
+            self.longest[j] = max(self.longest[j], between.max())
+            self.run[j] = between[-1] if len(known) else self.run[j] + len(counts)
+            self.last[j] = counts[known[-1], j] if len(known) else self.last[j]
+
+    def findings(self, rate: float) -> tuple[str, ...]:
+        """How many samples are missing and what became of them, a sentence for each encoder that
+        misses any.
+        """
+        return tuple(
+            (
+                f"encoder {j + 1}: {self.samples[j]} samples are missing, at most "
+                f"{self.longest[j]} "
+                "in "
+                f"a row ({self.longest[j] / rate:.3g} s); "
+            )
+            + (
+                (
+                    "where the counts around a gap do not tell the position to half a step, rows "
+                    "are "
+                    f"left out ({self.unknown[j]} samples)"
+                )
+                if self.unknown[j]
+                else "the counts around them tell the motion there"
+            )
+            for j in np.flatnonzero(self.samples)
+        )
+
+
+def stretches(N: int) -> list[tuple[int, int, int, int]]:
+    """(begin, first, stop, end): samples [begin, end) are read to know [first, stop)."""
+    count = max(1, round(N / STRETCH))
+    cuts = [*(STRETCH * i for i in range(count)), N]
+    return [(max(a - MARGIN, 0), a, b, min(b + MARGIN, N)) for a, b in pairwise(cuts)]

@@ -1,0 +1,163 @@
+"""Stiffness and damping of joints with an encoder before and one behind the gear (q and q_link).
+
+    K (q - q_l) + D (qd - qd_l) = tau - Ia qdd - FV qd - FS sign(qd) - OFFSET
+
+is the torque through the gear. The torque is the quieter side, and the difference of two encoders
+holds what they are apart in time, lag qd; so least squares of the difference, joint by joint,
+
+    q - q_l = tau/K - (D/K) d/dt(q - q_l) - (Ia/K) qdd + (lag - FV/K) qd - (FS/K) sign(qd) + offset
+
+with Ia of the robot file where it has one. Deviations are those of blocks of time. A rigid model
+takes qdd for qdd_l: at f it errs by (f/f_j)^2 of the inertia torque, f_j = sqrt(K/A_jj)/(2 pi) with
+A_jj the inertia that the fit has at the middle of the motion, the rotor in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.core.documents import Result
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.problem import Problem
+from runtime.core.rows.prepared import Prepared
+from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity(Result):
+    """Gears of the joints with two encoders, shape (k,) each.
+
+    Attributes
+    ----------
+    joints : tuple of str
+    K, sigma_K : ndarray, N m/rad or N/m
+        Stiffness and its deviation; nan where the record does not determine it.
+    D, sigma_D : ndarray, N m s/rad or N s/m
+        Damping.
+    lag : ndarray, s
+        By which the encoder behind the gear is late, less FV/K.
+    resonance : ndarray, Hz
+        f_j; nan without K, or where the fit has no inertia above zero.
+    cutoff : float, Hz
+        Of the study: highest frequency of the rows.
+    """
+
+    joints: tuple[str, ...]
+    K: Array
+    sigma_K: Array
+    D: Array
+    sigma_D: Array
+    lag: Array
+    resonance: Array
+    cutoff: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Each joint in words; where the rigid model is no longer enough."""
+        texts = []
+        for j, K, s, D, d, lag, f in zip(
+            self.joints,
+            *(self.K, self.sigma_K, self.D, self.sigma_D, self.lag, self.resonance),
+            strict=True,
+        ):
+            behind = f"the encoder behind it is {1e3 * lag:.2f} ms late (FV/K less)"
+            if not np.isfinite(K):
+                texts.append(f"Gear of joint {j}: no stiffness can be told from this; {behind}.")
+                continue
+            text = (
+                f"Gear of joint {j}: stiffness {K:.3g} +- {1.96 * s:.2g}, damping {D:.2g} +- "
+                f"{1.96 * d:.2g} (SI), {behind}"
+            )
+            if np.isfinite(f):
+                share = (self.cutoff / f) ** 2
+                rigid = "is enough" if share < LIMIT.RIGID_ENOUGH else "is no longer enough"
+                text += (
+                    f"; resonance near {f:.3g} Hz: a rigid model {rigid} at the cut-off of "
+                    f"{self.cutoff:g} Hz, an error of {100 * share:.1f} % of the inertia torque"
+                )
+            texts.append(text + ".")
+        return tuple(texts)
+
+
+def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:
+    """Stiffness of the joints with two encoders, all records of a prepared problem together; None where there is none.
+
+    names, X : parameters of the rigid fit, for the inertia about each joint.
+    """
+    model = problem.model
+    both = [reading for reading in problem.prepared if "q_link" in reading.record.channels]
+    if not both:
+        return None
+    first = both[0]
+    joints = np.flatnonzero(np.ptp(first.record.channels["q_link"], axis=0) > 0)  # nan, 0: none
+    values = dict(getattr(model, "VALUES", {}))
+    labels = joint_labels(model)
+    gears = [_gear(both, int(j), values.get(f"Ia{model.JOINTS[j]}")) for j in joints]
+    K, sigma_K, D, sigma_D, lag = np.array(gears).T
+    A = _inertia(model, np.median(first.states.q, axis=0), names, X)[joints]
+    with np.errstate(invalid="ignore"):
+        resonance = np.sqrt(K / A) / (2 * np.pi)
+    low = first.study.signals.lowpass
+    cutoff = first.record.rate / 2 if low is None else low.hertz
+    shown = tuple(labels[j] for j in joints)
+    return Elasticity(shown, K, sigma_K, D, sigma_D, lag, resonance, cutoff)
+
+
+def _gear(records: Sequence[Prepared], j: int, Ia: float | None) -> tuple[float, ...]:
+    """K, sigma, D, sigma, lag of one joint."""
+    rows, blocks = [], []
+    for prepared in records:
+        record = prepared.record
+        signals = prepared.study.signals
+        low = signals.lowpass
+        link = filtered_states(record.channels["q_link"][:, [j]], record.rate, signals)
+        motor = filtered_states(record.q[:, [j]], record.rate, signals)
+        tau = median_filtered(record.torque[:, [j]], signals.window_of_torques)
+        for _ in () if low is None else {*low.on}:
+            tau = lowpass_filtered(tau, record.rate, low)  # type: ignore[arg-type]
+        gap = motor.q - link.q
+        sign = np.sign(motor.qd)
+        tau = tau - (Ia or 0.0) * motor.qdd
+        columns = [tau, link.qd - motor.qd, motor.qd, sign, np.ones_like(sign), gap]
+        A = np.hstack([*columns[:-1], *([] if Ia else [motor.qdd]), gap])
+        kept = prepared.selection.samples
+        moving = np.abs(motor.qd[kept, 0]) > LIMIT.STANDING * np.abs(motor.qd).max()
+        rows.append(A[kept][moving])
+        blocks += np.array_split(np.arange(len(rows[-1])), LIMIT.GEAR_BLOCKS)
+    A = np.vstack(rows)
+    Z = A[:, :-1]
+    y = A[:, -1]
+    scale = np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
+    Z = Z / scale
+    x, *_ = np.linalg.lstsq(Z, y, rcond=None)
+    inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
+    e = y - Z @ x
+    first = np.repeat(np.cumsum([0, *map(len, rows[:-1])]), LIMIT.GEAR_BLOCKS)
+    g = np.array([Z[k + a].T @ e[k + a] for a, k in zip(first, blocks, strict=True)])
+    C = inverse @ (g.T @ g) @ inverse * len(g) / (len(g) - 1)
+    x = x / scale
+    s = np.sqrt(np.diag(C)) / scale
+    if x[0] < LIMIT.GEAR_CERTAIN * s[0]:
+        return (np.nan, np.nan, np.nan, np.nan, float(x[2]))
+    K = 1 / x[0]
+    damping = x[1] / x[0]
+    mixed = C[0, 1] / (scale[0] * scale[1])
+    spread = np.sqrt(s[1] ** 2 + (damping * s[0]) ** 2 - 2 * damping * mixed) * K
+    return float(K), float(s[0] * K**2), float(damping), float(spread), float(x[2])
+
+
+def _inertia(model: GeneratedModel, q: Array, names: Sequence[str], X: Array) -> Array:
+    """A_jj at q of the parameters, shape (n,)."""
+    n = len(q)
+    at_rest = np.zeros((n + 1, n))
+    kept = [list(model.BASE_PARAMETERS).index(k) for k in names]
+    D = model.regressor(np.tile(q, (n + 1, 1)), at_rest, np.vstack([np.zeros(n), np.eye(n)]))
+    torques = np.asarray(D)[:, :, kept] @ X
+    A = np.diag(torques[1:] - torques[0])
+    return np.where(A > 0, A, np.nan)

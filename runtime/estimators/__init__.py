@@ -1,1 +1,0 @@
-"""Estimators, one file a method; `runtime.compose` names them by name."""

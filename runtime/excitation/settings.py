@@ -1,0 +1,125 @@
+"""The `excitation` section of a study: what is asked of an exciting motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from runtime.core.settings import Count, Many, Positive, Real, Settings, Text, Whole, require
+from runtime.excitation.families import AnyFamily, Fourier, PointToPoint
+
+
+class Sphere(Settings):
+    """A ball that moves with a frame.
+
+    Attributes
+    ----------
+    frame : int
+        Number of the frame.
+    radius : float, m
+        Radius.
+    centre : tuple of 3 float, m
+        Centre, in that frame.
+    """
+
+    frame: Whole
+    radius: Positive
+    centre: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+
+
+class ExcitationSettings(Settings):
+    """The search for an exciting motion.
+
+    Attributes
+    ----------
+    parts : tuple of Family
+        Families in the order of the motion (`runtime.excitation.trajectories`).
+    poses : int or None
+        So many poses at rest are sought in place of a motion, for `signals.reader: static`
+        (`runtime.excitation.poses`); null: a motion.
+    criterion : str
+        record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
+        largest predicted %sigma over that of the motion of
+        the record: below 1, every parameter is told better than by it.
+    columns : str or tuple of str
+        essential (of an estimate), all, or names.
+    limits : mapping
+        q, qd, qdd, tau in place of those of the robot file: one value per joint, or [lower, upper]
+        for q.
+    torque_rms : tuple of float or None, N m or N
+        Largest root mean square of each torque; null: unlimited.
+    torque_rate : tuple of float or None, N m/s or N/s
+        Largest rate of change of each torque; null: unlimited.
+    margin : float
+        Share of every limit that the optimiser keeps free between its grid points.
+    grid : float, Hz
+        Points of the optimiser.
+    rate : float, Hz
+        Rate of the controller.
+    begin : tuple of float or None, rad or m
+        Positions at the start; null: free.
+    spheres : tuple of Sphere
+        Balls on the links.
+    apart : tuple of pairs of int or None
+        Pairs of balls, by number from 1, that stay apart; null: every pair on frames that are not
+        next to each other.
+    gap : float, m
+        Smallest distance between the surfaces of such a pair.
+    smooth : float, rad/s or m/s
+        v0 of tanh(qd/v0), which stands for sign(qd) inside the optimiser only.
+    torque_sigma : tuple of float or None, N m or N
+        Deviation s_j of each torque; null: those of an estimate, else 1 for every joint.
+    starts : int
+        Random starts.
+    iterations : int
+        Iterations of the optimiser in each of its two stages.
+    seed : int
+        Seed of the starts.
+    """
+
+    parts: Annotated[Many[AnyFamily], Field(min_length=1)] = (
+        Fourier(),
+        PointToPoint(points=7, travel=1.0, blend=0.25),
+    )
+    poses: Count | None = None
+    criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"
+    columns: Literal["essential", "all"] | Many[Text] = "essential"
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    torque_rms: Many[Real] | None = None
+    torque_rate: Many[Real] | None = None
+    margin: Annotated[Real, Field(ge=0, lt=1)] = 0.02
+    grid: Positive = 20.0
+    rate: Positive = 1000.0
+    begin: Many[Real] | None = None
+    spheres: Many[Sphere] = ()
+    apart: tuple[tuple[Whole, Whole], ...] | None = None
+    gap: Real = 0.0
+    smooth: Positive = 0.05
+    torque_sigma: Many[Real] | None = None
+    starts: Count = 10
+    iterations: Count = 200
+    seed: Whole = 1
+
+    def __post_init__(self) -> None:
+        for pair in self.apart or ():
+            require(
+                all(1 <= k <= len(self.spheres) for k in pair),
+                f"{list(pair)}; there are {len(self.spheres)} spheres",
+                "apart",
+            )
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of spheres that stay apart, numbered from 0."""
+        if self.apart is not None:
+            return tuple((a - 1, b - 1) for a, b in self.apart)
+        count = range(len(self.spheres))
+        return tuple(
+            (a, b)
+            for a in count
+            for b in count
+            if a < b and abs(self.spheres[a].frame - self.spheres[b].frame) > 1
+        )

@@ -1,0 +1,172 @@
+"""How far off are predictions of other motions likely to be?
+
+Deviations of the parameters, and what encoders do to them, carried over to motions of the robot's
+own range.
+
+    D       regressor in states of a reference motion: sines of every joint over a part of the range
+            and at a part of the speed of the robot file, or of the record where it has none
+    C       covariance of least squares with joints weighted by their residuals, wider by the median
+            of corrected over stated deviations
+    V       the same, knowing the values of the robot file to LIMIT.VALUES_KNOWN where the fit
+            does: (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; their
+            estimate is chi_V
+    a       share of the accelerations that is an error of the encoder's steps
+
+    expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2 + (a/(1 + a))^2
+
+The first part is what the record leaves open, the second how far the fit is from what record and
+values say together, the third how much too small the steps make inertias (the record's own lattice:
+`runtime.counts.encoder_advice`). What the model leaves out is not in it, but as far as it is in
+the residuals of C.
+
+The square of the error that one record makes is a sum of b squares, of which a few weigh most:
+with M = K'D'D K V it scatters as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
+interval of the expected error has the first two parts times quantiles of that. Where one direction
+is open, nu is 1: 30 % expected may be 2 %.
+
+Reference: Satterthwaite (1946) for nu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import assemble
+from runtime.core.least_squares.method import linear_companion, linear_system
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, channels_of, joint_units
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared
+from runtime.core.study import EstimateSettings
+from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
+
+Array = np.ndarray
+
+
+class Expected(NamedTuple):
+    """Expected error of predictions, %, and the interval of LIMIT.EXPECTED_INTERVAL around it."""
+
+    error: float
+    low: float
+    high: float
+
+
+def expected_error(
+    model: GeneratedModel,
+    observation: Observation,
+    settings: EstimateSettings,
+    fit: Estimate,
+    records: Sequence[Prepared],
+    steps: float = 0.0,
+) -> Expected:
+    """Expected error of predictions, at most LIMIT.LARGEST_EXPECTED; nan where neither the robot
+    file nor records tell a range, or a loop does not close in it.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    observation : Observation
+        Rows of the records.
+    settings : EstimateSettings
+        Method of the study; deviations are those of its linear companion, weighted by joint where
+        that has no weights: a slide of large forces says nothing of the noise of a wrist.
+    fit : Estimate
+        The parameters that stand for the robot.
+    records : sequence of Prepared
+    steps : float
+        Share of the accelerations that is an error of the encoder's steps.
+    """
+    states = reference_states(model, records)
+    if states is None or channels_of(model):
+        return Expected(*3 * (float("nan"),))
+    try:
+        D = np.asarray(model.regressor(*states))
+    except ValueError:  # a loop that does not close
+        return Expected(*3 * (float("nan"),))
+    linear = linear_companion(settings)
+    if linear.weights == "none":
+        linear = EstimateSettings("wls", "joint", linear.columns)
+    system = linear_system(observation, linear)
+    least_squares = assemble(system, system.solve())
+    D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in least_squares.names]]
+    X = np.array(
+        [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
+    )
+    wider = max(1.0, float(np.median(least_squares.sigma_corrected / least_squares.sigma))) ** 2
+    V = wider * least_squares.covariance
+    near = least_squares.X
+    if dict(fit.details.get("options", {})).get("prior", "none") != "none":
+        physical = physical_model(model)
+        K, rows = physical.rows(least_squares.names), system.weighted
+        variance = wider * (1.0 if system.known_variance else least_squares.sigma_rho**2)
+        near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
+        D, X = D @ K, np.linalg.lstsq(K, X, rcond=None)[0]
+    A = D.reshape(-1, len(X))
+    size = np.linalg.norm(A @ X)
+    M = A.T @ A @ V
+    spread = max(np.trace(M), 0.0)
+    nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
+    open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
+    times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
+    errors = 100 * np.sqrt(open_part * times + (steps / (1 + steps)) ** 2)
+    return Expected(*np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist())
+
+
+def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
+    """Standard parameters chi of rows R K chi = y with errors of variance 1 and of the values of
+    the robot file, and their covariance; those without a value are free.
+    """
+    known = np.array([physical.values.get(name, np.nan) for name in physical.standard])
+    deviation = np.abs(known)
+    for ten in map(physical.link, physical.links):
+        xx, _, _, yy, _, zz, *_, mass = known[ten]
+        size, weight = (xx + yy + zz) / 2, mass
+        deviation[ten] = [size] * 6 + [np.sqrt(size * weight)] * 3 + [weight]
+    chosen = [name.startswith((*INERTIAL, "Ia")) for name in physical.standard]
+    given = np.isfinite(deviation) & (deviation > 0) & chosen
+    known, precision = np.where(given, known, 0.0), np.zeros(len(known))
+    precision[given] = (LIMIT.VALUES_KNOWN * deviation[given]) ** -2.0
+    rows = R @ K
+    A, g = rows.T @ rows + np.diag(precision), rows.T @ (y - rows @ known)
+    d = np.sqrt(np.where(np.diag(A) > 0, np.diag(A), 1.0))
+    V = np.linalg.pinv(A / np.outer(d, d), rcond=LIMIT.RANGE_ROUNDING, hermitian=True)
+    V = V / np.outer(d, d)
+    return known + V @ g, V
+
+
+def reference_states(
+    model: GeneratedModel, records: Sequence[Prepared]
+) -> tuple[Array, Array, Array] | None:
+    """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None where no range is
+    known.
+    """
+    limits = dict(getattr(model, "LIMITS", {}) or {})
+    n = len(model.JOINTS)
+    span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
+    if span.shape != (n, 2) or speed.shape != (n,) or not np.isfinite([*span.T, speed]).all():
+        if not records:
+            return None
+        q = np.concatenate([record.states.q for record in records])
+        qd = np.concatenate([record.states.qd for record in records])
+        half = np.ptp(q, axis=0) / 2
+        speed = np.abs(qd).max(axis=0)
+        units = np.array(joint_units(model))
+        alike = units[:, None] == units
+        half, speed = (
+            np.array([max(x[j], np.median(x[alike[j]])) for j in range(n)]) for x in (half, speed)
+        )  # a joint that hardly moves: as its neighbours
+        middle = (q.max(axis=0) + q.min(axis=0)) / 2
+        half, speed = half / LIMIT.REFERENCE_RANGE[1], speed / LIMIT.REFERENCE_SPEED[1]
+    else:
+        middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
+    rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
+    (least, most), (slow, fast) = LIMIT.REFERENCE_RANGE, LIMIT.REFERENCE_SPEED
+    a = half * rng.uniform(least, most, shape)
+    w = np.minimum(speed * rng.uniform(slow, fast, shape) / np.where(a > 0, a, np.inf), 2 * np.pi)
+    phase = rng.uniform(0, 2 * np.pi, shape)
+    return middle + a * np.sin(phase), a * w * np.cos(phase), -a * w**2 * np.sin(phase)

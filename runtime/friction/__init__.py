@@ -1,0 +1,1 @@
+"""Friction against velocity, joint by joint, and the law that it follows."""

@@ -1,0 +1,361 @@
+"""The friction of every joint as a curve against velocity, and which law it follows.
+
+    f_j = Y_j - W_j X without the friction and offset of joint j
+            (Y, W decimated, X of a fit of all parameters)
+
+    coulomb+viscous   FS s + FV v + OFFSET                                  s = sign(v)
+    asymmetric        FSP, FVP forward, FSN, FVN backward
+    stribeck          FS s + FV v + OFFSET + FST s exp(-(v/VS)^2)
+            FST the excess at standstill, VS its velocity
+    load              FS s + FV v + OFFSET + FL s |tau_r|
+            tau_r the rigid-body torque the transmission carries
+    stribeck+load     both
+
+Every term is built at the rate of the record and decimated like Y, so that the filter rounds
+sign(v) on both sides alike. Every law contains the first and is linear but for VS, which is
+searched (its F-test is approximate: VS means nothing where FST = 0). Residuals are correlated:
+deviations take blocks of time as independent, and the F-test and Akaike's criterion count N/T
+samples, T the correlation time of the residual in rows. The law is chosen on blocks of time that
+did not fit it. X is held: this says what form friction has, not what the other parameters would be
+with it.
+
+References: Armstrong-Helouvry, Dupont and Canudas de Wit (1994), section 2, for the laws; Hamon,
+Gautier and Garrec (2010) for friction that grows with the load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.least_squares.linear import percent
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, require
+from runtime.core.problem import Problem
+from runtime.core.residuals import correlation_time, p_value, residual_correlation
+from runtime.core.rows.prepared import Prepared
+from runtime.core.rows.regressor import in_time
+from runtime.core.signals.filters import decimated
+from runtime.core.signals.states import require_motion
+from runtime.core.table import Table
+from runtime.friction.laws import (
+    LAWS,
+    Terms,
+    deviations,
+    fitted,
+    held_out_error,
+    joined,
+    law_torque,
+)
+from runtime.physical.inertia import physical_model
+
+Array = np.ndarray
+
+OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """One law fitted to one joint.
+
+    Attributes
+    ----------
+    name : str
+    parameters : mapping of str to float
+        Values by name, SI.
+    sigma : mapping of str to float
+        Deviations by blocks of time.
+    error : float, %
+        100 ||f - law|| / ||f|| on all rows.
+    held_out : float, %
+        The same on blocks of time that did not fit the law.
+    aic : float
+        Akaike's criterion minus that of the first law.
+    p_value : float
+        Of the F-test against the first law; 1 for the first law itself.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    sigma: Mapping[str, float]
+    error: float
+    held_out: float
+    aic: float
+    p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Friction of one joint against its velocity.
+
+    Attributes
+    ----------
+    joint : str
+    v : ndarray, shape (N,), rad/s or m/s
+        Velocity at the rows.
+    f : ndarray, shape (N,), N m or N
+        Friction torque at the rows.
+    centre : ndarray, shape (k,), rad/s or m/s
+        Mean velocity of each bin.
+    mean : ndarray, shape (k,), N m or N
+        Mean friction of each bin.
+    half : ndarray, shape (k,), N m or N
+        Half width of the 95 % interval of the mean.
+    laws : tuple of FrictionLaw
+        The first is Coulomb and viscous.
+    law_name : str
+        Name of the law that predicts.
+    law_torques : mapping of str to ndarray, shape (k,), N m or N
+        Mean torque of each law in each bin, by name of the law.
+    """
+
+    joint: str
+    v: Array
+    f: Array
+    centre: Array
+    mean: Array
+    half: Array
+    laws: tuple[FrictionLaw, ...]
+    law_name: str
+    law_torques: Mapping[str, Array]
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The law that predicts."""
+        return next(law for law in self.laws if law.name == self.law_name)
+
+    def to_table(self) -> str:
+        """Laws line by line, then the parameters of the one that predicts."""
+        compared, predicting = law_tables([self])
+        parts = [compared.to_text(), f"{self.label}: {predicting.rows[0][2]}", self.note]
+        return "\n".join(part for part in parts if part)
+
+    @property
+    def label(self) -> str:
+        """Name of the law that predicts; says where its Stribeck term makes no peak."""
+        return (
+            f"{self.law_name} (no peak)"
+            if self.law.parameters.get("FST", 1.0) < 0
+            else self.law_name
+        )
+
+    @property
+    def note(self) -> str:
+        """What the sign of FST means; empty for laws without it."""
+        excess = self.law.parameters.get("FST")
+        if excess is None:
+            return ""
+        if excess > 0:
+            return "friction is larger at standstill than in slow motion: the Stribeck effect"
+        return "FST is negative: friction falls towards standstill, there is no Stribeck peak; the term bends the curve of viscous friction"
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        curve = {"velocity": self.centre, "torque": self.mean, "half_interval": self.half}
+        return {
+            "joint": self.joint,
+            "chosen": self.law_name,
+            "note": self.note,
+            "laws": self.laws,
+            "curve": curve,
+        }
+
+
+def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:
+    """The laws compared joint by joint, and the parameters of those that predict."""
+    compared = [
+        (
+            *(curve.joint, law.name, number(law.error, ".2f"), number(law.held_out, ".2f")),
+            *(number(law.aic, "+.1f"), number(law.p_value, ".2g")),
+        )
+        for curve in curves
+        for law in curve.laws
+    ]
+    laws = [
+        (
+            *(curve.joint, curve.label),
+            ", ".join(
+                f"{name} {x:.4g} ± {curve.law.sigma[name]:.2g}"
+                for name, x in curve.law.parameters.items()
+            ),
+        )
+        for curve in curves
+    ]
+    return (
+        Table(
+            "Laws compared",
+            (
+                *("joint", "law", "error %", "held-out error %", "AIC against the first"),
+                "p of the F-test",
+            ),
+            compared,
+        ),
+        Table("Chosen laws, SI", ("joint", "law", "parameters"), laws),
+    )
+
+
+def friction_curves(problem: Problem, fit: Estimate) -> tuple[FrictionCurve, ...]:
+    """Friction against velocity, one curve per joint, from the records of a prepared problem and an estimate of all parameters."""
+    require_motion(problem.settings.signals, "a friction curve")
+    model = problem.model
+    require(model, "inverse_dynamics")
+    parts = [_terms(model, record, fit, k) for k, record in enumerate(problem.prepared)]
+    return tuple(
+        _curve(label, joined([part[j] for part in parts]))
+        for j, label in enumerate(joint_labels(model))
+        if fit.per_joint[j].rows and not is_axis(model.JOINTS[j])
+    )
+
+
+def own_friction(model: GeneratedModel, j: int) -> list[int]:
+    """Base parameters made of friction and offset of joint number j alone (j from 0), those of its
+    curve.
+    """
+    physical = physical_model(model)
+    elements = elements_of(model)
+    of_curve = [name in elements and elements[name][0] in OWN for name in physical.standard]
+    others = ~np.array(of_curve)
+    structure = np.asarray(model.STRUCTURE)
+    alone = structure[:, j] & (structure.sum(axis=1) == 1)
+    return [int(k) for k in np.flatnonzero(alone) if not physical.K[k][others].any()]
+
+
+def _terms(model: GeneratedModel, record: Prepared, fit: Estimate, number: int) -> list[Terms]:
+    """Terms of every joint of one record."""
+    selection = record.certain(model)
+    observation = record.observation(model)
+    window = record.states[selection.samples]
+    X = np.array([fit[name] if name in fit.names else 0.0 for name in model.BASE_PARAMETERS])
+    block = observation.blocks()
+    alone = [own_friction(model, j) for j in range(observation.n)]
+    frictionless = X.copy()
+    frictionless[[k for columns in alone for k in columns]] = (
+        0.0  # each acts on its own joint alone
+    )
+    transmitted = np.abs(
+        cast(Any, model).inverse_dynamics(
+            window.q, window.qd, window.qdd, frictionless, **in_time(model, window)
+        )
+    )
+
+    def at_rows(signal: Array, j: int) -> Array:
+        return decimated(signal, selection.factor, selection.signals.decimate)[
+            ..., selection.mask[j]
+        ]
+
+    terms = []
+    for j in range(observation.n):
+        rest = X.copy()
+        rest[alone[j]] = 0.0
+        rows = observation.joint(j)
+        v = window.qd[:, j]
+        s = np.sign(v)
+        signals = {
+            "FS": s,
+            "FV": v,
+            "OFFSET": np.ones_like(v),
+            "FSP": (v > 0) * 1.0,
+            "FVP": np.maximum(v, 0),
+            "FSN": (v < 0) * -1.0,
+            "FVN": np.minimum(v, 0),
+            "FL": s * transmitted[:, j],
+        }
+
+        def excess(VS: float | Array, v: Array = v, j: int = j) -> Array:
+            return at_rows(np.sign(v) * np.exp(-((v / np.asarray(VS)[..., None]) ** 2)), j)
+
+        linear = {name: at_rows(signal, j) for name, signal in signals.items()}
+        of_record = block[rows] + (number << 32)
+        terms.append(
+            Terms(
+                observation.Y[rows] - observation.W[rows] @ rest,
+                linear["FV"],
+                of_record,
+                linear,
+                excess,
+            )
+        )
+    return terms
+
+
+def _curve(joint: str, terms: Terms) -> FrictionCurve:
+    if len(terms.f) < 10 * len(LAWS["stribeck+load"]):
+        raise InputError(
+            f"{len(terms.f)} rows of joint {joint}; a friction curve needs more of the record "
+            "(rows.window, rows.low_speed)"
+        )
+    all_rows = np.ones(len(terms.f), dtype=bool)
+    even = terms.block % 2 == 0
+    fits = {name: fitted(terms, names, all_rows) for name, names in LAWS.items()}
+    first = next(iter(LAWS))
+    residuals = {name: terms.f - law_torque(terms, fit) for name, fit in fits.items()}
+    squares = {name: float(r @ r) for name, r in residuals.items()}
+    count = len(terms.f) / correlation_time(residual_correlation(residuals["stribeck+load"]))
+    laws = []
+    for name, names in LAWS.items():
+        aic = count * np.log(squares[name] / squares[first]) + 2 * (len(names) - len(LAWS[first]))
+        laws.append(
+            FrictionLaw(
+                name,
+                fits[name],
+                deviations(terms, fits[name], residuals[name]),
+                percent(residuals[name], terms.f),
+                held_out_error(terms, names, even),
+                float(aic),
+                p_value(squares[first], squares[name], len(LAWS[first]), len(names), count),
+            )
+        )
+    centre, mean, half, mean_of = _bins(terms)
+    torques = {name: mean_of(law_torque(terms, fit)) for name, fit in fits.items()}
+    return FrictionCurve(
+        joint, terms.v, terms.f, centre, mean, half, tuple(laws), _predicting(laws), torques
+    )
+
+
+def _predicting(laws: Sequence[FrictionLaw]) -> str:
+    """The smallest held-out error among the laws that are worth their terms; the first where none
+    is.
+    """
+    first, *others = laws
+    worth = [
+        law
+        for law in others
+        if law.p_value < LIMIT.LAW_LEVEL and law.held_out < (1 - LIMIT.LAW_GAIN) * first.held_out
+    ]
+    return min(worth, key=lambda law: law.held_out, default=first).name
+
+
+def _bins(terms: Terms) -> tuple[Array, Array, Array, Callable[[Array], Array]]:
+    """Centres, means and half intervals over bins of about equal numbers of rows, none across
+    standstill; and the function that averages over them.
+    """
+    sides = [terms.v[terms.v < 0], terms.v[terms.v >= 0]]
+    shares = [max(round(LIMIT.FRICTION_BINS * len(side) / len(terms.v)), 1) for side in sides]
+    inner = [
+        np.quantile(side, np.linspace(0, 1, k + 1))
+        for side, k in zip(sides, shares, strict=True)
+        if len(side)
+    ]
+    edges = np.unique(np.concatenate([*inner, [0.0]]))
+    which = np.clip(np.searchsorted(edges, terms.v, side="right") - 1, 0, max(len(edges) - 2, 0))
+    count = np.bincount(which)
+    used = np.flatnonzero(count > 1)
+
+    def mean_of(x: Array) -> Array:
+        return np.asarray((np.bincount(which, weights=x) / np.maximum(count, 1))[used])
+
+    mean = np.bincount(which, weights=terms.f) / np.maximum(count, 1)
+    _, cell = np.unique(which * (terms.block.max() + 1) + terms.block, return_inverse=True)
+    sums = np.bincount(cell, weights=terms.f - mean[which])  # of a bin in a block
+    bin_of = np.zeros(len(sums), dtype=int)
+    bin_of[cell] = which
+    variance = (
+        np.bincount(bin_of, weights=sums**2, minlength=len(count)) / np.maximum(count, 1) ** 2
+    )
+    return mean_of(terms.v), mean[used], LIMIT.INTERVAL * np.sqrt(variance[used]), mean_of

@@ -1,1 +1,0 @@
-"""One call from records to parameters, and how far to trust them."""

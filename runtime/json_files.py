@@ -1,0 +1,126 @@
+"""JSON results read back, every value checked.
+
+A result has its kind and version in the key `schema`. Another kind, another version and damage are each one clear error. A reader leaves out keys that it does not know, so that keys can be added under the same version.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, WithJsonSchema
+from pydantic_core import core_schema
+
+from runtime.core.errors import InputError
+from runtime.core.settings_errors import settings_error
+from runtime.reading.files import require_file
+
+T = TypeVar("T")
+
+LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 million
+
+
+class Numbers:
+    """Annotation of an ndarray of floats: in JSON nested lists of numbers, null for nan.
+
+    Parameters
+    ----------
+    kind : type
+        The nested lists.
+    """
+
+    def __init__(self, kind: Any) -> None:
+        self.kind = kind
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(
+            self.array, handler.generate_schema(self.kind)
+        )
+
+    def array(self, rows: list[Any]) -> np.ndarray:
+        """The numbers of nested lists; shape (0, 0) for a matrix without rows."""
+        return (
+            np.array(rows, dtype=float) if rows or self.kind == list[Number] else np.empty((0, 0))
+        )
+
+
+_FORM = WithJsonSchema({"type": ["number", "null"]})
+_FINITE = Field(strict=True, allow_inf_nan=False)
+Number = Annotated[Annotated[float, _FINITE] | None, _FORM]
+NanIfNull = Annotated[
+    float, Field(strict=True), BeforeValidator(lambda x: math.nan if x is None else x), _FORM
+]
+InfIfNull = Annotated[
+    float, Field(strict=True), BeforeValidator(lambda x: math.inf if x is None else x), _FORM
+]
+Vector = Annotated[np.ndarray, Numbers(list[Number])]
+Matrix = Annotated[np.ndarray, Numbers(list[list[Number]])]
+Whole = Annotated[
+    int, Field(strict=True, ge=0, lt=2**63), WithJsonSchema({"type": "integer", "minimum": 0})
+]
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a file with a JSON result."""
+    path = Path(path)
+    try:
+        if require_file(path) > LARGEST:
+            raise InputError(
+                f"more than {LARGEST} bytes; expected a result of symgen", file=str(path)
+            )
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(
+            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+        ) from e
+
+
+def from_text(kind: type[T], text: str, schema: str, file: str) -> T:
+    """The result in a JSON text.
+
+    Parameters
+    ----------
+    kind : type
+        Dataclass whose fields are keys of the result.
+    schema : str
+        Kind and version, such as "symgen-estimate/1".
+    file : str
+        Name of the file in messages.
+
+    Raises
+    ------
+    InputError
+        Where the text is no JSON, of another kind or version, incomplete, or holds other values.
+    """
+    try:
+        data = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as e:
+        raise InputError(f"not JSON: {e}", file=file) from e
+    given = data.get("schema") if isinstance(data, dict) else None
+    if not isinstance(given, str) or given.partition("/")[0] != schema.partition("/")[0]:
+        raise InputError(
+            f"its schema is {given!r:.60}; expected {schema!r}, as symgen writes it", file=file
+        )
+    if given != schema:
+        raise InputError(
+            f"has schema {given!r:.60}; this version reads {schema!r}: update symgen, or make the file again",
+            file=file,
+        )
+    if missing := [f.name for f in fields(kind) if f.name not in data]:  # type: ignore[arg-type]
+        raise InputError(f"no {missing[0]!r}; the file is incomplete", file=file)
+    try:
+        result: T = TypeAdapter(kind).validate_python(data)
+    except ValidationError as e:
+        raise InputError(
+            f"{settings_error(e, data)}; the file was changed, or another version of symgen wrote it",
+            file=file,
+        ) from e
+    return result
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number of JSON")

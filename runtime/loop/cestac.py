@@ -1,0 +1,204 @@
+"""The closed loop of a resolution study: for methods that simulate it (iv, didim), and for
+encoders that stand inside it.
+
+    place: record
+            the positions of the record are rounded; the loop is simulated without steps, as the
+            method does on any record
+    place: loop
+            every run is a record simulated anew, the encoder of the loop with steps of Delta and a
+            random phase for each encoder:
+
+        arm, controller and record answer
+                y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
+
+Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next
+to nothing of didim, which reads one position.
+In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for
+every Delta and method; so have the runs that they are
+compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e is
+what the steps alone do. `around` of estimate.options
+then serves every method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from runtime.core.cestac.rounding import stream
+from runtime.core.cestac.runs import Level
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.method import Method
+from runtime.core.model import GeneratedModel
+from runtime.core.problem import Problem
+from runtime.core.rows.observation import LoopRows, Observation
+from runtime.core.signals.states import lowpassed
+from runtime.core.study import EstimateSettings
+from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.control_law import parameters_of
+from runtime.loop.reference import Reference, reference_of
+
+if TYPE_CHECKING:
+    from runtime.loop.simulation import Simulator
+
+Array = np.ndarray
+
+ALIKE = ("around", "reference")  # estimate.options that are the loop's, whatever the method
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The loop of one study.
+
+    Attributes
+    ----------
+    problem : Problem
+        With the median of settings.cestac in its signals; of place loop, its records are those that the reference may come from.
+    simulator : Simulator
+        Without steps of its own making: its law has the encoder of the settings.
+    """
+
+    problem: Problem
+    simulator: Simulator
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes: what makes the simulator, which is not pickled."""
+        return _loop, (self.problem,)
+
+    @property
+    def model(self) -> GeneratedModel:
+        """The model of the problem."""
+        return self.problem.model
+
+    @property
+    def study(self) -> Any:
+        """The settings of the problem."""
+        return self.problem.settings
+
+    @property
+    def options(self) -> Mapping[str, Any]:
+        """estimate.options that are the loop's."""
+        return {
+            key: self.study.estimate.options[key]
+            for key in ALIKE
+            if key in self.study.estimate.options
+        }
+
+    @cached_property
+    def reference(self) -> Reference:
+        """What the controller follows, of place loop."""
+        return reference_of(self.simulator.controller, self.model, records=self.problem.records)
+
+    @cached_property
+    def truth(self) -> Array:
+        """Base parameters of the simulated arm, shape (b,)."""
+        return parameters_of(self.model, self.simulator.controller)
+
+    @cached_property
+    def closed(self) -> ClosedLoop:
+        """The loop of the measured records; of place loop, of one made with the encoder of the
+        study.
+        """
+        if self.study.cestac.place == "record":
+            return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
+        return self._of(self.simulator, self.simulator.controller.seed, 0.0)
+
+    def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
+        """`observation` of the perturbed positions of every record, shape (N, n), with the loop
+        attached.
+        """
+        parts = [
+            replace(part, prepared=replace(part.prepared, record=part.record.moved(np.asarray(q))))
+            for part, q in zip(self.closed.parts, positions, strict=True)
+        ]
+        return replace(
+            observation,
+            closed_loop=LoopRows(
+                replace(self.closed, parts=tuple(parts)), np.arange(len(observation.Y))
+            ),
+        )
+
+    def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
+        """The loop of a record made with encoders of steps of level.delta; of those of the study at
+        a level without steps.
+        """
+        random = stream(self.study.cestac.seed, draw[-1])
+        law, n = self.simulator.law, len(self.model.JOINTS)
+        phase = level.delta * random.random(n)
+        simulator: Any = copy(self.simulator)
+        if level.delta:
+            simulator.law = replace(
+                law,
+                encoder_step=np.full(n, level.delta),
+                offset=law.offset + np.linalg.solve(law.R, phase),
+            )
+        return self._of(simulator, int(random.integers(2**31)), level.delta)
+
+    def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
+        """A record made by `simulator`, under the loop without its steps; the reader of counts is
+        told them, and needs some.
+        """
+        record = simulator.run(
+            self.truth, self.reference, seed=seed, name=f"SIMULATED {self.model.NAME}"
+        ).record()
+        signals, step = self.study.signals, delta or self.simulator.controller.encoder.step
+        if signals.reader == "counts" and step:
+            signals = replace(signals, step=step, side=self.study.cestac.side)
+        elif signals.reader == "counts":
+            signals = replace(signals, reader="lowpass", step=None, side="joint")
+        settings = replace(self.study, signals=signals)
+        reader = self.problem.reader if signals.reader == self.study.signals.reader else lowpassed
+        problem = self.problem.changed(
+            records=(record,), unseen=(), settings=settings, reader=reader
+        )
+        return closed_loop(problem, problem.prepared, self.simulator, **self.options)
+
+
+def _loop(problem: Problem) -> Loop:
+    """The loop with a simulator of the section `controller`."""
+    from runtime.loop.simulation import Simulator
+
+    settings: Any = problem.settings
+    return Loop(problem, Simulator(problem.model, settings.controller))
+
+
+def loop_of(problem: Problem, simulator: Simulator | None) -> Loop | None:
+    """The loop of a problem that simulates one; else None. simulator : default: that of the section `controller`."""
+    study: Any = problem.settings
+    if study.cestac.place != "loop" and problem.method.observe is None:
+        return None
+    if study.controller is None:
+        asked = "place: loop" if study.cestac.place == "loop" else study.estimate.method
+        raise SettingsError(
+            f"{asked} simulates the closed loop, and this study tells none; give a section "
+            "`controller` with law, rate and reference, "
+            "or use ols, wls or irls on recorded positions",
+            path=("cestac", "place") if study.cestac.place == "loop" else ("estimate", "method"),
+        )
+    quiet = replace(study, signals=replace(study.signals, median=study.cestac.median))
+    if (
+        study.cestac.place == "loop"
+    ):  # the encoder on the side of the study, of any step: only then is it in the law
+        encoder = replace(study.controller.encoder, side=study.cestac.side)
+        quiet = replace(quiet, controller=replace(study.controller, encoder=encoder))
+    quiet_problem = problem.changed(settings=quiet)
+    if simulator is not None and simulator.controller == quiet.controller:
+        return Loop(quiet_problem, simulator)
+    return _loop(quiet_problem)
+
+
+def without_loop_options(
+    settings: EstimateSettings, methods: Mapping[str, Method]
+) -> EstimateSettings:
+    """The settings as a method that simulates no loop takes them."""
+    if methods[settings.method].observe is not None:
+        return settings
+    return replace(
+        settings,
+        options={key: value for key, value in settings.options.items() if key not in ALIKE},
+    )

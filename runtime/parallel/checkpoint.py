@@ -1,0 +1,124 @@
+"""Runs of a long study on disk, so that it can be killed and go on.
+
+    FOLDER/runs.npz     level, run, X, residual_norm of the runs; `study`, JSON of what makes them:
+                        settings, hashes of record and model, versions
+
+The file is written whole under another name and then renamed. A study goes on only where `study`
+says the same, number of runs aside. Runs depend on their key alone, so a resumed study has the bits
+of an uninterrupted one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from runtime.core.cestac.runs import Runs
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+
+FILE = "runs.npz"
+UNFINISHED = ".unfinished"
+
+
+class Checkpoint:
+    """The runs of one study in FOLDER; written every `every` seconds, and by `flush`."""
+
+    def __init__(self, folder: str | Path, *, every: float = LIMIT.ARCHIVE_PERIOD) -> None:
+        self.file = Path(folder) / FILE
+        self.every = every
+        self.written = 0  # runs on disk
+        self._study = ""
+        self._runs: list[Runs] = []
+        self._last = monotonic()
+
+    def resume(self, identity: Mapping[str, Any], b: int) -> Runs:
+        """The runs, b parameters each, that an earlier study left.
+
+        identity : JSON values that tell studies apart.
+
+        Raises
+        ------
+        InputError
+            The runs are those of another study, or the file is damaged.
+        """
+        self._study = json.dumps(identity, sort_keys=True)
+        self._last = monotonic()
+        self._runs = [self._read(b)] if self.file.exists() else [Runs.of((), b)]
+        self.written = len(self._runs[0])
+        return self._runs[0]
+
+    def add(self, runs: Runs) -> None:
+        """Take new runs; write them when it is time."""
+        self._runs.append(runs)
+        if monotonic() - self._last > self.every:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the runs, where there are new ones."""
+        runs = Runs.joined(self._runs, self._runs[0].X.shape[1])
+        if len(runs) > self.written:
+            unfinished = self.file.with_name(FILE + UNFINISHED)
+            try:
+                self.file.parent.mkdir(parents=True, exist_ok=True)
+                with unfinished.open("wb") as file:
+                    np.savez(file, study=self._study, **vars(runs))
+                    file.flush()
+                    os.fsync(file.fileno())
+                unfinished.replace(self.file)
+            except OSError as e:
+                unfinished.unlink(missing_ok=True)
+                raise InputError(
+                    f"cannot be written: {e.strerror or e}; {self.written} runs are safe, make room and repeat the command to go on",
+                    file=str(self.file),
+                ) from e
+            self.written = len(runs)
+        self._runs = [runs]
+        self._last = monotonic()
+
+    def remove(self) -> None:
+        """Delete the file, once other files hold its runs."""
+        self.file.unlink(missing_ok=True)
+        self.file.with_name(FILE + UNFINISHED).unlink(missing_ok=True)
+
+    def _read(self, b: int) -> Runs:
+        """The runs of the file; pickled objects are refused."""
+        try:
+            with np.load(self.file, allow_pickle=False) as archive:
+                study = str(archive["study"])
+                runs = Runs(**{name: archive[name] for name in Runs.__dataclass_fields__})
+            earlier = dict(json.loads(study))
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            EOFError,
+            RecursionError,
+            BadZipFile,
+        ) as e:
+            raise InputError(
+                f"damaged ({e}); delete this file, its runs are computed again", file=str(self.file)
+            ) from e
+        identity = json.loads(self._study)
+        keys = sorted({*earlier, *identity})
+        other = [key for key in keys if earlier.get(key) != identity.get(key)]
+        if other:
+            raise InputError(
+                f"holds runs of another study, {', '.join(other)} differ; use another folder, or delete this file",
+                file=str(self.file),
+            )
+        R = len(runs.run)
+        if [x.shape for x in vars(runs).values()] != [(R,), (R,), (R, b), (R,)]:
+            raise InputError(
+                f"holds runs of another shape than ({R}, {b}); delete this file, its runs are computed again",
+                file=str(self.file),
+            )
+        return runs

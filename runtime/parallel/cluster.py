@@ -1,0 +1,89 @@
+"""A map over the workers of a Dask cluster (extra `scale`), for whoever takes `map=`.
+
+Its workers must have the versions of this process and run what this process sends; trust the
+scheduler you name. Numbers are those of one process in every bit on one kind of machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import contextmanager
+from importlib.metadata import version
+from typing import Any
+
+from runtime.core.errors import InputError
+from runtime.parallel.processes import packed, there
+
+TIMEOUT = 10.0  # s that a scheduler has to answer
+PACKAGES = ("symgen", "numpy", "scipy")  # whose versions decide the bits
+
+
+@contextmanager
+def cluster(scheduler: str, timeout: float = TIMEOUT) -> Iterator[Callable[..., Iterator[Any]]]:
+    """A map over the workers of the scheduler at this address, such as tcp://10.0.0.1:8786.
+
+    Raises
+    ------
+    InputError
+        No answer from the scheduler or its workers; workers of other versions, or that die.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as e:
+        raise InputError(
+            "a Dask cluster needs an optional library: pip install symgen[scale]"
+        ) from e
+    silence = (OSError, ValueError, RuntimeError, CancelledError, KilledWorker)
+    try:
+        with ThreadPoolExecutor(1) as thread:  # an event loop of its own, wherever we are called
+            thread.submit(asyncio.run, _shake_hands(scheduler, timeout)).result()
+        with Client(scheduler, timeout=timeout, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=timeout)
+            _check_versions(client)
+            yield lambda function, keys: _mapped(client, function, keys)
+    except InputError:
+        raise
+    except silence as e:
+        reason = str(e).partition("\n")[0] or "no reply in time"
+        raise InputError(
+            f"no answer from the scheduler {scheduler} or its workers: {reason}"
+        ) from e
+
+
+def _mapped(client: Any, function: Callable[..., Any], keys: Any) -> Iterator[Any]:
+    """Results in the order of the keys; the function travels once to each worker."""
+    sent = client.scatter(packed(function), broadcast=True, hash=False)
+    for future in [client.submit(there, sent, key, pure=False) for key in keys]:
+        yield future.result()
+
+
+async def _shake_hands(scheduler: str, timeout: float) -> None:
+    """Connect once: something that listens and never answers would keep a Client waiting for
+    ever.
+    """
+    from distributed.comm import connect
+
+    comm = await asyncio.wait_for(connect(scheduler, timeout=timeout), timeout)
+    await comm.close()
+
+
+def _check_versions(client: Any) -> None:
+    """Refuse workers whose bits could differ, or that cannot run our tasks."""
+    here = _versions()
+    try:
+        of_workers = client.run(_versions)
+    except ImportError as e:
+        raise InputError(
+            f"the workers cannot run tasks of symgen ({e}): install the same symgen there"
+        ) from e
+    for address, versions in of_workers.items():
+        if versions != here:
+            raise InputError(
+                f"the worker {address} has other versions: {versions}; this process {here}. Install the same"
+            )
+
+
+def _versions() -> dict[str, str]:
+    return {package: version(package) for package in PACKAGES}

@@ -1,0 +1,340 @@
+"""Torque constants of the drives from a weighed load.
+
+The torque of a record is v, computed with the torque constants of the robot file; the true one is g
+v, a factor per motor. V holds the share of
+every motor in the torque of every joint (block diagonal without coupling), a without the load, b
+with it:
+
+    [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
+
+    together   W and the load's columns are exact, V is noisy: total least squares with exact
+               columns. With Q a basis of the exact columns and D the deviations of the columns of
+               V, g ~ D^-1 times the smallest right singular vector of (V - Q Q'V) D^-1; the last
+               entry gives the size.
+    per joint  v_j = W_j (X/g_j) + W_Lu (chi_Lu/g_j) + W_Lk chi_Lk (1/g_j): one least squares per
+               motor, noise on the left side alone; drives without coupling only.
+
+The load is that of the torques times g; its deviations hold those of g.
+
+A motor whose torque does not change with the load says nothing: its gain is refused by its own
+deviation. Without a weighed load no record can tell g from X.
+
+Reference: Gautier and Briot (2011), global identification of drive gains and dynamic parameters;
+identification.md 5.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.optimize import nnls
+
+from runtime.core.documents import Result
+from runtime.core.drives import Drives
+from runtime.core.errors import InputError
+from runtime.core.least_squares.block_covariance import gram_root, scatter
+from runtime.core.least_squares.linear import LinearOptions, assemble, ordinary
+from runtime.core.limits import LIMIT
+from runtime.core.markup import number
+from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.rows.factor import triangularise
+from runtime.core.rows.observation import Observation, split_rows, stack
+from runtime.core.rows.prepared import Prepared, decimated_torque
+from runtime.core.study import EstimateSettings, PayloadSettings
+from runtime.core.table import Table
+from runtime.payload.load import load_columns
+from runtime.physical.inertia import physical_model
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class DriveGains(Result, keys="joints constant together sigma alone sigma_alone refused"):
+    """Factors g on the torque constants of the records, one per motor; nan where a method has none.
+
+    Attributes
+    ----------
+    joints : tuple of str
+    constant : ndarray, shape (n,), N m/A or N m/V
+        Torque constants by which the records were read: theirs, or those of the robot file.
+    together : ndarray, shape (n,)
+        g by total least squares over all joints.
+    sigma : ndarray, shape (n,)
+        Deviation of `together`, from resampled blocks of time.
+    alone : ndarray, shape (n,)
+        g of each motor by least squares on its own joint.
+    sigma_alone : ndarray, shape (n,)
+        Deviation of `alone`.
+    sigma_load : ndarray, shape (u,)
+        Deviations of the unknown parameters of the load, those of g among them.
+    """
+
+    joints: tuple[str, ...]
+    constant: Array
+    together: Array
+    sigma: Array
+    alone: Array
+    sigma_alone: Array
+    sigma_load: Array
+
+    @property
+    def factors(self) -> Array:
+        """g, shape (n,), 1 where no load tells it."""
+        return np.where(np.isfinite(self.together), self.together, 1.0)
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Motors whose torque does not tell: %sigma of the joint solution is LIMIT.GAIN_REFUSED or
+        more.
+        """
+        return tuple(
+            j
+            for j, g, s in zip(self.joints, self.together, self.sigma, strict=True)
+            if not 100 * s < LIMIT.GAIN_REFUSED * abs(g)
+        )
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if not self.refused:
+            return (
+                "every gain is determined by the load, whose parameters are those with them; "
+                "those of the robot are not: set record.torque_constant to these constants"
+            )
+        return (
+            "REFUSED, the load does not change their torque enough (%sigma from "
+            f"{LIMIT.GAIN_REFUSED:g}): motor {', '.join(self.refused)}"
+        )
+
+    def table(self) -> Table:
+        """One line per motor."""
+        columns = (self.together, self.sigma, self.alone, self.sigma_alone)
+        return Table(
+            "Factors on the torque constants by which the records were read",
+            ("motor", "together", "sigma", "alone", "sigma", "torque constant"),
+            [
+                (
+                    *(joint, *(number(x, ".5g") for x in row)),
+                    "refused" if joint in self.refused else f"{constant * row[0]:.6g}",
+                )
+                for joint, constant, *row in zip(self.joints, self.constant, *columns, strict=True)
+            ],
+        )
+
+    def to_table(self) -> str:
+        """The table as text."""
+        return self.table().to_text()
+
+
+def drive_gains(
+    model: GeneratedModel,
+    without: Sequence[Prepared],
+    loaded: Sequence[Prepared],
+    settings: PayloadSettings,
+    *,
+    seed: int = 1,
+) -> DriveGains:
+    """Gains from records without and with a load of known mass.
+
+    Parameters
+    ----------
+    without, loaded : sequence of Prepared
+        Joint side, without and with the load.
+    settings : PayloadSettings
+        Where the load is fixed, and its mass.
+    seed : int
+        Of the resampling.
+    """
+    if not without or not loaded or "M" not in settings.known:
+        raise InputError(
+            "drive gains need a record without the load, one with it, and its weighed mass "
+            "(payload.known: {M: ...})"
+        )
+    drives = _drives(model)
+    constants = []
+    for reading in (*without, *loaded):
+        constant = reading.record.origin.torque_constant
+        constants.append(drives.torque_constant if constant is None else constant)
+    if any(not np.array_equal(constant, constants[0]) for constant in constants):
+        raise InputError(
+            "the records were read with different torque constants; give them the same "
+            "record.torque_constant: one factor a motor is sought for all of them"
+        )
+    observation = stack(
+        [
+            _with_load(
+                model,
+                _with_motors(model, reading, drives),
+                settings,
+                mounted,
+            )
+            for records, mounted in ((without, 0.0), (loaded, 1.0))
+            for reading in records
+        ]
+    )
+    n = drives.n
+    exact = observation.W[:, : -n - 1]
+    load = observation.W[:, -n - 1]
+    V = observation.W[:, -n:]
+    deviations, alone, sigma_alone = _alone(observation, exact, load, drives)
+    together, sigma = _together(observation, exact, load, V, deviations, drives, seed)
+    return DriveGains(
+        joint_labels(model),
+        np.asarray(constants[0]),
+        together[:n],
+        sigma[:n],
+        alone,
+        sigma_alone,
+        sigma[n + len(model.BASE_PARAMETERS) :],
+    )
+
+
+def _drives(model: GeneratedModel) -> Drives:
+    return Drives.from_mapping(model.DRIVES or {"ratio": np.eye(len(model.JOINTS))})
+
+
+def _with_motors(model: GeneratedModel, record: Prepared, drives: Drives) -> Observation:
+    """W and Y of a record, and behind W one column per motor: its share in the torque of the joint
+    of the row.
+    """
+    selection = record.certain(model)
+    observation = record.observation(model)
+    motor = drives.motor_command(record.record.torque) * drives.torque_constant
+    mask = selection.mask.ravel()
+    shares = [
+        decimated_torque(motor[:, [m]] * drives.ratio[m], selection).ravel()[mask]
+        for m in range(drives.n)
+    ]
+    names = (*observation.names, *(f"motor {m + 1}" for m in range(drives.n)))
+    return replace(
+        observation, W=np.asfortranarray(np.column_stack([observation.W, *shares])), names=names
+    )
+
+
+def _with_load(
+    model: GeneratedModel, observation: Observation, settings: PayloadSettings, mounted: float
+) -> Observation:
+    """Columns W, W_Lu, the torque of the known part of the load, motors; those of the load zero
+    where it is not mounted.
+    """
+    load = load_columns(model, physical_model(model), settings)
+    b = len(model.BASE_PARAMETERS)
+    W = observation.W[:, :b]
+    V = observation.W[:, b:]
+    columns = [W, mounted * (W @ load.columns), mounted * (W @ load.torque), V]
+    names = (
+        *observation.names[:b],
+        *(f"{family} of the load" for family in load.unknown),
+        "known load",
+        *observation.names[b:],
+    )
+    return replace(observation, W=np.asfortranarray(np.column_stack(columns)), names=names)
+
+
+def _alone(
+    observation: Observation, exact: Array, load: Array, drives: Drives
+) -> tuple[Array, Array, Array]:
+    """Deviation of the torque residual of every joint, and 1/(coefficient of the load) where one
+    motor moves one joint.
+    """
+    n = observation.n
+    deviation = np.ones(n)
+    gain = np.full(n, np.nan)
+    sigma = np.full(n, np.nan)
+    coupled = drives.ratio != np.diag(np.diag(drives.ratio))
+    for j in range(n):
+        rows = observation.joint(j)
+        A = np.column_stack([exact[rows], load[rows]])
+        used = [k for k in range(A.shape[1]) if A[:, k].any()]
+        names = tuple(observation.names[k] for k in used)
+        of_joint = Observation(
+            np.asfortranarray(A[:, used]),
+            observation.Y[rows],
+            observation.rows[j : j + 1],
+            names,
+            observation.t[rows],
+            observation.record[rows],
+            observation.rate,
+        )
+        factored = ordinary(of_joint, EstimateSettings(), LinearOptions())
+        fit = assemble(factored, factored.solve())
+        deviation[j] = fit.sigma_rho
+        if "known load" in names and not coupled[j].any() and not coupled[:, j].any():
+            k = names.index("known load")
+            gain[j] = 1 / fit.X[k]
+            sigma[j] = max(fit.sigma[k], fit.sigma_corrected[k]) * gain[j] ** 2
+    return deviation, gain, sigma
+
+
+def _together(
+    observation: Observation,
+    exact: Array,
+    load: Array,
+    V: Array,
+    deviation: Array,
+    drives: Drives,
+    seed: int,
+) -> tuple[Array, Array]:
+    """g by total least squares with exact columns, then X and the load, nan of columns that others
+    hold, and their deviations over resampled blocks of time.
+    """
+    weight = np.repeat(
+        1 / np.maximum(deviation, 1e-12 * np.abs(observation.Y).max()), observation.rows
+    )
+    n = len(deviation)
+    independent = _independent(exact)
+    E = exact[:, independent]
+    A = np.column_stack([E, load, V]) * weight[:, None]
+    D = _column_deviations(observation.rows, deviation, drives)
+    blocks = split_rows(A, observation.blocks())
+    found, scattered = np.full((2, n + exact.shape[1]), np.nan)
+    places = [*range(n), *(n + independent)]
+    found[places] = _gains(triangularise(A), D)
+    scattered[places] = scatter(
+        blocks, lambda gram: _gains(gram_root(gram), D), LIMIT.GAIN_RUNS, seed
+    )
+    return found, scattered
+
+
+def _gains(R: Array, D: Array) -> Array:
+    """g, and the parameters of the exact columns, from the triangular factor of [exact, known load,
+    V].
+    """
+    n = len(D)
+    e = len(R) - n - 1
+    g = np.linalg.svd(R[-n:, -n:] / D)[2][-1] / D
+    along = R[-n - 1, -n:] @ g / R[-n - 1, -n - 1] if R[-n - 1, -n - 1] else 0.0
+    g = g / along if along else np.full(n, np.nan)
+    return np.append(g, np.linalg.lstsq(R[:e, :e], R[:e, -n:] @ g - R[:e, e], rcond=None)[0])
+
+
+def _column_deviations(rows: Sequence[int], deviation: Array, drives: Drives) -> Array:
+    """Deviations of the errors of the columns of V with rows of joint j divided by s_j: s_j^2 =
+    sum_m (R_mj sigma_m)^2.
+    """
+    largest = (deviation**2).max()
+    variance = (
+        largest * nnls(drives.ratio.T**2, deviation**2 / largest)[0]
+    )  # scaled: nnls of SciPy 1.13 takes tiny values for zero
+    weighted = (drives.ratio**2 * variance[:, None] / deviation**2) @ np.asarray(rows, dtype=float)
+    return np.asarray(np.sqrt(np.maximum(weighted, 1e-6 * weighted.max())))
+
+
+def _independent(A: Array) -> Array:
+    """Columns of A that the others do not hold, by pivoting on unit columns."""
+    norms = np.linalg.norm(A, axis=0)
+    used = np.flatnonzero(norms)
+    R, order = qr(triangularise(A[:, used] / norms[used]), mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    return np.asarray(np.sort(used[order[size > LIMIT.INDEPENDENT_COLUMN * size[0]]]))
+
+
+def scaled(model: GeneratedModel, record: Prepared, gains: DriveGains) -> Observation:
+    """Rows of a record with the torques of every motor times its factor."""
+    n = len(model.JOINTS)
+    motors = _with_motors(model, record, _drives(model))
+    Y = motors.W[:, -n:] @ gains.factors
+    return replace(motors, W=motors.W[:, :-n], Y=Y, names=motors.names[:-n])

@@ -1,0 +1,210 @@
+"""Effect of a tool or load of known inertia on the base parameters: its ten parameters in the frame
+it is mounted on and in that of the link.
+
+With P the pseudo-inertia of a body (`runtime.physical.inertia`), about and along the axes of frame f,
+and lTf the pose of f in the frame of its link l,
+
+    P_l = lTf P_f lTf',            hence chi_l = A(lTf) chi_f, A of shape (10, 10),
+    X of the robot with the load = X + K_l chi_l,     K_l the columns of K = dX/dchi of link l.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, require
+from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model, pseudo_inertia
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """Where a load is fixed.
+
+    Attributes
+    ----------
+    link : int
+        Link that carries it.
+    frame : int
+        Frame of its parameters: that of the link, or one fixed to it.
+    T : ndarray, shape (4, 4)
+        Pose of the frame in the frame of the link.
+    """
+
+    link: int
+    frame: int
+    T: Array
+
+    @property
+    def place(self) -> str:
+        """In words."""
+        return (
+            f"link {self.link}"
+            if self.frame == self.link
+            else f"frame {self.frame} of link {self.link}"
+        )
+
+    @property
+    def action(self) -> Array:
+        """A, shape (10, 10): ten parameters at `frame` to those at the frame of the link, in the
+        order of INERTIAL.
+        """
+        return np.column_stack(
+            [ten_parameters(self.T @ pseudo_inertia(unit) @ self.T.T) for unit in np.eye(10)]
+        )
+
+    def columns(self, physical: PhysicalModel) -> Array:
+        """dX/dchi of the load at `frame`, shape (b, 10)."""
+        own = physical.K[:, physical.link(self.link)]
+        if self.frame == self.link:
+            return own
+        moved = own @ self.action
+        return np.where(
+            np.abs(moved) > LIMIT.RIGID_POSE * np.abs(moved).max(axis=1, keepdims=True), moved, 0.0
+        )
+
+
+def mount(
+    model: GeneratedModel,
+    frame: int | None = None,
+    link: int | None = None,
+    constants: Mapping[str, float] | None = None,
+) -> Mount:
+    """The link that carries a frame, and the pose of the frame in it.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    frame : int, optional
+        Any declared frame; default: that of the link.
+    link : int, optional
+        Default: the one that carries the frame, or the last link with inertia.
+    constants : mapping, optional
+        Values in place of the robot file's, as for `frame_poses`.
+
+    Raises
+    ------
+    InputError
+        No such frame or link, or a frame that no link with inertia carries.
+    """
+    links = physical_model(model).links
+    link = links[-1] if link is None and frame is None else link
+    if link is not None and link not in links:
+        raise InputError(f"no link {link} with inertia; links are {', '.join(map(str, links))}")
+    if frame is None or frame == link:
+        assert link is not None  # one of both is given
+        return Mount(link, link, np.eye(4))
+    require(model, "frame_poses")
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-1.0, 1.0, (8, len(model.JOINTS)))
+    T: Array = cast(Any, model).frame_poses(q, **(constants or {}))
+    if not 1 <= frame <= T.shape[1]:
+        raise InputError(f"no frame {frame}; {model.NAME} has frames 1 to {T.shape[1]}")
+    poses = {j: np.linalg.solve(T[:, j - 1], T[:, frame - 1]) for j in links}
+    size = max(1.0, float(np.abs(T).max()))
+    carrying = [
+        j for j, pose in poses.items() if np.ptp(pose, axis=0).max() < LIMIT.RIGID_POSE * size
+    ]
+    if link is not None and link not in carrying:
+        raise InputError(
+            f"frame {frame} is not fixed to link {link}; it is fixed to {_named(carrying)}"
+        )
+    if not carrying:
+        raise InputError(
+            f"frame {frame} is fixed to no link with inertia; links are "
+            f"{', '.join(map(str, links))}"
+        )
+    link = link or (frame if frame in carrying else carrying[-1])
+    return Mount(link, frame, np.eye(4) if link == frame else poses[link].mean(axis=0))
+
+
+def load_effect(
+    model: GeneratedModel,
+    load: Mapping[str, float],
+    *,
+    frame: int | None = None,
+    link: int | None = None,
+    **constants: float,
+) -> Array:
+    """Change of the base parameters by a known load, shape (b,), in the order of BASE_PARAMETERS: X
+    + load_effect(...) is the robot with it.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    load : mapping
+        Some of XX XY XZ YY YZ ZZ MX MY MZ M at the frame, SI; what is left out is zero.
+    frame : int, optional
+        Default: that of the link.
+    link : int, optional
+        Default: the one that carries the frame, or the last link with inertia.
+    **constants : float
+        Values in place of the robot file's.
+    """
+    return np.asarray(
+        mount(model, frame, link, constants).columns(physical_model(model, constants))
+        @ load_vector(load)
+    )
+
+
+def load_vector(load: Mapping[str, float]) -> Array:
+    """The ten parameters in the order of INERTIAL; InputError for another name."""
+    if unknown := [name for name in load if name not in INERTIAL]:
+        raise InputError(
+            f"unknown parameter {', '.join(unknown)} of a load; expected some of "
+            f"{', '.join(INERTIAL)}"
+        )
+    return np.array([float(load.get(name, 0.0)) for name in INERTIAL])
+
+
+def load_of_body(
+    mass: float, centre: Any, inertia: Any = None, rotation: Any = None
+) -> dict[str, float]:
+    """Parameters of a body from its data sheet: about the origin and along the axes of the frame it
+    is mounted on.
+
+    Parameters
+    ----------
+    mass : float, kg
+    centre : array_like, shape (3,), m
+        Of mass, in that frame.
+    inertia : array_like, shape (3, 3), kg m^2, optional
+        Tensor about the centre of mass (products as tensor elements, Ixy = -integral x y dm);
+        default: a point.
+    rotation : array_like, shape (3, 3), optional
+        Orientation of the axes of `inertia` in that frame; default: the same axes.
+    """
+    c, I = (
+        np.asarray(centre, dtype=float),
+        np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=float),
+    )
+    R = np.eye(3) if rotation is None else np.asarray(rotation, dtype=float)
+    if c.shape != (3,) or I.shape != (3, 3) or R.shape != (3, 3) or not np.allclose(I, I.T):
+        raise InputError(
+            f"centre {c.shape}, inertia {I.shape}, rotation {R.shape}; expected (3,), a symmetric "
+            "(3, 3), (3, 3)"
+        )
+    if not mass > 0:
+        raise InputError(f"mass {mass} kg; expected a positive one")
+    J = R @ I @ R.T + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return dict(zip(INERTIAL, map(float, (*J[np.triu_indices(3)], *(mass * c), mass)), strict=True))
+
+
+def ten_parameters(P: Array) -> Array:
+    """The ten parameters of a pseudo-inertia, in the order of INERTIAL: J = tr(S) 1 - S of its
+    matrix S of second moments.
+    """
+    S = P[:3, :3]
+    J = np.trace(S) * np.eye(3) - S
+    return np.array([*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]])
+
+
+def _named(links: list[int]) -> str:
+    return f"link {', '.join(map(str, links))}" if links else "no link with inertia"

@@ -1,0 +1,107 @@
+"""The load of a study: its parameters, and the torque constants of the drives that carry it.
+
+`runtime.payload.load`, `runtime.payload.gains`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.core.documents import Result
+from runtime.core.errors import SettingsError
+from runtime.core.least_squares.method import linear_companion
+from runtime.core.model import GeneratedModel, require_no_channels
+from runtime.core.problem import Problem
+from runtime.core.record import Record
+from runtime.core.rows.observation import Observation
+from runtime.core.rows.prepared import Prepared
+from runtime.core.signals.states import require_motion
+from runtime.core.table import in_lines, with_intervals
+from runtime.payload.gains import DriveGains, drive_gains, scaled
+from runtime.payload.load import Payload, payload
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PayloadStudy(Result, keys="payload drive_gains:gains"):
+    """A load.
+
+    Attributes
+    ----------
+    payload : Payload
+        From the records without and with the load, fitted together.
+    gains : DriveGains or None
+        Torque constants of the drives; None where study.payload.gains does not ask for them.
+    """
+
+    payload: Payload
+    gains: DriveGains | None
+
+    def brief(self) -> str:
+        """Load and torque constants with their 95 % intervals, four in a line."""
+        load, gains = self.payload, self.gains
+        given = [f"{name} {value:.4g} (given)" for name, value in load.given.items()]
+        estimated = with_intervals(load.names, load.value, load.sigma)
+        lines = [f"The load on {load.place}, SI, +- 95 %", *in_lines([*given, *estimated])]
+        if gains is not None:
+            value, sigma = (gains.constant * x for x in (gains.together, gains.sigma))
+            values = with_intervals([f"motor {joint}" for joint in gains.joints], value, sigma)
+            known = [x for j, x in zip(gains.joints, values, strict=True) if j not in gains.refused]
+            lines += ["Torque constants, SI, +- 95 %", *in_lines(known), gains.text]
+        return "\n".join(lines)
+
+    def to_table(self) -> str:
+        """The tables one below the other."""
+        gains = [] if self.gains is None else [self.gains.to_table(), self.gains.text]
+        return "\n\n".join([self.payload.to_table(), *gains])
+
+
+def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:
+    """The load of settings.payload, by ols, or by wls where the settings have weights.
+
+    Parameters
+    ----------
+    problem : Problem
+        Prepared; its records are those without the load.
+    loaded : sequence of Record
+        Joint side, with the load, prepared by the same steps.
+
+    Raises
+    ------
+    SettingsError
+        No record with the load, or columns left out.
+    """
+    study: Any = problem.settings
+    model, settings = problem.model, study.payload
+    if settings is None or not loaded:
+        raise SettingsError(
+            "no record with the load; name it in payload.record", path=("payload", "record")
+        )
+    method = linear_companion(study.estimate)
+    if method.columns != "all":
+        raise SettingsError(
+            "a load needs all base parameters; remove estimate.columns",
+            path=("estimate", "columns"),
+        )
+    require_no_channels(model, "the study of a load")
+    require_motion(study.signals, "a load")
+    full = [problem.reading(record) for record in loaded]
+    gains = None
+    if settings.gains:
+        gains = drive_gains(model, problem.prepared, full, settings)
+    rows = [_rows(model, record, gains) for record in problem.prepared]
+    loaded_rows = [_rows(model, record, gains) for record in full]
+    load = payload(model, rows, loaded_rows, settings, method, provenance=problem.provenance)
+    if gains is not None:
+        load = replace(load, sigma=np.fmax(load.sigma, gains.sigma_load))
+    return PayloadStudy(load, gains)
+
+
+def _rows(model: GeneratedModel, record: Prepared, gains: DriveGains | None) -> Observation:
+    """Rows of a record, with the torques of every motor times its factor where it is sought."""
+    return record.observation(model) if gains is None else scaled(model, record, gains)

@@ -1,0 +1,1 @@
+"""Bodies that exist: conditions of a physical robot, the values nearest to them."""

@@ -1,0 +1,360 @@
+"""Can a physical robot have these base parameters, and which standard parameters would it have?
+
+    feasibility(X)            t* = max t: every condition of `runtime.physical.inertia` holds with
+                              margin t, and K chi = X. t* < 0: no robot has X
+    standard_parameters(X)    chi with K chi = X that fulfils every condition, nearest to the values
+                              of the robot file (or to zero)
+
+A negative t* is blamed on the condition with the largest multiplier; that one is released and the
+rest asked again, until it holds.
+Without limits on masses chi is not unique: different chi of one X give the same torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.limits import LIMIT
+from runtime.core.settings import Positive, Real, Settings, Text
+from runtime.physical.inertia import INERTIAL, PhysicalModel
+from runtime.physical.semidefinite import (
+    Distance,
+    LinearBounds,
+    Optimum,
+    Prior,
+    closest,
+    everything,
+    margin,
+    solutions,
+)
+
+Array = np.ndarray
+Bounds = tuple[Real | None, Real | None]
+
+TYPICAL = {
+    "X": 0.1,
+    "Y": 0.1,
+    "Z": 0.1,
+    "MX": 0.3,
+    "MY": 0.3,
+    "MZ": 0.3,
+    "M": 3.0,
+}  # kg m^2, kg m, kg; scales of the unknowns only
+
+
+class Ellipsoid(Settings):
+    """Ellipsoid that holds the mass of a link.
+
+    Attributes
+    ----------
+    centre : tuple of 3 float, m
+        Centre, in the link frame.
+    axes : tuple of 3 float, m
+        Semi-axes, along the axes of the link frame.
+    """
+
+    centre: tuple[Real, Real, Real]
+    axes: tuple[Positive, Positive, Positive]
+
+
+class RobotLimits(Settings):
+    """Knowledge about the standard parameters of a robot.
+
+    Attributes
+    ----------
+    bounds : mapping of pairs of float or None, SI
+        [lowest, highest] of standard parameters, by name.
+    total_mass : float or pair of float or None, kg
+        Mass of all links together, a number or [lowest, highest].
+    centre : mapping of 3 pairs of float, m
+        Box of the centre of mass, by link, in the link frame.
+    ellipsoid : mapping of Ellipsoid
+        Ellipsoid that holds the mass, by link.
+    """
+
+    bounds: Mapping[Text, Bounds] = field(default_factory=dict)
+    total_mass: Real | tuple[Real, Real] | None = None
+    centre: Mapping[Text, tuple[tuple[Real, Real], tuple[Real, Real], tuple[Real, Real]]] = field(
+        default_factory=dict
+    )
+    ellipsoid: Mapping[Text, Ellipsoid] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """Whether base parameters are those of a physical robot.
+
+    Attributes
+    ----------
+    margin : float
+        t*: a share of the link's second moment and mass in the robot file; SI where it has none,
+        and of friction and actuators.
+    feasible : bool
+        Whether t* >= 0, or may be for all that the record tells (`within_noise`).
+    physical : bool
+        Whether some robot has them, whatever the limits that were given or guessed.
+    blocking : tuple of (str, float)
+        Conditions that had to be released, in order, each with the t* before; empty where feasible.
+    chi : ndarray, shape (p,)
+        Standard parameters at t*.
+    """
+
+    margin: float
+    feasible: bool
+    blocking: tuple[tuple[str, float], ...]
+    chi: Array
+    physical: bool = False
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if self.physical and not self.feasible:
+            named = ", ".join(name for name, _ in self.blocking)
+            return f"physically feasible, but not within the bounds of masses and centres: {named}"
+        if self.feasible and self.blocking:
+            named = ", ".join(name for name, _ in self.blocking)
+            return f"physically feasible within the deviations of the record; at a bound: {named}"
+        if self.feasible:
+            least = "at least " if self.margin > 0.999 * LIMIT.LARGEST_MARGIN else ""
+            return (
+                "physically feasible: every condition holds with a margin of "
+                f"{least}{self.margin:.3g}"
+            )
+        named = ", ".join(f"{name} (margin {t:.3g})" for name, t in self.blocking)
+        return (
+            "NOT physically feasible: no positive mass density and friction gives these "
+            f"parameters; in the way: {named}"
+        )
+
+
+def feasibility(
+    physical: PhysicalModel,
+    names: Sequence[str],
+    X: Array,
+    limits: RobotLimits | None = None,
+    *,
+    blame: bool = True,
+) -> Feasibility:
+    """Whether base parameters X, shape (len(names),), are those of a physical robot within the
+    limits. blame : all conditions in the way, not the first.
+    """
+    rows, space = limit_rows(physical, limits), solutions(physical.rows(names), X, units(physical))
+    first = margin(physical.conditions, rows, space)
+    if not first.solved:
+        raise InputError(
+            unsolved(first.status, rows, lambda other: margin(physical.conditions, other, space))
+        )
+    blocking, conditions, released = [], list(physical.conditions), first
+    while released.solved and released.margin < -LIMIT.MARGIN_ROUNDING and conditions:
+        worst = max(released.duals, key=lambda name: released.duals[name])
+        blocking.append((worst, released.margin))
+        conditions = [c for c in conditions if c.name != worst]
+        if not blame:
+            break
+        released = margin(conditions, rows, space)
+    return Feasibility(first.margin, not blocking, tuple(blocking), first.chi, not blocking)
+
+
+def within_noise(
+    judged: Feasibility, physical: PhysicalModel, names: Sequence[str], X: Array, covariance: Array
+) -> Feasibility:
+    """The same, feasible where a robot lies as near as noise takes an estimate from it: with C the
+    covariance of X, shape (b, b),
+
+        min ||X - K chi||^2_C^-1 <= the 99 % point of chi-square,
+
+    as many degrees of freedom as the conditions in the way have rows.
+    """
+    L = np.linalg.cholesky(covariance)
+    R, z = np.linalg.solve(L, physical.rows(names)), np.linalg.solve(L, X)
+    size = np.linalg.norm(z)
+    nearest = closest(
+        R / size,
+        z / size,
+        physical.conditions,
+        limit_rows(physical, None),
+        everything(units(physical)),
+        least=LIMIT.MARGIN_ROUNDING,
+    )
+    blocked = dict(judged.blocking)
+    freedom = sum(c.B.shape[1] for c in physical.conditions if c.name in blocked)
+    far = float(np.sum((R @ nearest.chi - z) ** 2)) if nearest.solved else np.inf
+    if far > chi2.ppf(LIMIT.NOISE_LEVEL, freedom):
+        return judged
+    return replace(judged, feasible=True, physical=True, margin=0.0, chi=nearest.chi)
+
+
+def standard_parameters(
+    physical: PhysicalModel, names: Sequence[str], X: Array, limits: RobotLimits | None = None
+) -> Array:
+    """chi, shape (p,), with K chi = X to rounding and every condition fulfilled; raises InputError
+    where X is infeasible.
+
+    Of all such chi the one nearest to the values of the robot file, or to zero where it has none,
+    in units of their size.
+    """
+    answer = feasibility(physical, names, X, limits)
+    if not answer.feasible:
+        raise InputError(
+            f"no standard parameters: {answer.text}; identify with estimate.method: feasible"
+        )
+    return nearest_standard(physical, names, X, answer.chi, limits)
+
+
+def nearest_standard(
+    physical: PhysicalModel,
+    names: Sequence[str],
+    X: Array,
+    start: Array,
+    limits: RobotLimits | None = None,
+) -> Array:
+    """The chi of `standard_parameters` where one that fulfils the conditions, `start`, is known."""
+    scale, unit = scales(physical), units(physical)
+    space, rows = solutions(physical.rows(names), X, unit), limit_rows(physical, limits)
+    chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
+    reach = np.abs(space.basis).max(axis=1, initial=0.0) / unit
+    open_ = tuple(
+        c for c in physical.conditions if reach[list(c.numbers)].max() > LIMIT.MARGIN_ROUNDING
+    )
+    if len(open_) < len(
+        physical.conditions
+    ):  # X alone decides the others, such as a friction of zero
+        inner = margin(open_, rows, space)
+        start = inner.chi if inner.solved else start
+    least = float(
+        np.clip(
+            min((c.smallest(start) for c in open_), default=LIMIT.LEAST_EIGENVALUE) / 2,
+            LIMIT.LEAST_EIGENVALUE**2,
+            LIMIT.LEAST_EIGENVALUE,
+        )
+    )
+    nearest = closest(np.diag(1 / scale), chi0 / scale, open_, rows, space, least=least)
+    kept = nearest.solved and all(c.smallest(nearest.chi) >= 0 for c in open_)
+    return nearest.chi if kept else start
+
+
+def limit_rows(physical: PhysicalModel, limits: RobotLimits | None) -> LinearBounds:
+    """The limits as rows lower <= A chi <= upper."""
+    limits = limits or RobotLimits()
+    entries: list[tuple[str, dict[int, float], float, float]] = []
+    for name, (low, high) in limits.bounds.items():
+        if name not in physical.standard:
+            message = f"no standard parameter {name}; there are {', '.join(physical.standard)}"
+            raise SettingsError(message, path=("estimate", "options", "bounds", name))
+        bounds = (-np.inf if low is None else low, np.inf if high is None else high)
+        entries.append((f"bounds of {name}", {physical.standard.index(name): 1.0}, *bounds))
+    if limits.total_mass is not None:
+        low, high = np.broadcast_to(limits.total_mass, 2).tolist()
+        entries.append(
+            ("total_mass", {physical.link(j)[-1]: 1.0 for j in physical.links}, low, high)
+        )
+    for key, box in limits.centre.items():
+        ten = physical.link(_link(physical, key, "centre"))
+        for axis, (low, high) in enumerate(box):
+            moment, mass = ten[6 + axis], ten[9]
+            sides = {moment: 1.0, mass: -low}, {moment: -1.0, mass: high}
+            entries += [(f"centre of link {key}", side, 0.0, np.inf) for side in sides]
+    for key, ellipsoid in limits.ellipsoid.items():
+        j = _link(physical, key, "ellipsoid")
+        condition = next(c for c in physical.conditions if c.name == f"link {j}")
+        weights = np.einsum("kij,ij->k", condition.B, _inside(ellipsoid))
+        entries.append(
+            (
+                f"ellipsoid of link {key}",
+                dict(zip(condition.numbers, weights.tolist(), strict=True)),
+                0.0,
+                np.inf,
+            )
+        )
+    A = np.zeros((len(entries), len(physical.standard)))
+    for row, (_, weights_of, _, _) in enumerate(entries):
+        A[row, list(weights_of)] = list(weights_of.values())
+    lower, upper = (np.array([entry[k] for entry in entries], dtype=float) for k in (2, 3))
+    return LinearBounds(tuple(entry[0] for entry in entries), A, lower, upper)
+
+
+def scales(physical: PhysicalModel) -> Array:
+    """Sizes of the standard parameters, shape (p,): those of the robot file, typical ones where it
+    has none or zero.
+    """
+    sizes = []
+    for name in physical.standard:
+        family = name.rstrip("0123456789")
+        typical = TYPICAL.get(family, 0.1 if family in INERTIAL else 1.0)
+        value = abs(physical.values.get(name, 0.0))
+        sizes.append(max(value, 1e-2 * typical) if physical.values else typical)
+    return np.array(sizes)
+
+
+def units(physical: PhysicalModel) -> Array:
+    """Units of the unknowns, shape (p,): `scales`, of a link with values those of its condition."""
+    sizes = scales(physical)
+    for j, condition in zip(physical.links, physical.conditions, strict=False):
+        second, mass = condition.size[0], condition.size[-1]
+        if all(f"{family}{j}" in physical.values for family in INERTIAL):
+            sizes[physical.link(j)] = [second] * 6 + [np.sqrt(second * mass)] * 3 + [mass]
+    return sizes
+
+
+def pulled(physical: PhysicalModel, kind: Distance, weight: float) -> Prior | None:
+    """The pull to the values of the robot file; InputError where they are missing."""
+    if kind == "none" or weight == 0:
+        return None
+    numbers = known_inertia(physical)
+    if not numbers:
+        raise SettingsError(
+            "the robot file has no values of links; give them, or use prior: none",
+            path=("estimate", "options", "prior"),
+        )
+    chi0 = np.array([physical.values.get(name, 0.0) for name in physical.standard])
+    return Prior(chi0, scales(physical), numbers, weight)
+
+
+def known_inertia(physical: PhysicalModel) -> tuple[int, ...]:
+    """Numbers of the inertial parameters of links that the robot file has values of."""
+    return tuple(
+        k
+        for j in physical.links
+        for k in physical.link(j)
+        if physical.standard[k] in physical.values
+    )
+
+
+def unsolved(status: str, rows: LinearBounds, attempt: Callable[[LinearBounds], Optimum]) -> str:
+    """What happened, the likely cause, what to try. attempt : the same problem with other rows;
+    each limit is released in turn.
+    """
+    helps = [name for name in dict.fromkeys(rows.names) if attempt(rows.without(name)).solved]
+    if helps:
+        return (
+            "no physical robot within the limits; there is one without "
+            f"{' or without '.join(helps)}: widen it or leave it out"
+        )
+    if status.startswith("infeasible") and rows.names:
+        named = ", ".join(dict.fromkeys(rows.names))
+        return (
+            f"no physical robot within the limits ({named}); more than one of them contradicts "
+            "the others: leave them out one by one"
+        )
+    return (
+        f"the semidefinite program was not solved ({status}); try another margin, a prior, or "
+        "bounds on the masses"
+    )
+
+
+def _inside(e: Ellipsoid) -> Array:
+    """Q with x'Qx = 1 - (x - c)' A^-1 (x - c), A = diag(axes^2): tr(P Q) >= 0 for mass inside."""
+    A, c = np.diag(1 / np.square(e.axes)), np.array([e.centre]).T
+    return np.block([[-A, A @ c], [c.T @ A, 1 - c.T @ A @ c]])
+
+
+def _link(physical: PhysicalModel, key: str, setting: str) -> int:
+    if key not in map(str, physical.links):
+        message = f"no link {key!r}; links are {', '.join(map(str, physical.links))}"
+        raise SettingsError(message, path=("estimate", "options", setting, key))
+    return int(key)

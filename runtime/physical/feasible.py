@@ -1,0 +1,413 @@
+"""Feasible least squares: the parameters nearest to the record that a physical robot can have.
+
+    min ||R (z - K chi)||^2 + weight D(chi)      subject to
+            P_j(chi) >= margin S_j, forms >= margin 1, Ia, FV, FS >= margin, limits
+    X = K chi                                    R z = Q'Y, W = Q R
+
+W is factored once and b rows enter the semidefinite program (`runtime.physical.semidefinite`);
+the conditions are those of `runtime.physical.inertia`. All base
+parameters are fitted, essential or not: a condition ties every parameter of a link. With the
+columns of some parameters alone, the others
+are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least
+squares is feasible, it is the solution.
+
+options (all of `runtime.physical.feasibility.RobotLimits` too):
+    margin     smallest eigenvalue of every condition: of a link with values in the robot file as
+               share of its second moment and mass there (S_j), of others in SI; 1e-6
+    prior      none | euclidean: distance D of the inertial parameters from the values of the robot file; "auto": euclidean where it has values of links, else none
+    weight     of D, a number; "held-out": that by which four fifths of the record in time predict
+               the fifth that is left out best; "auto": the
+               largest, to half a decade, that raises the residual norm by at most 1 %
+    reach      size of the robot, m, which bounds masses and their centres
+               "auto": from its frames where these say enough; null
+    explain    whether every condition in the way of least squares is named; true
+    linear     options of the least squares behind it: rank_tolerance, block
+
+sigma and covariance are those of least squares without conditions, eq. (10): the theory of
+estimates on the boundary of a cone has no such formula. `sigma_corrected` of a parameter is
+
+    sqrt(s^2 + (X - X_0)^2)       X_0, s: least squares and its deviation by blocks of time
+
+Conditions that hold and a prior that is right take X nearer to the truth than X_0 is, a wrong prior
+further, by X - X_0 at most. Where s is right, such an interval holds the truth at least as often
+as it says, whatever the prior. Resampled records would not tell: those that end at the same limit,
+or at the value of the file, do not scatter. A parameter held by an active condition is told by
+`details`.
+
+Reference: Sousa and Cortesao (2014); Wensing, Kim and Slotine (2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.core.errors import InputError, SettingsError
+from runtime.core.least_squares.linear import System, assemble, percent
+from runtime.core.least_squares.method import Beginning, Fitted
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel
+from runtime.core.progress import at
+from runtime.core.rows.factor import Array, Factor, factor, triangularise
+from runtime.core.rows.observation import Observation
+from runtime.core.settings import Flag, NotNegative, Positive, require
+from runtime.physical.feasibility import (
+    Feasibility,
+    RobotLimits,
+    feasibility,
+    known_inertia,
+    limit_rows,
+    nearest_standard,
+    pulled,
+    units,
+    unsolved,
+)
+from runtime.physical.inertia import PhysicalModel, physical_model
+from runtime.physical.semidefinite import Distance, LinearBounds, Optimum, closest, everything
+from runtime.physical.signs import reach_of
+
+WEIGHTS = 10.0 ** np.arange(0.0, -9.5, -0.5)
+DECADES = WEIGHTS[::2]  # of the search for the weight of smallest held-out error
+
+
+class FeasibleOptions(RobotLimits):
+    """estimate.options of method feasible; those of `RobotLimits` too.
+
+    Attributes
+    ----------
+    margin : float
+        Smallest eigenvalue of every condition: of a link with values in the robot file as share of
+        its second moment and mass there, of others in SI.
+    prior : str
+        Distance D of the inertial parameters from the values of the robot file: none or euclidean; auto: euclidean where the file has values of links, else none.
+    weight : float or str
+        Weight of D; held-out: that by which four fifths of the record in time predict the fifth
+        that is left out best; auto: the largest, to half
+        a decade, that raises the residual norm by at most 1 %.
+    reach : float, str or None, m
+        Size of the robot: no centre of mass lies further from the origin of its frame, and all
+        links together weigh less than a fifth of the water in a cube of that
+        side, where `total_mass` and `bounds` say nothing. auto: from its frames, where at least two
+        links have a length and prismatic joints limits, and the record does not contradict it;
+        null: no such bounds.
+    explain : bool
+        Name every condition that least squares breaks; false: the parameters alone, in a third of the time.
+    linear : mapping
+        Options of the least squares that starts the method: rank_tolerance, block.
+    """
+
+    margin: Positive = 1e-6
+    prior: Distance | Literal["auto"] = "auto"
+    weight: NotNegative | Literal["auto", "held-out"] = "held-out"
+    reach: Positive | Literal["auto"] | None = "auto"
+    explain: Flag = True
+    linear: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        message = f"{self.weight} with prior: none; set prior: euclidean"
+        require(self.prior != "none" or isinstance(self.weight, str), message, "weight")
+
+
+def fit(start: Beginning) -> Fitted:
+    """The feasible fit; `details` holds the standard parameters, the smallest eigenvalues, and what
+    least squares gave.
+    """
+    if start.model is None:
+        raise InputError(
+            "method feasible needs the model: it knows which parameters belong to one link"
+        )
+    observation = start.observation
+    system = start.system
+    free = start.solution
+    physical = physical_model(start.model)
+    options = decided(start.options, start.model, physical)
+    guess = reach_text(options) if start.options.reach == "auto" else ""
+    without_prior = None
+    if guess:
+        open_options = decided(replace(start.options, reach=None), start.model, physical)
+        unbounded, bounded = by_reach(system.weighted, physical, open_options, options)
+        without_prior = bounded
+        if contradicted(system.weighted, physical, unbounded, bounded):
+            options = open_options
+            without_prior = unbounded
+            guess += " The record contradicts them: they are left out."
+    unconstrained = None
+    if options.explain or options.prior == "none":
+        unconstrained = within_limits(physical, system.names, free.X, options)
+    if (
+        options.prior == "none"
+        and unconstrained is not None
+        and unconstrained.feasible
+        and unconstrained.margin >= options.margin
+    ):
+        X = free.X
+        chi = unconstrained.chi
+        weight = 0.0
+    else:
+        searched = options
+        if options.prior != "none" and options.weight == "held-out":
+            found = held_out_weight(observation, system, physical, options)
+            searched = replace(options, weight=found)
+        known = isinstance(searched.weight, float)
+        at(f"feasible, weight of the prior {searched.weight:g}" if known else "feasible")
+        chi, weight = weighed(system.weighted, physical, searched, without_prior)
+        X = physical.rows(system.names) @ chi
+    if weight == 0:  # nothing was pulled: chi is one of many
+        chi = nearest_standard(physical, system.names, X, chi, options)
+    smallest = physical.smallest(chi)
+    limit = LIMIT.ACTIVE_CONDITION * options.margin
+    active = [name for name, value in smallest.items() if value < limit]
+    method = "ols" if start.settings.weights == "none" else "wls"
+    residual, measured = system.norms(free.X)
+    without = percent(residual, measured)
+    given = percent(system.norms(X)[0], measured)
+    details = {
+        "standard": physical.named(chi),
+        "smallest_eigenvalues": smallest,
+        "active": active,
+        "options": asdict(options),
+        "weight": weight,
+        "least_squares": {
+            "method": method,
+            **conditions_of(unconstrained),
+            "relative_error": without,
+            "residual_norm": float(np.linalg.norm(residual)),
+            "X": free.X,
+        },
+    }
+    violated = min(smallest.values()) < 0
+    failure = "The solver left a condition violated: try another margin, a prior, or bounds on the masses."
+    judgement = f"Least squares ({method}) is {unconstrained.text}. " if unconstrained else ""
+    parts = (
+        failure if violated else "",
+        f"{judgement}With the conditions the relative error is {given:.3f} % instead of {without:.3f} %; at their limit: {', '.join(active) or 'none'}.",
+        prior_text(physical, options, weight),
+        guess,
+    )
+    return Fitted(
+        system,
+        replace(free, X=X, residual_norm=residual_norm(system.weighted, X)),
+        corrected=np.hypot(assemble(system, free).sigma_corrected, X - free.X),
+        status="not-converged" if violated else "ok",
+        message=" ".join(part for part in parts if part),
+        details=details,
+    )
+
+
+def conditions_of(judged: Feasibility | None) -> dict[str, Any]:
+    """What least squares does to the conditions of a physical robot; nothing where it was not asked."""
+    if judged is None:
+        return {}
+    blocking = [{"condition": name, "margin": t} for name, t in judged.blocking]
+    return {"feasible": judged.feasible, "margin": judged.margin, "blocking": blocking}
+
+
+def within_limits(
+    physical: PhysicalModel, names: Sequence[str], X: Array, options: FeasibleOptions
+) -> Feasibility:
+    """Whether X is that of a physical robot, and if it is, whether of one within the limits: these
+    are what is known or guessed of a robot, not physics.
+    """
+    judged = feasibility(physical, names, X, blame=options.explain)
+    named = dict.fromkeys(limit_rows(physical, options).names)
+    if not judged.feasible or not named:
+        return judged
+    try:
+        bounded = feasibility(physical, names, X, options, blame=False)
+    except InputError:
+        bounded = replace(judged, feasible=False)
+    blocking = () if bounded.feasible else tuple((name, bounded.margin) for name in named)
+    return replace(bounded, physical=True, blocking=blocking)
+
+
+def weighed(
+    rows: Factor,
+    physical: PhysicalModel,
+    options: FeasibleOptions,
+    without_prior: Array | None = None,
+) -> tuple[Array, float]:
+    """chi of a factored system, and the weight of D.
+
+    without_prior : chi of weight 0, shape (p,), where it is known.
+    """
+    if options.prior == "none":
+        if without_prior is None:
+            without_prior = fitted(rows, physical, options, 0.0)
+        return without_prior, 0.0
+    if not isinstance(options.weight, str):
+        return fitted(rows, physical, options, options.weight), options.weight
+    K = physical.rows(rows.names)
+    free = without_prior if without_prior is not None else fitted(rows, physical, options, 0.0)
+    allowed = LIMIT.WEIGHT_INCREASE * residual_norm(rows, K @ free)
+    for weight in map(float, WEIGHTS):
+        try:
+            chi = fitted(rows, physical, options, weight)
+        except SettingsError:
+            raise
+        except InputError:  # as in `held_out_weight`
+            continue
+        if residual_norm(rows, K @ chi) <= allowed:
+            return chi, weight
+    return free, 0.0
+
+
+def held_out_weight(
+    observation: Observation, system: System, physical: PhysicalModel, options: FeasibleOptions
+) -> float:
+    """The weight of D by which every fifth of the record is predicted best by the others; the
+    largest of several.
+
+    Errors of the fifths add up, and none is below that of the least squares of its own rows: a
+    weight is left as soon as it cannot be the best.
+    """
+    number = observation.equal_parts(LIMIT.HELD_OUT_PARTS)
+    parts = [part_factor(observation.where(number == p), system) for p in np.unique(number)]
+    others = [
+        Factor(system.names, triangularise(np.vstack([o.R for o in parts if o is not part])), ())
+        for part in parts
+    ]
+    least = np.cumsum([part.r22**2 for part in parts][::-1])[
+        ::-1
+    ]  # of this part and those after it
+    K = physical.rows(system.names)
+
+    at("feasible, the weight of the prior by held-out error")
+
+    def error(weight: float, best: float) -> float:
+        fixed, squares = replace(options, weight=weight), 0.0
+        try:
+            for rows, part, left in zip(others, parts, least, strict=True):
+                if squares + left > best:
+                    return float("inf")
+                squares += residual_norm(part, K @ weighed(rows, physical, fixed)[0]) ** 2
+        except SettingsError:
+            raise
+        except InputError:  # a weight by which the program is too badly scaled for the solver
+            return float("inf")
+        return squares
+
+    chosen = 0.0
+    best = float("inf")
+    for weight in map(float, (0.0, *DECADES[::-1])):
+        squares = error(weight, best)
+        if squares <= best:
+            chosen = weight
+            best = squares
+    return chosen
+
+
+def decided(
+    options: FeasibleOptions, model: GeneratedModel, physical: PhysicalModel
+) -> FeasibleOptions:
+    """The options with the prior and the bounds that they leave to the robot.
+
+    No centre of mass lies further from the origin of its frame, along any axis, than the robot
+    reaches, and all links together weigh less than a fifth of the water in a cube of that side.
+    """
+    prior = (
+        ("euclidean" if known_inertia(physical) else "none")
+        if options.prior == "auto"
+        else options.prior
+    )
+    message = (
+        f"{options.weight}, but {model.NAME} has no values of links; give them in the robot "
+        "file, or leave this out"
+    )
+    require(
+        prior != "none" or isinstance(options.weight, str), message, "estimate", "options", "weight"
+    )
+    reach = reach_of(model) if options.reach == "auto" else options.reach
+    if reach is None or not np.isfinite(reach):
+        return replace(options, prior=prior, reach=None)
+    masses = [f"M{j}" for j in physical.links]
+    said = options.total_mass is not None or any(name in options.bounds for name in masses)
+    box = ((-reach, reach),) * 3
+    own = {str(j): box for j in physical.links if str(j) not in options.ellipsoid}
+    return replace(
+        options,
+        prior=prior,
+        reach=reach,
+        total_mass=options.total_mass if said else (0.0, LIMIT.ROBOT_DENSITY * reach**3),
+        centre={**own, **options.centre},
+    )
+
+
+def reach_text(options: FeasibleOptions) -> str:
+    """Bounds that were guessed from the lengths of the robot, in words."""
+    if options.reach is None or options.reach == "auto":
+        return ""
+    mass = options.total_mass[1] if isinstance(options.total_mass, tuple) else np.inf
+    total = f", {mass:.3g} kg in all" if mass == LIMIT.ROBOT_DENSITY * options.reach**3 else ""
+    return (
+        f"Masses and their centres are bounded by the size of the robot, {options.reach:.2g} m by "
+        f"its frames{total}: a guess, not physics; set reach, or reach: null for none."
+    )
+
+
+def by_reach(
+    rows: Factor, physical: PhysicalModel, unbounded: FeasibleOptions, bounded: FeasibleOptions
+) -> tuple[Array | None, Array | None]:
+    """chi without a prior, and without and with bounds that were guessed; None: no robot is within them."""
+    found: list[Array | None] = []
+    for limits in (unbounded, bounded):
+        options = replace(limits, prior="none", weight="auto")  # a weight is of a prior
+        try:
+            found.append(fitted(rows, physical, options, 0.0))
+        except InputError:
+            found.append(None)
+    return found[0], found[1]
+
+
+def contradicted(
+    rows: Factor, physical: PhysicalModel, unbounded: Array | None, bounded: Array | None
+) -> bool:
+    """Whether guessed bounds raise the residual by more than LIMIT.WEIGHT_INCREASE, or let no robot be."""
+    if unbounded is None or bounded is None:
+        return unbounded is not None
+    K = physical.rows(rows.names)
+    without = residual_norm(rows, K @ unbounded)
+    within = residual_norm(rows, K @ bounded)
+    return bool(within > LIMIT.WEIGHT_INCREASE * without)
+
+
+def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float) -> str:
+    """What the values of the robot file did, in words."""
+    if options.prior == "none":
+        return ""
+    missing = len(physical.links) * 10 - len(known_inertia(physical))
+    some = f" ({missing} parameters of links have no value and stay free)" if missing else ""
+    return f"Values of the robot file as prior, {options.prior}, weight {weight:g}{some}."
+
+
+def part_factor(part: Observation, system: System) -> Factor:
+    """Factor of some rows with the weights of the joints in the whole."""
+    chosen = part.columns(system.names)
+    return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
+        1 / np.array(system.scales)
+    )
+
+
+def fitted(rows: Factor, physical: PhysicalModel, options: FeasibleOptions, weight: float) -> Array:
+    """chi, shape (p,), of min ||R (z - K chi)||^2 + weight D(chi) under the conditions, of a
+    factored system.
+    """
+    size = float(np.hypot(np.linalg.norm(rows.r12), rows.r22)) or 1.0
+    R, z = rows.R11 @ physical.rows(rows.names) / size, rows.r12 / size
+    bounds, space = limit_rows(physical, options), everything(units(physical))
+    pull = pulled(physical, "none" if options.prior == "auto" else options.prior, weight)
+
+    def attempt(within: LinearBounds) -> Optimum:
+        return closest(R, z, physical.conditions, within, space, least=options.margin, pull=pull)
+
+    optimum = attempt(bounds)
+    if not optimum.solved:
+        raise InputError(unsolved(optimum.status, bounds, attempt))
+    return optimum.chi
+
+
+def residual_norm(rows: Factor, X: Array) -> float:
+    """||Y - W X|| of a factored system."""
+    return float(np.hypot(rows.r22, np.linalg.norm(rows.R11 @ X - rows.r12)))

@@ -1,0 +1,262 @@
+"""Conditions on the standard parameters of a physical robot: every link has a mass density,
+actuators have inertia, friction takes power.
+
+Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
+about the origin of its frame (the elements XX .. ZZ
+as they are) and l = (MX, MY, MZ), the pseudo-inertia
+
+    P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
+
+is the matrix of second moments of the density in homogeneous coordinates: a density exists if and
+only if P_j is positive semidefinite, which holds
+the triangle inequalities of the moments of inertia. Every element along s = G q (inertia, viscous,
+Coulomb) asks for c >= 0. Elements given as forms
+q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive
+semidefinite (the inertia of a coupled wrist,
+the power its viscous friction takes). Friction of one direction of motion counts in that direction
+and leaves forms alone. Offsets and springs
+have no sign.
+
+References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for
+identification under such constraints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from runtime.core.errors import InputError, ModelError
+from runtime.core.model import GeneratedModel, elements_of, require
+
+Array = np.ndarray
+
+INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+SIGNED = (
+    "inertia",
+    "viscous",
+    "coulomb",
+    "dissipative",
+)  # kinds of elements whose parameter is not negative
+FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefinite
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """The matrix sum_k chi[numbers[k]] B[k] is positive semidefinite.
+
+    Attributes
+    ----------
+    name : str
+        Link, form or element that the condition is about.
+    numbers : tuple of int
+        Standard parameters, by their place.
+    B : ndarray, shape (k, m, m)
+    size : ndarray, shape (m,), SI
+        What its eigenvalues are measured in: second moment and mass of the link in the robot file;
+        of inertias of drives 1000 times the least of these second moments, at most 1; 1 without
+        values, and of friction.
+    """
+
+    name: str
+    numbers: tuple[int, ...]
+    B: Array
+    size: Array
+
+    @property
+    def scaled(self) -> Array:
+        """B of S^-1/2 P S^-1/2, S = diag(size)."""
+        root = np.sqrt(self.size)
+        return np.asarray(self.B / np.outer(root, root))
+
+    def matrix(self, chi: Array) -> Array:
+        """The matrix P at chi, shape (m, m)."""
+        return np.asarray(np.tensordot(chi[list(self.numbers)], self.B, axes=1))
+
+    def smallest(self, chi: Array) -> float:
+        """The largest t with P >= t S: its smallest eigenvalue in units of `size`."""
+        P = np.tensordot(chi[list(self.numbers)], self.scaled, axes=1)
+        return float(np.linalg.eigvalsh(P)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalModel:
+    """Standard parameters of a model: their map to base parameters and the conditions on them.
+
+    Attributes
+    ----------
+    standard, base : tuple of str
+        Names, p and b of them.
+    K : ndarray, shape (b, p)
+        X = K chi.
+    links : tuple of int
+        Links that have inertia.
+    conditions : tuple of Condition
+        One per link, then one per form, then one per signed element.
+    values : mapping
+        Those of the robot file, by name.
+    """
+
+    standard: tuple[str, ...]
+    base: tuple[str, ...]
+    K: Array
+    links: tuple[int, ...]
+    conditions: tuple[Condition, ...]
+    values: Mapping[str, float]
+
+    def link(self, j: int) -> list[int]:
+        """Where the ten parameters of link j stand among the standard ones, in the order of
+        INERTIAL.
+        """
+        if j not in self.links:
+            raise InputError(
+                f"link {j} has no inertial parameters; links are {', '.join(map(str, self.links))}"
+            )
+        return [self.standard.index(f"{family}{j}") for family in INERTIAL]
+
+    def named(self, chi: Array) -> dict[str, float]:
+        """Standard parameters by name."""
+        return {name: float(value) for name, value in zip(self.standard, chi, strict=True)}
+
+    def smallest(self, chi: Array) -> dict[str, float]:
+        """The smallest eigenvalue of every condition in units of its size, by its name: not
+        negative for a physical robot.
+        """
+        return {condition.name: condition.smallest(chi) for condition in self.conditions}
+
+    def rows(self, names: Sequence[str]) -> Array:
+        """The rows of K of the base parameters `names`."""
+        return self.K[[self.base.index(name) for name in names]]
+
+
+def physical_model(
+    model: GeneratedModel, constants: Mapping[str, float] | None = None
+) -> PhysicalModel:
+    """Standard parameters of an emitted model and the conditions on them.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+    constants : mapping, optional
+        Values in place of the robot file's, as for `base_parameters`.
+
+    Raises
+    ------
+    ModelError
+        A model of an older version, without these tables.
+    """
+    require(model, "base_parameters")
+    elements = elements_of(model, constants)
+    if missing := [name for name in ("STANDARD_PARAMETERS", "LINKS") if not hasattr(model, name)]:
+        raise ModelError(
+            f"no {', '.join(missing)}; emit it again with this version of symgen", file=model.NAME
+        )
+    emitted = cast(Any, model)
+    standard: tuple[str, ...] = tuple(emitted.STANDARD_PARAMETERS)
+    links = [*_links(emitted.LINKS, standard, model.VALUES)]
+    least = min([1.0, *(1e3 * float(link.size[0]) for link in links)])
+    return PhysicalModel(
+        standard=standard,
+        base=tuple(model.BASE_PARAMETERS),
+        K=np.asarray(
+            emitted.base_parameters(np.eye(len(standard)), **(constants or {})), dtype=float
+        ),
+        links=tuple(emitted.LINKS),
+        conditions=(*links, *_forms(elements, standard, least), *_signs(elements, standard, least)),
+        values=dict(model.VALUES),
+    )
+
+
+def pseudo_inertia(ten: Array) -> Array:
+    """P_j, shape (4, 4), of the ten parameters of a link in the order of INERTIAL, about the origin
+    of its frame.
+    """
+    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = ten
+    J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+    l = np.array([[MX, MY, MZ]])
+    return np.block([[np.trace(J) / 2 * np.eye(3) - J, l.T], [l, np.array([[M]])]])
+
+
+def _links(
+    links: Sequence[int], standard: Sequence[str], values: Mapping[str, float]
+) -> Iterator[Condition]:
+    B = np.array([pseudo_inertia(ten) for ten in np.eye(10)])
+    for j in links:
+        names = [f"{family}{j}" for family in INERTIAL]
+        diagonal = np.diag(pseudo_inertia(np.array([values.get(name, 0.0) for name in names])))
+        second, mass = float(diagonal[:3].sum()), float(diagonal[3])
+        size = np.array([second, second, second, mass]) if min(second, mass) > 0 else np.ones(4)
+        yield Condition(f"link {j}", tuple(standard.index(name) for name in names), B, size)
+
+
+def _forms(
+    elements: Mapping[str, Any], standard: Sequence[str], least: float
+) -> Iterator[Condition]:
+    """One condition per kind and per group of joints that forms of that kind couple."""
+    for kind in FORMED:
+        own = {
+            name: _form(acts)
+            for name, (k, when, acts) in elements.items()
+            if k == kind and when == "both"
+        }
+        for joints in _coupled(
+            [{i for pair in own[name] for i in pair} for name in own if is_form(elements[name][2])]
+        ):
+            place = {j: k for k, j in enumerate(sorted(joints))}
+            members = [name for name in own if {i for pair in own[name] for i in pair} <= joints]
+            B = np.zeros((len(members), len(place), len(place)))
+            for k, name in enumerate(members):
+                for (i, m), b in own[name].items():
+                    B[k, place[i], place[m]] = B[k, place[m], place[i]] = b
+            names = ", ".join(map(str, sorted(joints)))
+            numbers = tuple(standard.index(name) for name in members)
+            size = least if kind == "inertia" else 1.0
+            yield Condition(f"{kind} of joints {names}", numbers, B, np.full(len(place), size))
+
+
+def _signs(
+    elements: Mapping[str, Any], standard: Sequence[str], least: float
+) -> Iterator[Condition]:
+    """c >= 0 along each row; where friction of one direction is set on that of both, their sum in
+    either direction.
+    """
+    along: dict[tuple[Any, ...], dict[str, list[str]]] = {}
+    for name, (kind, when, acts) in elements.items():
+        if kind in SIGNED and not is_form(acts):
+            along.setdefault((kind, *sorted(acts.items())), {}).setdefault(when, []).append(name)
+    for row, own in along.items():
+        both, sided = own.get("both", []), [own.get(when, []) for when in ("positive", "negative")]
+        for names in [[*both, *one] for one in sided] if any(sided) else [[name] for name in both]:
+            if names:
+                yield Condition(
+                    " + ".join(names),
+                    tuple(standard.index(name) for name in names),
+                    np.ones((len(names), 1, 1)),
+                    np.array([least if row[0] == "inertia" else 1.0]),
+                )
+
+
+def is_form(acts: Mapping[Any, float]) -> bool:
+    """Whether an element of ELEMENTS is given as a form q'Bq (its keys are pairs of joints), not
+    along s = G q.
+    """
+    return any(isinstance(key, tuple) for key in acts)
+
+
+def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:
+    """The form q'Bq of an element as {(i, j): B_ij}, i <= j; along s = G q it is (G q)**2."""
+    if is_form(acts):
+        return dict(acts)
+    return {(i, j): a * b for i, a in acts.items() for j, b in acts.items() if i <= j}
+
+
+def _coupled(groups: Sequence[set[int]]) -> list[set[int]]:
+    """Sets that share a joint, united."""
+    united: list[set[int]] = []
+    for group in groups:
+        touching = [other for other in united if other & group]
+        united = [other for other in united if not other & group] + [group.union(*touching)]
+    return united

@@ -1,0 +1,72 @@
+"""The robot itself: how large it is, and estimates that no drive has. The conditions of bodies:
+`runtime.physical.inertia`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.limits import LIMIT
+from runtime.core.model import GeneratedModel, joint_units
+from runtime.physical.inertia import SIGNED, is_form
+
+Array = np.ndarray
+
+
+def frame_origins(model: GeneratedModel, q: Array) -> Array | None:
+    """Origins of all frames in frame 0, m, shape (K, frames, 3), in the positions q, shape (K, n);
+    None without poses, or where a loop does not close.
+    """
+    poses = getattr(model, "frame_poses", None)
+    try:
+        with np.errstate(all="ignore"):
+            return None if poses is None else np.asarray(poses(q))[:, :, :3, 3]
+    except ValueError:
+        return None
+
+
+def reach_of(model: GeneratedModel) -> float:
+    """Size of a robot, m: the largest distance between two of its frames in random poses, and once
+    more the longest link, whose end no frame marks.
+
+    Joints move within their limits, without them revolute joints turn anywhere. nan where frames
+    say little: a prismatic joint without limits, or fewer than two links with a length.
+    """
+    limits = dict(getattr(model, "LIMITS", None) or {}).get("q")
+    units = joint_units(model)
+    if limits is None and "m" in units:
+        return float("nan")
+    spans = (
+        np.array([(-np.pi, np.pi)] * len(units))
+        if limits is None
+        else np.array([(-x, x) if np.ndim(x) == 0 else x for x in limits], dtype=float)
+    )
+    rng = np.random.default_rng(0)
+    q = rng.uniform(spans[:, 0], spans[:, 1], (LIMIT.REACH_POSES, len(spans)))
+    origins = frame_origins(model, q)
+    if origins is None or origins.shape[1] < 2:
+        return float("nan")
+    links = np.linalg.norm(np.diff(origins, axis=1), axis=2)
+    spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
+    several = (links.max(axis=0) > 0.1 * links.max()).sum() > 1
+    return float(spread.max() + links.max()) if several else float("nan")
+
+
+def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
+    """Motor inertias and frictions of their own column that are negative by more than
+    LIMIT.CERTAIN_SIGN corrected deviations: no drive has them.
+    """
+    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
+    signed = {
+        name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)
+    }
+    sigma = np.fmax(fit.sigma, fit.sigma_corrected)
+    return tuple(
+        name
+        for i, name in enumerate(fit.names)
+        if name in signed and fit.X[i] < -LIMIT.CERTAIN_SIGN * sigma[i]
+    )

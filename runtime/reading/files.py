@@ -1,0 +1,111 @@
+"""Bytes of a measured file, plain or compressed by gzip, their hash, and how much a file may unpack to."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from stat import S_ISDIR, S_ISREG
+from typing import BinaryIO, cast
+
+from runtime.core.errors import InputError
+
+WHOLE = 2**31  # bytes of a file that is read into memory as it is
+ALWAYS = 2**28  # bytes, 256 MiB: what any file may unpack to
+RATIO = 20  # times its size: what a larger one may unpack to; measured records reach 2 to 10
+PART = 2**20  # bytes read at a time
+GZIP = b"\x1f\x8b"  # first bytes
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of that name; False for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def require_file(path: Path) -> int:
+    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as e:
+        raise InputError(
+            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+        ) from e
+    if not S_ISREG(status.st_mode):
+        what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
+        raise InputError(
+            f"cannot be read: {what}; expected a file, copy its content into one", file=str(path)
+        )
+    return status.st_size
+
+
+def require_size(unpacked: int, size: int, file: str) -> None:
+    """Raise InputError where a file of `size` bytes would hold `unpacked` ones, more than a measured record ever does."""
+    if unpacked > max(ALWAYS, RATIO * size):
+        raise InputError(
+            f"unpacks to {unpacked / 2**20:.0f} MiB or more from {size / 2**20:.3g} MiB; a record may be {ALWAYS // 2**20} MiB or {RATIO} times the size of its file: store it without compression if it is genuine",
+            file=file,
+        )
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """The uncompressed bytes of a file as a stream; an error while it is read names the file."""
+    require_file(path)
+    try:
+        with path.open("rb") as plain:
+            if plain.peek(len(GZIP))[: len(GZIP)] != GZIP:
+                yield plain
+                return
+            with gzip.GzipFile(fileobj=plain) as stream:
+                yield cast(BinaryIO, stream)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as e:
+        raise InputError(f"damaged gzip file ({e}); copy it again", file=str(path)) from e
+    except OSError as e:
+        raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
+
+
+def unpacked(path: Path) -> Path | BytesIO:
+    """What libraries are given that take a path or a file: the path, or the bytes where they were compressed."""
+    with opened(path) as stream:
+        packed = isinstance(stream, gzip.GzipFile)
+    return BytesIO(read_bytes(path)) if packed else path
+
+
+def read_bytes(path: Path) -> bytes:
+    """The uncompressed bytes of a file."""
+    if require_file(path) > WHOLE:
+        raise InputError(
+            f"more than {WHOLE // 2**30} GiB; cut it into shorter records", file=str(path)
+        )
+    return b"".join(_parts(path))
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of the uncompressed bytes of a file, 64 hexadecimal digits. A file that unpacks to more than a record holds is refused, part by part."""
+    digest = hashlib.sha256()
+    for part in _parts(path):
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def sha256(data: bytes) -> str:
+    """SHA-256 of bytes, 64 hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _parts(path: Path) -> Iterator[bytes]:
+    """The uncompressed bytes of a file, part by part."""
+    size = require_file(path)
+    total = 0
+    with opened(path) as stream:
+        while part := stream.read(PART):
+            total += len(part)
+            require_size(total, size, str(path))
+            yield part

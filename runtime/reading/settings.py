@@ -1,0 +1,362 @@
+"""Settings of measured records: where they lie, what their columns mean, what is done about their
+time stamps. Part of a Study.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field, replace
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from runtime.core.settings import (
+    Flag,
+    Many,
+    NotNegative,
+    PerJoint,
+    Positive,
+    Real,
+    Settings,
+    Text,
+    require,
+)
+from runtime.loop.settings import Controller
+from runtime.reading.units import COMMANDS, position_unit, time_unit, torque_unit
+
+
+def _one_by_one(names: Any) -> Any:
+    if isinstance(names, Mapping):
+        raise ValueError(
+            f"a table of {', '.join(map(str, names))}; expected a list, one column per joint in "
+            "the order of the robot file"
+        )
+    return names
+
+
+def _distinct(names: tuple[str, ...]) -> tuple[str, ...]:
+    double = next((name for name in names if names.count(name) > 1 and name != NONE), None)
+    if double is not None:
+        raise ValueError(f"{double!r} twice; expected one column per joint")
+    return names
+
+
+def _known(read: Callable[[str], Any]) -> AfterValidator:
+    def check(unit: str) -> str:
+        read(unit)
+        return unit
+
+    return AfterValidator(check)
+
+
+NONE = "0"  # in place of a column: no such torque on this joint
+Names = Annotated[Many[Text], BeforeValidator(_one_by_one), AfterValidator(_distinct)]
+TimeUnit = Annotated[Text, _known(time_unit)]
+PositionUnit = Annotated[Text, _known(position_unit)]
+TorqueUnit = Annotated[Text, _known(torque_unit)]
+Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
+
+
+QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "q_link", "tau_ff", "tau_known", "law_v")
+WRENCH = "wrench"  # beginning of the channels that are wrenches, before the number of the frame
+BY_NAME = ("names",)  # columns found by the names of the joints
+
+
+class Columns(Settings):
+    """Names of the columns of a record file, one per joint.
+
+    A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
+    a .npz or .mat file, which stands
+    for its n columns. `names` stands for the labels of the joints in the robot file: a column is
+    called as the joint, or q_ and the joint,
+    joint.position, tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
+
+    Attributes
+    ----------
+    t : str or None
+        Time; null for a record without time column.
+    q : tuple of str
+        Positions.
+    tau : tuple of str
+        Torques.
+    q_ref : tuple of str
+        Reference positions, where the file of the positions holds them; unit and side are those of
+        q.
+    qr : tuple of str
+        Earlier name of q_ref.
+    qd : tuple of str
+        Velocities that were recorded beside the positions, in the same file; unit and side of q,
+        per s. They give the velocity of the rows where they say more than differences of q do.
+    qd_ref : tuple of str
+        Reference velocities, in the same file, units as qd; for the law of a controller.
+    q_link : tuple of str
+        Positions by encoders behind the gears, in the same file, joint side, unit of q; 0 in place
+        of a name: none on this joint.
+    tau_ff : tuple of str
+        Feed-forward torques that the controller added, in the file of the torques; unit and side
+        are those of tau. For methods that simulate it, and for the torque of a law.
+    tau_known : tuple of str
+        Torques of the drives that do not come from the model (a counterbalance, a cable), computed
+        elsewhere; N m or N, joint side. They are
+        subtracted from tau. 0 in place of a name: none on this joint.
+    channels : mapping of str to str
+        Column of each channel.NAME of the laws of the robot file, in the file of the positions, as
+        it is: {temperature: T_motor}.
+    wrench : mapping of int to six str
+        Three forces and three moments of a sensor in the axes of a frame, about its origin, by the
+        number of the frame, in the file of the positions, N and N m: {0: [fx, fy, fz, mx, my, mz]}
+        below the robot, {7: [...]} ahead of link 7. Beside tau, or in its place.
+    """
+
+    t: Text | None = None
+    q: Names = ()
+    tau: Names = ()
+    q_ref: Names = ()
+    qr: Names = ()
+    qd: Names = ()
+    qd_ref: Names = ()
+    q_link: Names = ()
+    tau_ff: Names = ()
+    tau_known: Names = ()
+    channels: Mapping[Text, Text] = field(default_factory=dict)
+    wrench: Mapping[Annotated[int, Field(ge=0)], Names] = field(default_factory=dict)
+
+    @property
+    def further(self) -> dict[str, tuple[str, ...]]:
+        """Columns that are no joint's, by channel."""
+        own = {name: (column,) for name, column in self.channels.items()}
+        return own | {f"{WRENCH}{frame}": names for frame, names in self.wrench.items()}
+
+    def __post_init__(self) -> None:
+        require(
+            not {*self.channels} & {*QUANTITIES}, "channels are called as constants are", "channels"
+        )
+        require(
+            not (self.qr and self.q_ref), "given beside q_ref; it is the same, leave it out", "qr"
+        )
+        object.__setattr__(self, "q_ref", self.q_ref or self.qr)
+        object.__setattr__(self, "qr", ())
+
+
+class Units(Settings):
+    """Units of the columns: one, or one per joint, by any name that `runtime.reading.units` knows.
+
+    Counts need the counts per revolution; units of current and voltage are turned into torque by
+    the torque constant.
+
+    Attributes
+    ----------
+    t : str
+        Of the time: s, ms, us, ns.
+    q : str or tuple of str
+        Of the positions: rad, deg, rev, counts, m, mm.
+    tau : str or tuple of str
+        Of the torques: N*m, mN*m, N, A, mA, V.
+    """
+
+    t: TimeUnit = "s"
+    q: PositionUnit | Many[PositionUnit] = "rad"
+    tau: TorqueUnit | Many[TorqueUnit] = "N*m"
+
+
+class Scale(Settings):
+    """Factors on the columns before their unit applies: a number, one per joint, or the name of a
+    scalar in the file.
+
+    Attributes
+    ----------
+    q : float or tuple of float or str
+        On the positions.
+    tau : float or tuple of float or str
+        On the torques; gtau where the file holds force = gtau*vir.
+    wrench : float
+        On wrenches, which are those by which the sensor moves the links ahead of it: -1 where it
+        reports what they do to it.
+    """
+
+    q: Factor = 1.0
+    tau: Factor = 1.0
+    wrench: Real = 1.0
+
+
+class Resample(Settings):
+    """Time stamps that are not uniform, made so; nothing is resampled unless this section is given.
+
+    Attributes
+    ----------
+    rate : float or None, Hz
+        Sampling rate made; default: record.rate, else the mean rate of the record.
+    method : str
+        cubic or linear interpolate between the stamps; count takes the samples as they are, for a
+        logger whose stamps jitter while the
+        controller samples uniformly.
+    gaps : str
+        refuse a record with gaps or with time that goes back, or split it at these places into
+        records of their own.
+    longest : float, sampling periods
+        Steps up to this length are bridged, longer ones are gaps.
+    shortest : float, s
+        Pieces shorter than this are left out.
+    """
+
+    rate: Positive | None = None
+    method: Literal["cubic", "linear", "count"] = "cubic"
+    gaps: Literal["refuse", "split"] = "refuse"
+    longest: Annotated[Real, Field(gt=1)] = 3.0
+    shortest: NotNegative = 0.5
+
+
+class RecordSettings(Settings):
+    """One measured record, or several alike: where they lie and what their columns mean.
+
+    Attributes
+    ----------
+    files : tuple of str
+        One file with all columns, or two: positions (and time), then torques; then, where it is
+        apart, the file of the known torques. Relative to
+        the study file, or files of `dataset`.
+    columns : Columns
+        Names of the columns.
+    side : str
+        motor (qm = R (q - offset), tau = R' u, by the drives of the robot), joint, or link: joint
+        torques of sensors behind the gears, in which the drive has no part: inertia, viscous and
+        dry friction of drives (Ia, FV, FS) are left out of the columns, and a base parameter that
+        holds Ia holds none.
+    torque_side : str or None
+        The same for tau alone: motor for joint angles recorded with motor currents. Default: side.
+    rate : float or None, Hz
+        Sampling rate; may be left out where a time column gives it.
+    units : Units
+        Units of the columns.
+    scale : Scale
+        Factors on the columns.
+    counts_per_revolution : float or tuple of float or None
+        Counts in one turn of the encoder, on the side of q; needed where the unit of q is counts.
+    torque_constant : float or tuple of float or None, N*m/A or N*m/V
+        For tau in A, mA, V; default: that of the robot's drives. On the side of tau: of the motor,
+        or with the gear in it for the joint.
+    coupling : str
+        Use the off-diagonal part of R for both, for position or torque alone, or for none.
+    jitter : float, sampling periods
+        Largest deviation of the time column from a uniform grid.
+    dataset : str or None
+        Public dataset that holds the files.
+    name : str or None
+        Name of the record in results; default: that of its first file.
+    simulated : bool
+        Nothing was measured, and results say so.
+    topic : str or None
+        Topic of a bag that holds several of sensor_msgs/JointState.
+    decimal : str
+        Decimal sign of a text file, "." or "," (columns then separated by semicolons, tabs or
+        blanks).
+    resample : Resample or None
+        How a time column that is not uniform is made so; null: it is refused.
+    controller : Controller or None
+        Whose law is the torque, where q_ref is named and tau is not; default: that of the study.
+    also : tuple of tuple of str
+        Files of further records with the same settings, each a record of its own: [b.csv, c.csv],
+        or pairs of files.
+    """
+
+    files: Many[Text] = ()
+    columns: Columns = field(default_factory=Columns)
+    side: Literal["motor", "joint", "link"] = "joint"
+    torque_side: Literal["motor", "joint", "link"] | None = None
+    rate: Positive | None = None
+    units: Units = field(default_factory=Units)
+    scale: Scale = field(default_factory=Scale)
+    counts_per_revolution: PerJoint[Real] | None = None
+    torque_constant: PerJoint[Real] | None = None
+    coupling: Literal["both", "position", "torque", "none"] = "both"
+    jitter: Annotated[Positive, Field(lt=0.5)] = 0.1
+    dataset: Text | None = None
+    name: Text | None = None
+    simulated: Flag = False
+    topic: Text | None = None
+    decimal: Literal[".", ","] = "."
+    resample: Resample | None = None
+    controller: Controller | None = None
+    also: Many[Many[Text]] = ()
+
+    def __post_init__(self) -> None:
+        no_law = self.controller is not None and not self.by_law
+        require(not no_law, "given, but no law is needed: name q_ref, and no tau", "controller")
+        most = 3 if self.columns.tau_known else 2
+        message = f"{len(self.files)} files; expected one, or two (positions, then torques)"
+        require(
+            len(self.files) <= most,
+            message + (", and one of known torques" if most > 2 else ""),
+            "files",
+        )
+        for i, files in enumerate(self.also):
+            message = (
+                f"{len(files)} files; expected {len(self.files)}, as in files: {list(self.files)}"
+            )
+            require(len(files) == len(self.files), message, "also", i)
+        counts = any(position_unit(unit)[0] == "counts" for unit in _each(self.units.q))
+        commands = any(torque_unit(unit)[0] in COMMANDS for unit in _each(self.units.tau))
+        require(
+            self.counts_per_revolution is not None or not counts,
+            "missing; positions in counts need it",
+            "counts_per_revolution",
+        )
+        for key, used, unit, units in (
+            ("counts_per_revolution", counts, "q", "counts"),
+            ("torque_constant", commands, "tau", "mA, A or V"),
+        ):
+            message = (
+                f"given, but units.{unit} is {', '.join(_each(getattr(self.units, unit)))}; "
+                f"say {units} there, or leave this out"
+            )
+            require(getattr(self, key) is None or used, message, key)
+
+    @property
+    def by_law(self) -> bool:
+        """Whether the torque is that of a controller's law."""
+        return bool(self.columns.q_ref) and not self.columns.tau
+
+    @property
+    def sides(self) -> tuple[str, str]:
+        """Sides of the positions and of the torques: motor, joint or link."""
+        return self.side, self.torque_side or self.side
+
+
+def behind_gears(records: Sequence[RecordSettings]) -> bool:
+    """Whether the torques are those of sensors behind the gears; SettingsError where those of one
+    record are and those of another are not.
+    """
+    sides = {record.sides[1] == "link" for record in records}
+    message = "link in one record and not in another; fit them in studies of their own"
+    require(len(sides) < 2, message, "record", 0, "torque_side")
+    return True in sides
+
+
+def with_law(
+    records: Sequence[RecordSettings], controller: Controller | None
+) -> tuple[RecordSettings, ...]:
+    """The records, that controller where a law is the torque and none is named."""
+    return tuple(
+        replace(record, controller=record.controller or controller) if record.by_law else record
+        for record in records
+    )
+
+
+def each_record(settings: Sequence[RecordSettings]) -> tuple[RecordSettings, ...]:
+    """One RecordSettings per record: the files of `also` in entries of their own, without name."""
+    return tuple(
+        single
+        for record in settings
+        for single in (
+            replace(record, also=()),
+            *(replace(record, files=files, also=(), name=None) for files in record.also),
+        )
+    )
+
+
+Records = Annotated[Many[RecordSettings], AfterValidator(each_record)]
+"""Settings of one record or of several, one entry each."""
+
+
+def _each(units: str | tuple[str, ...]) -> tuple[str, ...]:
+    return units if isinstance(units, tuple) else (units,)

@@ -1,1 +1,0 @@
-"""From measured files to a `Record`: joint side, SI, uniform time."""

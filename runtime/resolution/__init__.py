@@ -1,1 +1,0 @@
-"""Encoder resolution: CESTAC (chapter, section 3) and the advisor."""

@@ -1,3 +1,0 @@
-"""A study file as checked values: what an experiment is, apart from the robot and the measured
-numbers.
-"""

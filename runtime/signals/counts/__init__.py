@@ -1,1 +1,0 @@
-"""Positions read as counts of encoders: lattice, spline, sites, lines, reading."""

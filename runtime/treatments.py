@@ -1,0 +1,274 @@
+"""Which of several treatments of the same records predicts best? One call for "with all rows or
+without rest, with the counterbalance known or not".
+
+Every candidate is identified on its own terms; of its sets of parameters
+(`runtime.core.parameter_sets`) the one that predicts the validation records best stands
+for it, the essential one too. All of them are then judged on the
+same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out
+what it cannot explain,
+
+    e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||
+            residual of candidate c on the validation records treated as by candidate k, of the
+            measured torque
+
+known torques included in what is measured, so that those who know them have no advantage by the
+norm. Order: the geometric mean over k. A candidate whose
+estimator did not end well comes after all others. The winner of many candidates is chosen by the
+validation records, which are then no unseen data for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from runtime.core.errors import InputError
+from runtime.core.estimation import estimated
+from runtime.core.identify import identify
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.model import GeneratedModel
+from runtime.core.parameter_sets import ORDER, SetName, best_set
+from runtime.core.problem import Problem, Step, prepared
+from runtime.core.progress import at
+from runtime.core.record import Record
+from runtime.core.result import Identification
+from runtime.core.rows.prepared import stacked
+from runtime.core.table import Table
+from runtime.plausible.motion import low_speed_of_rest
+from runtime.plausible.plausibility import plausibility
+from runtime.plausible.samples import samples_of
+
+STATED = "as stated"
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Treatments in the order in which they predict.
+
+    Attributes
+    ----------
+    results : mapping of str to Identification
+        By name of the candidate, the best first.
+    errors : mapping of str to mapping of str to float, %
+        e_ck, by candidate, then by the treatment that it is judged in.
+    standing : mapping of str to (str, Estimate)
+        The set of parameters that stands for each candidate, and its name.
+    missing : tuple of str
+        Candidates that could not be identified, each with its reason.
+    """
+
+    results: Mapping[str, Identification]
+    errors: Mapping[str, Mapping[str, float]]
+    standing: Mapping[str, tuple[SetName, Estimate]]
+    missing: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Identification:
+        """The identification that predicts best."""
+        return next(iter(self.results.values()))
+
+    @property
+    def mean_errors(self) -> dict[str, float]:
+        """Geometric mean of e_ck over k, %, by candidate."""
+        return {
+            name: float(np.exp(np.mean(np.log(list(own.values())))))
+            for name, own in self.errors.items()
+        }
+
+    @property
+    def verdict(self) -> str:
+        """The order, in one sentence."""
+        first, *others = [
+            f"{name} ({columns_text(*self.standing[name])}) {error:.1f} %"
+            for name, error in self.mean_errors.items()
+        ]
+        then = f"; then {', '.join(others)}" if others else ""
+        return f"Predicts {self.best.unseen} best: {first}{then} of the measured torques."
+
+    def table(self) -> Table:
+        """One line by candidate."""
+        header = (
+            "treatment",
+            "parameters",
+            "fit %",
+            "unseen, rows of all treatments %",
+            *(f"unseen, {name} %" for name in ORDER),
+            "use",
+        )
+        rows = [
+            (
+                name,
+                columns_text(*self.standing[name]),
+                f"{self.standing[name][1].relative_error:.2f}",
+                f"{self.mean_errors[name]:.2f}",
+                *(
+                    f"{result.set_errors[own]:.2f}" if own in result.set_errors else "-"
+                    for own in ORDER
+                ),
+                result.checklist.answer if result.usable else result.estimate.status,
+            )
+            for name, result in self.results.items()
+        ]
+        return Table(
+            "Treatments of the records, the best first",
+            header,
+            rows,
+            note="Unseen by set of parameters: on the treatment's own rows.",
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """For JSON."""
+        treatments = [
+            {
+                "name": name,
+                "status": result.estimate.status,
+                "columns": self.standing[name][0],
+                "count": len(self.standing[name][1].names),
+                "fit": self.standing[name][1].relative_error,
+                "unseen": self.mean_errors[name],
+                "unseen_by_rows": self.errors[name],
+                "unseen_by_set": result.set_errors,
+                "state": result.checklist.state,
+            }
+            for name, result in self.results.items()
+        ]
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "treatments": treatments,
+            "missing": self.missing,
+        }
+
+    def __str__(self) -> str:
+        return "\n\n".join([self.table().to_text(), *self.missing, self.verdict])
+
+
+def compare(
+    problems: Mapping[str, Problem],
+    *,
+    loaded: Mapping[str, Sequence[Record]] | None = None,
+    variants: GeneratedModel | None = None,
+) -> Ranking:
+    """Identify with each of several treatments, and order them by what they predict.
+
+    Parameters
+    ----------
+    problems : mapping of str to Problem
+        Prepared, by name of the treatment; their unseen records are the same instants.
+    loaded : mapping of str to sequence of Record, optional
+        Records with the load of settings.payload, by treatment.
+    variants : GeneratedModel, optional
+        The module of `symgen.variants`: the plausibility of the best treatment is then judged.
+
+    Raises
+    ------
+    InputError
+        A treatment without validation records, or with others than the first; none that can be identified.
+    """
+    first = next(iter(problems.values())).unseen
+    for name, problem in problems.items():
+        _require_alike(name, problem.unseen, first)
+    results: dict[str, Identification] = {}
+    missing: list[str] = []
+    for name, problem in problems.items():
+        at(f"treatment {name}")
+        try:
+            results[name] = identify(problem, loaded=(loaded or {}).get(name, ()))
+        except InputError as e:
+            missing.append(f"{name}: {e}")
+    if not results:
+        raise InputError(
+            f"no treatment can be identified; {missing[0]}"
+            if missing
+            else "no treatment; expected one or more to compare"
+        )
+    standing = {name: standing_set(result) for name, result in results.items()}
+    errors = {
+        name: {other: _error(problems[name], fit, problems[other]) for other in results}
+        for name, (_, fit) in standing.items()
+    }
+    means = Ranking(results, errors, standing).mean_errors
+    order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
+    if variants is not None:
+        best = results[order[0]]
+        found = plausibility(best.problem, variants=variants)
+        results[order[0]] = replace(best, plausibility=found)
+    return Ranking(
+        {name: results[name] for name in order},
+        {name: errors[name] for name in order},
+        standing,
+        tuple(missing),
+    )
+
+
+def treatments(problem: Problem, steps: Sequence[Step]) -> dict[str, Problem]:
+    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps."""
+    stated = prepared(problem, steps)
+    found = {STATED: stated}
+    low = low_speed_of_rest(samples_of(stated.prepared, stated.settings), stated.settings)
+    if low is not None:
+        settings = problem.settings
+        settings = replace(settings, rows=replace(settings.rows, low_speed=low))
+        problem = problem.changed(settings=settings)
+        found["without rest"] = prepared(problem, steps)
+    if any(record.tau_known is not None for record in (*problem.records, *problem.unseen)):
+        unknown = problem.changed(
+            records=tuple(replace(record, tau_known=None) for record in problem.records),
+            unseen=tuple(replace(record, tau_known=None) for record in problem.unseen),
+        )
+        found["known torques left out"] = prepared(unknown, steps)
+    return found
+
+
+def standing_set(result: Identification) -> tuple[SetName, Estimate]:
+    """The set of parameters that predicts data it has not seen best (`best_set`, the essential one
+    among them), and its name.
+    """
+    name = best_set(result.set_errors, essential=True) if result.set_errors else "all"
+    fit = result.sets.get(name, result.estimate)
+    if name == "essential" and not result.sets:  # of a method that is not linear
+        own = replace(result.study.estimate, columns=result.essential.names)
+        fit = estimated(result.problem, result.observation, own)
+    return name, fit
+
+
+def columns_text(name: SetName, fit: Estimate) -> str:
+    """A set of parameters, and their number."""
+    return f"{name} parameters, {len(fit.names)}"
+
+
+def _require_alike(name: str, further: Sequence[Record], first: Sequence[Record]) -> None:
+    if not further:
+        raise InputError(
+            f"{name} has no validation record, by which treatments are compared; set "
+            "validate.record"
+        )
+    for record in further:
+        if not record.tau.any():
+            raise InputError(
+                (
+                    "the torques are zero throughout; expected measured ones, which a validation "
+                    "record compares with"
+                ),
+                file=record.file,
+            )
+    if [len(record) for record in further] != [len(record) for record in first]:
+        raise InputError(
+            f"{name} is validated by {', '.join(r.file for r in further)}, the first by "
+            f"{', '.join(r.file for r in first)}; expected the same"
+        )
+
+
+def _error(problem: Problem, fit: Estimate, treatment: Problem) -> float:
+    """Residual of an estimate on its validation records as another problem treats them, % of the measured torque."""
+    rows, signals = treatment.settings.rows, treatment.settings.signals
+    settings = replace(problem.settings, rows=rows, signals=signals)
+    treated = problem.changed(settings=settings, reader=treatment.reader)
+    whole = tuple(replace(record, tau_known=None) for record in problem.unseen)
+    residual, _ = stacked(problem.model, treated.prepared_unseen).norms(fit.names, fit.X)
+    measured = treated.changed(unseen=whole).prepared_unseen
+    _, total = stacked(problem.model, measured).norms((), np.zeros(0))
+    return 100 * float(np.linalg.norm(residual) / np.linalg.norm(total))

@@ -1,0 +1,128 @@
+"""YAML 1.2 to plain values with the line of every key, within limits.
+
+Only what settings need is read: mappings, lists and scalars of the core schema. Anchors, aliases, tags, merge keys, repeated keys and second documents are refused, so that a file means what it shows and no text grows in memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from io import StringIO
+from typing import Any
+
+from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
+from ruamel.yaml.error import MarkedYAMLError
+
+from runtime.core.errors import InputError, SettingsError, first_line
+from runtime.core.limits import LIMIT
+
+Path = tuple[str | int, ...]
+
+NUMBER = re.compile(
+    r"(?P<whole>[-+]?[0-9]{1,40})|[-+]?(\.[0-9]{1,400}|[0-9]{1,400}(\.[0-9]{0,400})?)([eE][-+]?[0-9]{1,3})?"
+)
+CONSTANTS: dict[str, bool | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+
+
+def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
+    """Built-in dict (keys as texts), list, str, int, float, bool and None, and the line, from 1, of every key path; SettingsError with file and line."""
+    if len(text) > LIMIT.YAML_CHARACTERS:
+        raise InputError(
+            f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
+        )
+    lines: dict[Path, int] = {}
+    try:
+        _require_plain(text, file)
+        node = YAML(typ="safe", pure=True).compose(text)
+        return (None if node is None else _value(node, (), lines, file)), lines
+    except InputError:
+        raise
+    except MarkedYAMLError as e:
+        mark = e.problem_mark or e.context_mark
+        raise SettingsError(
+            f"not YAML: {e.problem or e.context}",
+            file=file,
+            line=None if mark is None else mark.line + 1,
+        ) from None
+    except Exception as e:  # the scanner raises IndexError, AttributeError and others too
+        raise SettingsError(f"not YAML: {first_line(e)}", file=file) from None
+
+
+def yaml_text(mapping: Mapping[str, Any]) -> str:
+    """A mapping of plain values as YAML, keys in their order, lists of numbers on one line."""
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.width = 140
+    stream = StringIO()
+    yaml.dump(mapping, stream)
+    return stream.getvalue()
+
+
+def _require_plain(text: str, file: str) -> None:
+    """Raise SettingsError at the first thing that is not plain, too deep or too much, before anything is built of the text."""
+    depth = 0
+    documents = 0
+    for count, event in enumerate(YAML(typ="safe", pure=True).parse(text)):
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        documents += kind == "DocumentStartEvent"
+        refused = ""
+        if kind == "AliasEvent" or getattr(event, "anchor", None) is not None:
+            refused = "anchors and aliases (& and *) are not read; write the value out"
+        elif getattr(event, "tag", None) not in (None, "!"):
+            refused = "tags (!) are not read; write a plain value"
+        elif documents > 1:
+            refused = "a second document starts here; such a file holds one"
+        elif depth > LIMIT.YAML_LEVELS + 2 or count > LIMIT.YAML_VALUES:
+            refused = f"nested deeper than {LIMIT.YAML_LEVELS} levels or more than {LIMIT.YAML_VALUES} keys and values"
+        if refused:
+            raise SettingsError(refused, file=file, line=event.start_mark.line + 1)
+
+
+def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
+    """The plain value of a node; its line, and those of all in it, are put among the `lines`."""
+    lines.setdefault(path, node.start_mark.line + 1)
+    if isinstance(node, ScalarNode):
+        return node.value if node.style is not None else _scalar(node.value)
+    if not isinstance(node, MappingNode):
+        return [_value(item, (*path, k), lines, file) for k, item in enumerate(node.value)]
+    table: dict[str, Any] = {}
+    for key, item in node.value:
+        line = key.start_mark.line + 1
+        if not isinstance(key, ScalarNode) or key.value == "<<":
+            raise SettingsError(
+                "a key that is no name; merge keys (<<) and lists as keys are not read",
+                path=path,
+                file=file,
+                line=line,
+            )
+        name = str(key.value)
+        place = (*path, name)
+        if name in table:
+            raise SettingsError(
+                f"key {name!r:.60} is given twice (first on line {lines[place]}); keep one",
+                path=path,
+                file=file,
+                line=line,
+            )
+        lines[place] = line
+        table[name] = _value(item, place, lines, file)
+    return table
+
+
+def _scalar(text: str) -> Any:
+    """null, bool, int and float of the core schema; any other word is a text."""
+    if text in CONSTANTS:
+        return CONSTANTS[text]
+    number = NUMBER.fullmatch(text)
+    if number is None:
+        return text
+    if number["whole"]:
+        return int(text)
+    value = float(text)
+    return value if value - value == 0 else text
