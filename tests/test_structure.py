@@ -109,17 +109,12 @@ ONLY_IN = {  # library: files and folders that may import it
     "rich": ("symgen/cli/",),
     "pydantic": (
         "symgen/description/",
-<<<<<<< /tmp/ts.py
         "runtime/core/",
         "runtime/estimate_files.py",
         "runtime/json_files.py",
         "runtime/reading/settings.py",
         "runtime/loop/settings.py",
         "runtime/excitation/",
-=======
-        "runtime/settings/",
-        "runtime/estimate_files.py",
->>>>>>> /tmp/ts_now.py
     ),
     "ruamel": ("symgen/description/", "symgen/cli/", "runtime/yaml_text.py"),
     "sympy": ("symgen/regroup/formula.py", "symgen/symbols/"),
