@@ -113,7 +113,7 @@ def read_robot(
         with located(path.name):
             content = with_includes(content, _beside(path))
     if suffix in TREES:
-        from symgen.description.tree_parts import TreePart  # numpy, which robot files do without
+        from symgen.description.tree import TreePart  # numpy, which robot files do without
         from symgen.description.tree_robot import read_tree
 
         part = TreePart(lock or {}, chain)

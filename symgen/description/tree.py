@@ -1,20 +1,26 @@
 """A tree of links and joints with any axes, as URDF and MJCF tell it: what both are read into, and
-what becomes a table of Khalil frames.
+what becomes a table of Khalil frames; and part of one: joints held at positions, of a chain from
+`base` to `tip` all but those between these two links, at zero.
+
+A joint that is held is a fixed joint with the pose of that position; what follows it stands where
+its relation says. The inertia of a link that no longer moves belongs to the body that holds it, as
+with any fixed joint.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from symgen.description.angles import Angles
 from symgen.description.expression import Expression
+from symgen.errors import DescriptionError
 
 Array = np.ndarray
-MAX_JOINTS = 200
+MAX_JOINTS, SHOWN = 200, 20  # of a file; names in a message
 DROPPED = "not read:"  # how the note on elements that are left out starts
 EARTH = 9.81  # m/s^2, along -z of the root link
 MOVING, FIXED_TYPE, FREE_TYPE = ("revolute", "continuous", "prismatic"), "fixed", "free"
@@ -151,3 +157,130 @@ def transform(row: Sequence[float]) -> Array:
         step[:3, :3], step[axis, 3] = turn(axis, angle), shift
         T = T @ step
     return T
+
+
+# --- part of a tree ---
+
+
+@dataclass(frozen=True)
+class TreePart:
+    """What of a tree is kept.
+
+    Attributes
+    ----------
+    lock : mapping, rad or m
+        Positions at which joints are held, by name.
+    chain : tuple of str or None
+        Base and tip, names of links.
+    """
+
+    lock: Mapping[str, float] = field(default_factory=dict)
+    chain: tuple[str, str] | None = None
+
+
+WHOLE_TREE = TreePart()
+
+
+def part_of(tree: Tree, part: TreePart) -> Tree:
+    """The tree with the joints of `part.lock` held, and those beside `part.chain`; notes tell which.
+
+    Raises
+    ------
+    DescriptionError
+        No such joint or link, a joint that does not move or follows another, a tip that does not
+        hang on the base by a joint that moves.
+    """
+    for name in part.lock:
+        _require_independent(tree, name)
+    notes = list(tree.notes)
+    if part.lock:
+        notes.append(f"held: {_names([f'{name} at {x:.6g}' for name, x in part.lock.items()])}")
+        tree = _held(tree, part.lock)
+    if part.chain:
+        base, tip = part.chain
+        others = _beside(tree, base, tip)
+        tree = _held(tree, others)
+        moving = [joint.name for joint in tree.joints if joint.kind != FIXED_TYPE]
+        notes.append(f"chain from {base!a:.60} to {tip!a:.60}: {_names(moving)} move")
+        notes += [f"held at zero: {_names(others)}"] if others else []
+    return replace(tree, notes=tuple(notes))
+
+
+def _beside(tree: Tree, base: str, tip: str) -> dict[str, float]:
+    """Positions of the moving joints that are not between two links: zero, of one that follows that
+    where its leaders are at zero.
+    """
+    for link in (base, tip):
+        if link not in tree.links:
+            raise DescriptionError(
+                f"no link {link!a:.60} for the chain; the file has {_names(list(tree.links))}"
+            )
+    holding = {joint.child: joint for joint in tree.joints}
+    between: list[Joint] = []
+    link = tip
+    while link != base and link in holding:
+        between.append(holding[link])
+        link = holding[link].parent
+    if link != base or all(joint.kind == FIXED_TYPE for joint in between):
+        raise DescriptionError(
+            f"link {tip!a:.60} does not hang on {base!a:.60} by a joint that moves; a chain goes "
+            "from base to tip, outward"
+        )
+    kept = {joint.name for joint in between}
+    others = [j.name for j in tree.joints if j.kind != FIXED_TYPE and j.name not in kept]
+    at_zero = {name: e.terms.get((), 0.0) for name, e in tree.relations.items()}
+    return {name: float(at_zero.get(name, 0.0)) for name in others}
+
+
+def _require_independent(tree: Tree, name: str) -> None:
+    kinds = {joint.name: joint.kind for joint in tree.joints}
+    if kinds.get(name, FIXED_TYPE) == FIXED_TYPE:
+        moving = [joint for joint, kind in kinds.items() if kind != FIXED_TYPE]
+        raise DescriptionError(
+            f"joint {name!a:.60} to lock: no moving joint of that name; the file has "
+            f"{_names(moving)}"
+        )
+    if name in tree.relations:
+        leaders = [leader for leader in kinds if leader in tree.relations[name].atoms]
+        raise DescriptionError(f"joint {name!a:.60} to lock follows others; lock {_names(leaders)}")
+
+
+def _held(tree: Tree, positions: Mapping[str, float]) -> Tree:
+    """The tree with joints held at `positions`, and with them the joints that follow no other."""
+    exact = {name: Expression.number(repr(x)) for name, x in positions.items()}
+    relations = {
+        name: e.substitute(exact) for name, e in tree.relations.items() if name not in positions
+    }
+    fixed = {**positions, **{name: float(e) for name, e in relations.items() if not e.atoms}}
+    joints = tuple(
+        replace(j, kind=FIXED_TYPE, pose=j.pose @ _motion(j, fixed[j.name]), limits={})
+        if j.name in fixed
+        else j
+        for j in tree.joints
+    )
+    following = {name: e for name, e in relations.items() if e.atoms}
+    return replace(tree, joints=joints, relations=following)
+
+
+def _motion(joint: Joint, q: float) -> Array:
+    """(4, 4) of a joint at position q: along its axis, or about it, R = 1 + sin q [a] + (1 - cos q)
+    [a]^2.
+    """
+    T = np.eye(4)
+    if joint.kind == FREE_TYPE and q:
+        raise DescriptionError(
+            f"free joint {joint.name!a:.60} is held where the file has it, at 0", line=joint.line
+        )
+    if joint.kind == "prismatic":
+        T[:3, 3] = q * joint.axis
+        return T
+    c, s = turn(2, q)[:2, 0]  # exact at quarter turns
+    x, y, z = joint.axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    T[:3, :3] += s * cross + (1 - c) * cross @ cross
+    return T
+
+
+def _names(names: Collection[str]) -> str:
+    shown = ", ".join(ascii(name)[1:-1][:60] for name in list(names)[:SHOWN])
+    return shown + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")

@@ -23,9 +23,17 @@ from symgen.description.fields import located
 from symgen.description.mjcf import parse_mjcf
 from symgen.description.naming import is_label
 from symgen.description.robot import FIXED, INERTIAL, Element, Frame, Robot, parameter
-from symgen.description.tree import FREE_TYPE, Array, Inertial, Joint, Tree
+from symgen.description.tree import (
+    FREE_TYPE,
+    WHOLE_TREE,
+    Array,
+    Inertial,
+    Joint,
+    Tree,
+    TreePart,
+    part_of,
+)
 from symgen.description.tree_frames import Body, Table, placed
-from symgen.description.tree_parts import WHOLE_TREE, TreePart, part_of
 from symgen.description.urdf import parse_urdf
 from symgen.errors import DescriptionError
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from symgen.derive.graph import SYM, Node, Scalar
 from symgen.derive.model import Entry
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
 from symgen.emit.spec import STATES, Function, ModuleSpec
 

@@ -13,7 +13,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from symgen.derive.graph import CONST, COS, OPAQUE, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto

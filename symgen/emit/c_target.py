@@ -14,7 +14,7 @@ from typing import Any
 
 from symgen.derive.graph import Scalar
 from symgen.derive.model import Model
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.emit.blocks import label
 from symgen.emit.c_printer import CText, is_word
 from symgen.emit.header import header, line_of, packed, plain

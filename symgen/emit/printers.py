@@ -35,7 +35,7 @@ from symgen.derive.graph import (
     reachable,
 )
 from symgen.description.expression import Expression, decimal
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 
 SAYABLE = 3  # factors of a name that is made of them
 

@@ -14,7 +14,7 @@ from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, r
 from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.models import MODELS
 from symgen.derive.rewrite import Rewrite
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.description.robot import Robot
 from symgen.regroup.regrouping import Regrouping, regroup
 

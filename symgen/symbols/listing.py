@@ -13,7 +13,7 @@ from typing import Any
 
 from symgen.derive.graph import SYM, Domain, Scalar, interpret
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.emit.printers import PLAIN, Text
 
 

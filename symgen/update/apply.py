@@ -26,8 +26,7 @@ from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.modules import model as emitted
 from symgen.description.files import content_of, read_robot
 from symgen.description.robot import Robot, one_joint_parameters, parameter
-from symgen.description.tree import Array
-from symgen.description.tree_parts import TreePart
+from symgen.description.tree import Array, TreePart
 from symgen.errors import DescriptionError
 from symgen.update.applied import Applied
 from symgen.update.nearest import NONE, nearest, strange

@@ -26,9 +26,8 @@ from symgen.description.fields import located
 from symgen.description.files import TREES
 from symgen.description.mjcf_model import DEEPEST, ORIENTATION
 from symgen.description.robot import FIXED, Robot
-from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree
+from symgen.description.tree import FIXED_TYPE, Array, Inertial, Joint, Tree, TreePart, part_of
 from symgen.description.tree_frames import Table, placed
-from symgen.description.tree_parts import TreePart, part_of
 from symgen.description.tree_robot import (
     JOINT_TERMS,
     inertial_of,

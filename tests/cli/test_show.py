@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import symgen
 from symgen.cli.main import app
 from symgen.description import load_robot, packaged_robots, parse
-from symgen.description.namespace import Namespace
+from symgen.description.naming import Namespace
 from symgen.emit.printers import Text
 from symgen.emit.spec import function, is_inertial, is_inertial_or_actuator
 from symgen.regroup.regrouping import regroup

@@ -10,7 +10,7 @@ from oracles.urdf_robots import joint, link, robot
 from symgen.derive.lagrange import Lagrange
 from symgen.description import parse_robot
 from symgen.description.robot import INERTIAL
-from symgen.description.tree_parts import TreePart
+from symgen.description.tree import TreePart
 from symgen.description.tree_robot import read_tree
 from symgen.description.yaml import write_yaml
 from symgen.errors import DescriptionError
