@@ -91,8 +91,6 @@ class Simulated:
     def slips(self) -> tuple[Slip, ...]:
         """Slips of the two robots, the same numbers in both."""
         n, late = self.robot.n, int(0.04 * world.RATE)
-        half = len(self.move.t) // 2
-        heavy = self.with_load(0.1).torque(self.move) - self.truth.torque(self.move)
         wrist, at = np.arange(n) >= 3, np.arange
 
         def lag(x: Array, by: int, chosen: Array) -> Array:
@@ -102,13 +100,6 @@ class Simulated:
         def clipped(c: Case) -> Case:
             most = 0.6 * np.abs(c.tau[:, 1]).max()
             return replace(c, tau=np.where(at(n) == 1, c.tau.clip(-most, most), c.tau))
-
-        def coupled(c: Case, positions: bool) -> Case:
-            q, tau = c.q.copy(), c.tau.copy()
-            if positions:
-                q[:, 2] += 0.1 * q[:, 1]
-            tau[:, 1] -= 0.1 * (c.tau - self.balance)[:, 2]
-            return replace(c, q=q, tau=tau)
 
         def zero(j: int, degrees: float) -> Callable[[Case], Case]:
             return lambda c: replace(c, q=c.q + np.deg2rad(degrees) * (at(n) == j))
@@ -137,9 +128,6 @@ class Simulated:
             Slip(1, "torque of joint 2 clipped at 60 %", r"torque of joint 2 is at its largest", clipped),
             Slip(2, "torques of joints 4 on 40 ms late", r"torques? of joints? 4", lambda c: replace(c, tau=lag(c.tau, late, wrist))),
             Slip(3, "joints 4 on logged 40 ms late", r"joints? [4567][^|]*late", lambda c: replace(c, tau=lag(c.tau, late, wrist), q=lag(c.q, late, wrist))),
-            Slip(4, "coupling of 10 % of joints 2 and 3", r"coupling of joints 2 and 3", lambda c: coupled(c, True)),
-            Slip(5, "torque coupling of 10 % of joints 2 and 3", r"coupling of joints 2 and 3", lambda c: coupled(c, False)),
-            Slip(6, "a load added after 5 s", r"Before and after (4\.[5-9]|5\.[0-5]|5 s)", lambda c: replace(c, tau=c.tau + np.where(at(len(c.t))[:, None] >= half, heavy, 0.0))),
             Slip(7, "torques of the controller's model", r"no noise", lambda c: target(c, True)),
             Slip(8, "rate 125 for 94", r"sampling rate is [^;]*0\.7[345]", lambda c: replace(c, rate=125 / 94)),
             Slip(9, "rate 300 for 500", r"sampling rate is [^;]*1\.[67]", lambda c: replace(c, rate=0.6)),
