@@ -39,7 +39,6 @@ Status = Literal[
     "rank-deficient",
     "no-redundancy",
     "singular-weights",
-    "ill-posed",
     "not-converged",
     "weak-instruments",
     "simulation-apart",
