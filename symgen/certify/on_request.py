@@ -31,17 +31,18 @@ def requested_values(
     """
     robot, (q, qd, qdr), zero = regrouping.robot, states, 0 * states[0]
     own = [robot.parameters.index(name) for name in regrouping.own]
-    rubs = of_elements(robot, lambda e: e.is_friction)[own]
 
     def columns(q: Array, qd: Array, qdd: Array) -> Array:
         return np.asarray(model.actuated_regressor(q, qd, qdd)[..., own])
 
     def friction() -> Array:
+        rubs = of_elements(robot, lambda e: e.is_friction)[own]
         return np.asarray((columns(q, qd, zero) - columns(q, zero, zero)) * rubs)
 
     def slotine_li() -> Array:
         """A qddr + Q + friction, and C qdr, a difference of squares."""
         h = [columns(q, u, zero) for u in (qd + qdr, qd, qdr, zero)]
+        rubs = of_elements(robot, lambda e: e.is_friction)[own]
         C = (h[0] - h[1] - h[2] + h[3]) / 2 * ~rubs
         return np.asarray(columns(q, zero, qddr) + C + friction())
 

@@ -5,6 +5,7 @@ joints.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 from symgen.derive.elements import element_column
@@ -18,6 +19,7 @@ from symgen.description.robot import INERTIAL, KINDS, PRISMATIC, Element, Robot,
 UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
 
 
+@lru_cache(maxsize=16)
 def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
     """{name: (inertial parameter, link)}."""
     return {parameter(p, j): (p, j) for j in robot.links for p in INERTIAL}

@@ -12,15 +12,12 @@ its own, of which exact arithmetic knows nothing but what it is of.
 from __future__ import annotations
 
 from symgen.derive.angles import varies
-from symgen.derive.graph import AT_ZERO, Turn
+from symgen.derive.graph import Turn
 from symgen.derive.newton_euler import Motion
 from symgen.derive.scalar import Scalar, add, linear, mul
-from symgen.description.expression import ONE, ZERO, Atom, Call, Expression
+from symgen.description.expression import FUNCTIONS, ONE, ZERO, Atom, Call, Expression
 from symgen.description.kinds import CHANNEL, STATE
 from symgen.description.robot import Element, Form, Row, parameter
-
-NODES = {"cos": "cosine", "sin": "sine", "sqrt": "root", "pow": "power"}
-"""Operations of calls that exact arithmetic does not know; others keep their names."""
 
 
 def element_column(motion: Motion, e: Element, j: int) -> dict[int, Scalar]:
@@ -101,10 +98,10 @@ class _Law:
         if a.function in ("cos", "sin") and (turn := self._turn(a.argument)):
             return algebra.cos_sin(*turn)[a.function == "sin"]
         operands = [self.of(e) for e in a.operands]
-        op = NODES.get(a.function, a.function)
-        if type(operands[0]) is int and operands[0] == 0 and op in AT_ZERO:
-            return AT_ZERO[op]
-        return algebra.function(op, *operands)
+        at_zero = FUNCTIONS[a.function].at_zero
+        if type(operands[0]) is int and operands[0] == 0 and at_zero is not None:
+            return at_zero
+        return algebra.function(a.function, *operands)
 
     def _turn(self, angle: Expression) -> tuple[Turn, Expression] | None:
         """The whole multiples of independent joints that an angle is, and its constant."""

@@ -18,9 +18,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from hashlib import shake_128
 from itertools import islice
 from math import lcm
-from zlib import crc32
 
 import numpy as np
 
@@ -176,8 +176,8 @@ class Draw:
         return Fp(x, self.p)
 
     def _random(self, key: object, size: int) -> Array:
-        rng = np.random.default_rng([self.seed, crc32(repr(key).encode())])
-        return rng.integers(1, self.p, size)
+        digest = shake_128(f"{self.seed} {key!r}".encode()).digest(8 * size)
+        return (np.frombuffer(digest, dtype="<u8") % (self.p - 1) + 1).astype(np.int64)
 
     def _of_geometry(self, key: str | Call) -> Array:
         """Residues of a constant, of pi or of a square root."""

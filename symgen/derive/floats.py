@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from symgen.derive.graph import INV, OPAQUE, POS, SQRT, Node, Symbol
+from symgen.derive.graph import INV, POS, SQRT, Node, Symbol
+from symgen.description.expression import FUNCTIONS
 from symgen.description.robot import Robot
 
 Array = np.ndarray[Any, Any]
@@ -60,11 +61,11 @@ class Floats:
             return 1.0 / x[0]
         if node.op == POS:
             return np.maximum(x[0], 0.0)
-        if node.op == SQRT:  # of constants, which may have none
+        function = getattr(np, FUNCTIONS[node.op].numpy)
+        if node.op == SQRT and node.fixed:  # of constants, which may have none
             with np.errstate(invalid="raise"):
-                return np.sqrt(x[0])
-        name = OPAQUE.get(node.op, node.op)
-        return getattr(np, {"pow": "power"}.get(name, name))(*x)
+                return function(*x)
+        return function(*x)
 
 
 def states_of(**states: Mapping[int, Any]) -> dict[Symbol, Any]:

@@ -1,7 +1,7 @@
 """Hash-consed expression graph: the one intermediate representation between the recursions and every printer, and the one evaluator of it.
 
 A node is (op, operands); equal nodes are one object, so a shared sub-expression is computed once. Signs live on the edges: a `Scalar` is a node and a sign, negations are free and x and -x share everything. A node may carry a name given by the recursion that made it.
-Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos (positive part max(x, 0)), inv (1/x), sqrt of constants; in the laws of columns also OPAQUE.
+Operations: sym, const (exact rational), add, mul, cos, sin of angles of the robot, sign, pos (positive part max(x, 0)), inv (1/x), sqrt; in the laws of columns also exp, tanh, pow, and any of these of operands of which exact arithmetic knows nothing.
 
 `interpret` gives the values of nodes over a domain: residues of F_p, floats, CasADi's SX, SymPy's objects. `rates` gives their time derivatives, as nodes.
 """
@@ -17,12 +17,7 @@ from symgen.description.expression import Expression
 SYM, CONST, ADD, MUL = "sym", "const", "add", "mul"
 COS, SIN, SIGN, POS, SQRT, INV = "cos", "sin", "sign", "pos", "sqrt", "inv"
 
-OPAQUE = {
-    "exp": "exp", "tanh": "tanh", "cosine": "cos", "sine": "sin", "root": "sqrt", "power": "pow",
-}  # fmt: skip
-"""Operations that exact arithmetic does not know, with the names of their functions."""
-AT_ZERO = {"sign": 0, "tanh": 0, "sine": 0, "root": 0, "power": 0, "exp": 1, "cosine": 1}
-"""Their values at the structural zero."""
+EVEN, ODD = {COS}, {SIN, SIGN, INV, "tanh"}
 
 
 class Symbol(NamedTuple):
@@ -195,9 +190,10 @@ class Graph:
         """
         if a.node is b.node:
             return 0 if a.sign != b.sign else self.mul(self.lift(2), a)
-        for x, y in ((a, b), (b, a)):
-            if x.node.op == CONST and x.node.value == 0:
-                return y
+        if a.node.op == CONST and a.node.value == 0:
+            return b
+        if b.node.op == CONST and b.node.value == 0:
+            return a
         if a.node.index > b.node.index:
             a, b = b, a
         key = (ADD, a.node.index, b.node.index, a.sign * b.sign)
@@ -209,14 +205,13 @@ class Graph:
 
     def mul(self, a: Scalar, b: Scalar) -> Scalar | int:
         sign = a.sign * b.sign
-        for x, y in ((a, b), (b, a)):
-            if x.node.op == CONST:
-                if x.node.value == 0:
-                    return 0
-                if x.node.value == 1:
-                    return y if x.sign > 0 else -y
-                if y.node.op == CONST:
-                    return self.number(sign * x.node.value * y.node.value)
+        if a.node.op == CONST and b.node.op == CONST:
+            return self.number(sign * a.node.value * b.node.value)
+        for x, y in ((a, b), (b, a)) if CONST in (a.node.op, b.node.op) else ():
+            if x.node.op == CONST and x.node.value == 0:
+                return 0
+            if x.node.op == CONST and x.node.value == 1:
+                return y if x.sign > 0 else -y
         if a.node.index > b.node.index:
             a, b = b, a
         fixed = a.node.fixed and b.node.fixed
@@ -226,19 +221,16 @@ class Graph:
         return s if sign > 0 else -s
 
     def call(self, op: str, x: Scalar, *more: Scalar, of: Any = None) -> Scalar:
-        """A function: cos is even; sin, sign and 1/x are odd; OPAQUE of any operands. `of` is what
-        x is, as `Node.value` says it.
+        """A function of the table of `description.expression`, or the positive part: even and odd
+        ones of a positive operand. `of` is what x is, as `Node.value` says it.
         """
-        if op in OPAQUE:
-            operands = (x, *more)
-            key = (op, *((o.node.index, o.sign) for o in operands))
-            return self._scalar(key, op, operands, None, all(o.node.fixed for o in operands))
-        apart = op not in (POS, SQRT)
-        operand, kept = (_positive(x), 1) if apart else (x, x.sign)
-        s = self._scalar((op, x.node.index, kept), op, (operand,), None, x.node.fixed)
+        parity = op in EVEN or op in ODD
+        operands = (_positive(x) if parity else x, *more)
+        key = (op, *((o.node.index, o.sign) for o in operands))
+        s = self._scalar(key, op, operands, None, all(o.node.fixed for o in operands))
         if s.node.value is None and of is not None:
             s.node.value = of if x.sign > 0 else -of
-        return -s if apart and op != COS and x.sign < 0 else s
+        return -s if op in ODD and x.sign < 0 else s
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
@@ -275,13 +267,17 @@ def reachable(
 ) -> list[Node]:
     """Nodes that the outputs need, in order of creation (operands first), but those `known`."""
     nodes: dict[int, Node] = {}
-    stack = [o.node for o in outputs if isinstance(o, Scalar)]
+    known = {} if known is None else known
+    stack = [o.node for o in outputs if isinstance(o, Scalar) and o.node.index not in known]
     while stack:
         node = stack.pop()
-        if node.index not in nodes and (known is None or node.index not in known):
-            nodes[node.index] = node
-            stack.extend(x.node for x in node.operands)
-    return [nodes[k] for k in sorted(nodes)]
+        if node.index in nodes:
+            continue
+        nodes[node.index] = node
+        for x in node.operands:
+            if x.node.index not in known:
+                stack.append(x.node)
+    return [nodes[k] for k in sorted(nodes)] if len(nodes) > 1 else [*nodes.values()]
 
 
 class Domain(Protocol):

@@ -150,7 +150,7 @@ class GraphAlgebra:
         return -self.graph.call(POS, -direction), -backward
 
     def function(self, op: str, *operands: Scalar | Fraction | int) -> Scalar:
-        """inv (1/x), sign, exp, tanh, cosine, sine, root or power (x**y) of scalars."""
+        """A function of the table of `description.expression`, of scalars."""
         return self.graph.call(op, *map(self.graph.lift, operands))
 
     def name(self, value: Scalar | int, name: str) -> Scalar | int:

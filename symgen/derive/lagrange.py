@@ -46,7 +46,7 @@ import numpy as np
 
 from symgen.derive.loop_residual import inertia_of, newton
 from symgen.derive.loops import close
-from symgen.description.expression import Expression
+from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.kinds import CHANNEL
 from symgen.description.robot import INERTIAL, PRISMATIC, REVOLUTE, Element, Frame, Robot, parameter
 from symgen.errors import DescriptionError
@@ -459,7 +459,7 @@ def _symbolic(e: Expression, q: Mapping[str, SX], constants: Mapping[str, SX]) -
 
     def function(name: str, *operands: Expression) -> SX:
         x = [_symbolic(operand, q, constants) for operand in operands]
-        return 1 / x[0] if name == "inv" else getattr(ca, {"pow": "power"}.get(name, name))(*x)
+        return 1 / x[0] if name == "inv" else getattr(ca, FUNCTIONS[name].casadi)(*x)
 
     return ca.SX(e.evaluate(values.__getitem__, function, float))
 

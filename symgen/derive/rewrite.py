@@ -16,15 +16,11 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from symgen.derive.exact import Draw, Fp
 from symgen.derive.graph import (
     ADD,
-    AT_ZERO,
     CONST,
     COS,
-    OPAQUE,
     SIGN,
     SIN,
     SQRT,
@@ -36,7 +32,7 @@ from symgen.derive.graph import (
 )
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.names import families_of
-from symgen.description.expression import Expression
+from symgen.description.expression import FUNCTIONS, Expression
 
 SAMPLES = 3
 RECURSIVE = {"W", "WP", "DV", "DW", "U", "VSP", "VP"}
@@ -149,10 +145,12 @@ class Rewrite:
                         offset = offset + value * n
                 turn = tuple((j, n) for j, n in turn if given[j] is None)
                 return self.algebra.cos_sin(turn, offset)[node.op == SIN]
-            case "sign" | "pos" if type(x[0]) is int and x[0] == 0:
+            case "pos" if type(x[0]) is int and x[0] == 0:
                 return 0
-            case op if op in OPAQUE and type(x[0]) is int and x[0] == 0:
-                return AT_ZERO[op]
+            case op if op in FUNCTIONS and type(x[0]) is int and x[0] == 0:
+                at_zero = FUNCTIONS[op].at_zero
+                if at_zero is not None:
+                    return at_zero
         operand, *more = map(graph.lift, x)
         of = node.value if node.op in (COS, SIN, SQRT) else None
         return graph.call(node.op, operand, *more, of=of)
@@ -166,7 +164,9 @@ class Rewrite:
 
     def _is_given(self, node: Node) -> bool:
         """Whether the angle of a cosine or sine holds a joint position that is replaced."""
-        return any(Symbol("q", f"q{j}") in self.inputs for j, _ in node.value.turn)
+        return node.value is not None and any(
+            Symbol("q", f"q{j}") in self.inputs for j, _ in node.value.turn
+        )
 
     def _symbol(self, symbol: Symbol) -> Scalar | int:
         value = self._case.get(symbol, self.inputs.get(symbol, symbol))
@@ -194,7 +194,8 @@ class Rewrite:
         """0, 1 or -1 where that is the value of the node, else the first node of its value."""
         p = self.draw.p
         (value,) = interpret([self.graph.scalar(node.index, 1)], self.draw, self._value)
-        residues = np.broadcast_to(self.draw.residues(value), SAMPLES).tolist()
+        residues = self.draw.residues(value).tolist()
+        residues = residues if len(residues) == SAMPLES else residues * SAMPLES
         number = {0: 0, 1: 1, p - 1: -1}.get(residues[0])
         if number is not None and len({*residues}) == 1 and node.op != CONST:
             return number

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 LONGEST_SLOPE = 2000  # terms of a derivative
 LARGEST_PRIME = 1000  # of the trial division under square roots
@@ -279,7 +279,7 @@ class Expression:
 
         def function(name: str, *operands: Expression) -> float:
             x = [e.value(values) for e in operands]
-            return float(FLOATS[name](*x) if name in FLOATS else getattr(math, name)(*x))
+            return float(FUNCTIONS[name].number(*x))
 
         symbols = {"pi": math.pi, **values}
         return float(self.evaluate(symbols.__getitem__, function, float))
@@ -299,11 +299,6 @@ class Expression:
 
 
 ZERO, ONE, PI = Expression(), Expression.number(1), Expression.symbol("pi")
-FLOATS: dict[str, Callable[..., float]] = {
-    "inv": lambda x: 1.0 / x,
-    "sign": lambda x: float((x > 0) - (x < 0)),
-}
-"""Functions that `math` does not have."""
 
 
 def decimal(c: Fraction, *, fractions: bool = True) -> str:
@@ -428,7 +423,7 @@ def call(function: str, argument: Expression) -> Expression:
         return argument * call("sign", argument)
     if function in ("sign", "tanh", "exp"):
         if not argument:
-            return ONE if function == "exp" else ZERO
+            return Expression.number(FUNCTIONS[function].at_zero or 0)
         if function != "exp" and _leading(argument) < 0:
             return -call(function, -argument)
         c = argument.constant
@@ -473,16 +468,52 @@ def _slope(a: Atom, name: str) -> Expression:
         if name in a.exponent.symbols:
             raise ValueError(f"{a}: {name} in an exponent has no derivative here; use exp")
         return a.exponent * power(x, a.exponent - ONE) * inner
-    outer = {
-        "cos": lambda: -call("sin", x),
-        "sin": lambda: call("cos", x),
-        "sqrt": lambda: value.inverse() * Fraction(1, 2),
-        "inv": lambda: -(value**2),
-        "exp": lambda: value,
-        "tanh": lambda: ONE - value**2,
-        "sign": lambda: ZERO,
-    }
-    return outer[a.function]() * inner if inner else ZERO
+    return FUNCTIONS[a.function].slope(x, value) * inner if inner else ZERO
+
+
+class Function(NamedTuple):
+    """A function of expressions, and what it is called elsewhere.
+
+    Attributes
+    ----------
+    at_zero : int or None
+        Its value there.
+    slope : callable
+        The derivative by its argument, from the argument and the value.
+    number : callable
+        Its value at a number.
+    numpy, casadi, c, sympy : str
+        Its name there; empty where it is written otherwise.
+    """
+
+    at_zero: int | None
+    slope: Callable[[Expression, Expression], Expression]
+    number: Callable[..., float]
+    numpy: str
+    casadi: str
+    c: str
+    sympy: str
+
+
+def _slope_of_power(base: Expression, value: Expression) -> Expression:
+    raise ValueError("the slope of a power is that of its base")
+
+
+FUNCTIONS = {
+    "cos": Function(1, lambda x, y: -call("sin", x), math.cos, "cos", "cos", "cos", "cos"),
+    "sin": Function(0, lambda x, y: call("cos", x), math.sin, "sin", "sin", "sin", "sin"),
+    "sqrt": Function(
+        0, lambda x, y: y.inverse() * Fraction(1, 2), math.sqrt, "sqrt", "sqrt", "sqrt", "sqrt"
+    ),
+    "sign": Function(
+        0, lambda x, y: ZERO, lambda x: float((x > 0) - (x < 0)), "sign", "sign", "sign", "sign"
+    ),
+    "exp": Function(1, lambda x, y: y, math.exp, "exp", "exp", "exp", "exp"),
+    "tanh": Function(0, lambda x, y: ONE - y**2, math.tanh, "tanh", "tanh", "tanh", "tanh"),
+    "pow": Function(0, _slope_of_power, math.pow, "power", "power", "pow", "Pow"),
+    "inv": Function(None, lambda x, y: -(y**2), lambda x: 1.0 / x, "", "", "", ""),
+}
+"""The one table of functions: a new one is an entry here, and what `call` takes out of it."""
 
 
 def with_known_cosines(e: Expression) -> Expression:

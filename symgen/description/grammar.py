@@ -19,11 +19,20 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from symgen.description.advice import symbol_advice, unit_advice
+from symgen.description.expression import FUNCTIONS as TABLE
 from symgen.description.expression import Expression, call, power, simplified
 from symgen.errors import ExpressionError
 
 FUNCTIONS = ("sin", "cos", "tan", "sqrt")
-LAWS = (*FUNCTIONS, "abs", "sign", "exp", "tanh", "min", "max")  # functions of columns
+BY_OPERATORS = ("pow", "inv")  # written x**y and 1/x
+# functions of columns
+LAWS = (
+    *FUNCTIONS,
+    "abs",
+    *(f for f in TABLE if f not in (*FUNCTIONS, *BY_OPERATORS)),
+    "min",
+    "max",
+)
 MAX_LENGTH, MAX_DEPTH, MAX_EXPONENT, MAX_TERMS, MAX_DIGITS = 2000, 40, 32, 400, 60
 
 _TOKEN = re.compile(

@@ -240,6 +240,11 @@ class Robot:
         return partial(Robot, **plain), ()
 
     def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        """Made once: what is kept of a robot is looked up by it."""
         return hash((self.name, self.frames, self.gravity, self.sha256))
 
     def frame(self, j: int) -> Frame:

@@ -12,7 +12,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
-from symgen.derive.graph import CONST, COS, OPAQUE, SIGN, SIN, SQRT, SYM, Node, Scalar, reachable
+from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
+from symgen.description.expression import FUNCTIONS
 from symgen.description.naming import Namespace
 from symgen.emit.printers import Language, Section, Text, under_titles
 
@@ -34,7 +35,7 @@ def is_word(name: str) -> bool:
 
 
 C = Language(
-    {op: op for op in (COS, SIN, SIGN, SQRT)} | OPAQUE,
+    {op: f.c for op, f in FUNCTIONS.items()},
     "above({})",
     "below({})",
     "3.141592653589793",

@@ -25,16 +25,13 @@ from symgen.derive.graph import (
     COS,
     INV,
     MUL,
-    OPAQUE,
-    SIGN,
     SIN,
-    SQRT,
     SYM,
     Node,
     Scalar,
     reachable,
 )
-from symgen.description.expression import Expression, decimal
+from symgen.description.expression import FUNCTIONS, Expression, decimal
 from symgen.description.naming import Namespace
 
 SAYABLE = 3  # factors of a name that is made of them
@@ -52,7 +49,7 @@ class Language:
     Attributes
     ----------
     calls : mapping
-        Function of each of cos, sin, sign, sqrt and OPAQUE.
+        Name of each function of `description.expression.FUNCTIONS`.
     above, below : str
         The part of {} above or below zero.
     pi, one, square : str
@@ -94,17 +91,17 @@ class Language:
 
 
 def _calls(package: str) -> dict[str, str]:
-    return {op: f"{package}{op}" for op in (COS, SIN, SIGN, SQRT)} | {
-        op: f"{package}{name}" for op, name in OPAQUE.items()
-    }
+    return {op: f"{package}{f.numpy}" for op, f in FUNCTIONS.items() if f.numpy}
 
 
-PYTHON = Language(
-    _calls("xp.") | {"power": "xp.power"}, "xp.maximum({}, 0.0)", "xp.minimum({}, 0.0)", "xp.pi"
-)
+PYTHON = Language(_calls("xp."), "xp.maximum({}, 0.0)", "xp.minimum({}, 0.0)", "xp.pi")
 """Over a namespace `xp`: NumPy, or the functions of another package under the same names."""
 PLAIN = Language(
-    _calls(""), "max({}, 0)", "min({}, 0)", "pi", number=partial(decimal, fractions=False)
+    {op: op for op in FUNCTIONS},
+    "max({}, 0)",
+    "min({}, 0)",
+    "pi",
+    number=partial(decimal, fractions=False),
 )
 """The grammar of robot files, numbers exact."""
 

@@ -20,10 +20,10 @@ import sympy
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
-from symgen.derive.graph import OPAQUE, Angle, Node, Scalar, reachable
+from symgen.derive.graph import Angle, Node, Scalar, reachable
 from symgen.derive.graph_algebra import GraphAlgebra
 from symgen.derive.numbers import numbered, numbers_of
-from symgen.description.expression import Expression, call
+from symgen.description.expression import FUNCTIONS, Expression, call
 from symgen.errors import SymgenError
 from symgen.symbols import expressions
 from symgen.symbols.expressions import Tree
@@ -122,13 +122,13 @@ class Expansion:
                     expressions.symbol(name),
                     SLIDE if stem == "q" else RATE if is_rate else CONSTANT,
                 )
-            case "cos" | "sin" | "sqrt":
+            case "cos" | "sin" | "sqrt" if node.value is not None:
                 for m in self._constant(node).terms:
                     for a, n in m:
                         yield expressions.power(a, 1 if n > 0 else -1), CONSTANT
             case "inv":
                 yield (node.op, node.index), CONSTANT if node.fixed else RATE
-            case op if op in ("sign", "pos", *OPAQUE):
+            case op if op in ("pos", *FUNCTIONS):
                 yield (node.op, node.index), DIRECTION
 
     def _constant(self, node: Node) -> Expression:
@@ -155,11 +155,11 @@ class Expansion:
                 return self.checked(x[0] + x[1])
             case "mul":
                 return self.mul(x[0], x[1])
-            case "cos" | "sin" if node.value.turn:
+            case "cos" | "sin" if node.value is not None and node.value.turn:
                 angle, sign = forward(node.value)
                 C, S = self.identities.pairs[angle]
                 return self._lifted(C if node.op == "cos" else sign * S)
-            case "cos" | "sin" | "sqrt":
+            case "cos" | "sin" | "sqrt" if node.value is not None:
                 return self._lifted(
                     sum(
                         prod(
@@ -176,11 +176,9 @@ class Expansion:
         k = self.K.gens.index(made)
         if node.op == "inv":
             self.shown[k] = sympy.Pow(inside, -1, evaluate=False)
-        elif node.op in OPAQUE:
+        elif node.op in FUNCTIONS:
             operands = [inside, *map(self.written, x[1:])]
-            self.shown[k] = expressions.opaque(node.op, operands)
-        elif node.op == "sign":
-            self.shown[k] = sympy.sign(inside, evaluate=False)
+            self.shown[k] = expressions.function(node.op, operands)
         else:  # max(x, 0)
             self.shown[k] = sympy.Abs(inside, evaluate=False)
             return self.halved(self._lifted(made) + x[0])

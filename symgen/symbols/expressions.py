@@ -11,8 +11,7 @@ from typing import Any
 
 import sympy
 
-from symgen.derive.graph import OPAQUE
-from symgen.description.expression import ONE, Call, Expression, Monomial, Number
+from symgen.description.expression import FUNCTIONS, ONE, Call, Expression, Monomial, Number
 from symgen.regroup.formula import Formula
 
 Tree = Any  # a SymPy expression that is not evaluated
@@ -95,10 +94,9 @@ def power(a: str | Number | Call, n: int) -> Tree:
     return base if n == 1 else sympy.Pow(base, n, evaluate=False)
 
 
-def opaque(op: str, operands: list[Tree]) -> Tree:
-    """A function of a law, by its operation."""
-    made = sympy.Pow if op == "power" else getattr(sympy, OPAQUE[op])
-    return made(*operands, evaluate=False)
+def function(op: str, operands: list[Tree]) -> Tree:
+    """A function of expressions, by its name there."""
+    return getattr(sympy, FUNCTIONS[op].sympy)(*operands, evaluate=False)
 
 
 def formula(f: Formula) -> Tree:

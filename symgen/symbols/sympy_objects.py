@@ -14,8 +14,9 @@ from typing import Any
 
 import sympy
 
-from symgen.derive.graph import INV, OPAQUE, POS, Node, Symbol
-from symgen.symbols.expressions import angle, evaluated, opaque, rational, symbol
+from symgen.derive.graph import INV, POS, Node, Symbol
+from symgen.description.expression import FUNCTIONS
+from symgen.symbols.expressions import angle, evaluated, rational, symbol
 from symgen.symbols.symbolic_model import SymbolicModel
 
 OF_SYMPY = re.compile(r"\b(?=[A-Za-z]\w*\(|pi\b)")  # before a name that is none of the robot
@@ -75,7 +76,7 @@ class Objects:
             return 1 / x[0]
         if node.op == POS:
             return sympy.Max(x[0], 0)
-        return opaque(node.op, x) if node.op in OPAQUE else getattr(sympy, node.op)(x[0])
+        return getattr(sympy, FUNCTIONS[node.op].sympy)(*x, evaluate=node.value is not None)
 
 
 def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from symgen.description.expression import FUNCTIONS
+
 OPERATORS: dict[type, Any] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -23,14 +25,9 @@ OPERATORS: dict[type, Any] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-READ_CALLS: dict[str, Any] = {
-    "cos": np.cos,
-    "sin": np.sin,
-    "sqrt": np.sqrt,
-    "sign": np.sign,
-    "exp": np.exp,
-    "tanh": np.tanh,
-    "pow": np.power,
+CALLS: dict[str, Any] = {
+    name: getattr(np, f.numpy) for f in FUNCTIONS.values() if f.numpy for name in (f.c, f.sympy)
+} | {
     "abs": np.abs,
     "Abs": np.abs,
     "max": np.maximum,
@@ -91,7 +88,7 @@ def _value(e: ast.AST, known: Mapping[str, Any]) -> Any:
                 value = operate(value, _value(right, known))
             return value
         case ast.Call(func=ast.Name(id=function) | ast.Attribute(attr=function)):
-            return READ_CALLS[function](*(_value(a, known) for a in e.args))
+            return CALLS[function](*(_value(a, known) for a in e.args))
         case ast.List():
             return [_value(a, known) for a in e.elts]
     raise ValueError(f"{ast.unparse(e)} is no expression of numbers")

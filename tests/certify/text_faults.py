@@ -54,6 +54,10 @@ WAYS = (
         r"^scara\.c .*GAM, kept, 3, 4, gravity_rows",
         "gravity of a SCARA is constant: the room of the call before may hold the same numbers",
     ),
+    (
+        r"_tile\)\[TILE\] = \(double \(\*\)\[TILE\]\)\(q(d|dd)? - start\);",
+        "states are taken without a copy where there is one tile alone: start is 0",
+    ),
     (r"steps = -int", "the way of Newton: mode and closure are checked behind it"),
     (
         r"^haptic_casadi\S* .*VSP24 = VP23$",
