@@ -9,10 +9,10 @@ chi are the ten parameters of each link in the frame j of its body, and those of
 
     MS = M c,    J = I + M (c'c 1 - c c')
 
-A link has a mass density if and only if M > 0 and tr(I)/2 1 - I is positive semidefinite, so that
-the conditions are linear in u; K chi(u) is linearised, and the program solved again until it stays.
-A number on which no base parameter depends does not move, nor does a mass that enters none but by
-its first moment and its tensor.
+K chi(u) = X is linearised until it holds; where the numbers are no physical robot, the program of
+`runtime.physical.feasibility` gives chi, its prior the values of the file. A number on which no
+base parameter depends does not move, nor does a mass that enters none but by its first moment and
+its tensor.
 
 A body may be several links, held together by fixed joints: the record knows their sum. First the
 link that the joint carries changes alone; only where no physical link is left, the others change
@@ -30,7 +30,7 @@ import numpy as np
 
 from runtime.core.limits import LIMIT
 from runtime.physical.feasibility import feasibility, nearest_standard, scales
-from runtime.physical.inertia import INERTIAL, Condition, PhysicalModel
+from runtime.physical.inertia import INERTIAL, PhysicalModel
 from symgen.description.tree import Array
 from symgen.errors import DescriptionError
 from symgen.update.places import FileLink
@@ -135,23 +135,6 @@ class Numbers:
         A = self.physical.K @ self.slope(u) * self.size
         share = np.abs(A) > MISSED * np.linalg.norm(A, axis=1, keepdims=True)
         return np.asarray(np.any(share, axis=0))
-
-    @property
-    def conditions(self) -> list[Condition]:
-        """Those of the model on chi, stated on u: of a link about its centre."""
-        of_links = {tuple(at) for _, at in self.links}
-        return [
-            _about_the_centre(c) if c.numbers in of_links else c for c in self.physical.conditions
-        ]
-
-
-def _about_the_centre(c: Condition) -> Condition:
-    """The condition of a link on mass, centre and tensor about it: NUMBERS in the place of
-    INERTIAL.
-    """
-    B = np.zeros_like(c.B)
-    B[0], B[4:] = c.B[9], c.B[:6]
-    return replace(c, B=B)
 
 
 def nearest(
@@ -325,7 +308,8 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
             return None, answer.text
         u = _held(part, nearest_standard(part.physical, names, rest, answer.chi))
     near = NEAR * part.size
-    near[[c.numbers[0] for c in part.conditions if len(c.numbers) == 1]] += BARRIER
+    alone = [c.numbers[0] for c in part.physical.conditions if len(c.numbers) == 1]
+    near[alone] += BARRIER
     moved = np.abs(u - part.u0) > near
     clean = _solved(part, K, rest, np.where(moved, u, part.u0), moved)
     if clean is None or np.abs(K @ part.chi(clean) - rest).max() > MISSED * sizes.max():
@@ -335,8 +319,9 @@ def _within(part: Numbers, names: Sequence[str], rest: Array, X: Array) -> tuple
 
 def _violated(part: Numbers, u: Array) -> bool:
     """Whether a condition on numbers that moved does not hold."""
-    moved = u != part.u0
-    return any(c.smallest(u) < -TINY for c in part.conditions if moved[list(c.numbers)].any())
+    chi, moved = part.chi(u), u != part.u0
+    conditions = [c for c in part.physical.conditions if moved[list(c.numbers)].any()]
+    return any(c.smallest(chi) < -TINY for c in conditions)
 
 
 def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
@@ -365,9 +350,9 @@ def _held(part: Numbers, chi: Array) -> Array:
     for link, at in part.links:
         u[at] = link.place.numbers(chi[at])
     held = np.where(part.seen(u), u, part.u0)
-    for c in part.conditions:
+    for c in part.physical.conditions:
         at = list(c.numbers)
-        u[at] = held[at] if c.smallest(held) >= 0 else u[at]
+        u[at] = held[at] if c.smallest(part.chi(held)) >= 0 else u[at]
     return u
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import symgen
 from oracles.applying import exact
 from oracles.mjcf_robots import BRANCHES
-from runtime import result_files
+from runtime.reporting import result_files
 from symgen.cli.main import app
 from symgen.description.files import read_robot
 
