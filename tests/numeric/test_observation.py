@@ -4,6 +4,7 @@ study repeats, several records as one.
 
 import dataclasses
 import types
+from dataclasses import replace
 from pathlib import Path
 
 import emps_model
@@ -13,9 +14,11 @@ import pytest
 import scipy.signal
 from planar_data import TRUE, motion
 
-from runtime import Record, essential, estimate, load_model, observe
+from runtime import Record, estimate, load_model, observe
+from runtime.compose import estimate_of, problem
 from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
+from runtime.core.essential import essential_of
 from runtime.core.record import Origin
 from runtime.core.rows.factor import factor
 from runtime.core.rows.observation import stack
@@ -23,7 +26,7 @@ from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.regressor import Columns, distinct_entries
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States, decimated, decimation_plan, filtered_states
-from runtime.core.study import Decimate, EstimateSettings, study_from_mapping
+from runtime.core.study import Decimate, EssentialSettings, EstimateSettings, study_from_mapping
 from runtime.core.uncertainty import block_bootstrap
 from runtime.core.validation import weak_directions
 from symgen.description import load_robot
@@ -96,7 +99,7 @@ def test_zero_entries_stay_zero(record):
 
 
 def test_equal_signals_are_filtered_once():
-    entries = distinct_entries(planar, {})
+    entries = distinct_entries(planar)
     assert len(entries.k) == planar.STRUCTURE.sum() == 13
     assert len(entries.source) == 12  # ZZ2 acts alike on both joints
     states = States(*(x[:100] for x in motion(T)))
@@ -120,7 +123,7 @@ def test_opposite_and_constant_signals():
         store=lambda N: np.zeros((4, 2, N)),
         regressor=regressor,
     )
-    entries = distinct_entries(model, {})
+    entries = distinct_entries(model)
     assert len(entries.source) == 3  # qd1, 1 and sign(qd1)
     qd = np.random.default_rng(0).normal(size=(300, 2))
     columns = Columns(model).decimated(States(qd, qd, qd), decimation_plan(300, 2, Decimate()))
@@ -146,13 +149,13 @@ def test_states_out_of_reach_are_not_merged():
         store=lambda N: np.zeros((2, 1, N)),
         regressor=regressor,
     )
-    assert len(distinct_entries(model, {}).source) == 2
+    assert len(distinct_entries(model).source) == 2
 
 
 def test_loops_that_do_not_close_at_random_states():
     """The five-bar raises there; its identification treats every entry by itself."""
     model = load_model(Path(__file__).parents[2] / "generated" / "five_bar.py")
-    entries = distinct_entries(model, {})
+    entries = distinct_entries(model)
     assert len(entries.source) == len(entries.k) == np.count_nonzero(model.STRUCTURE)
 
 
@@ -164,7 +167,7 @@ def test_signals_are_those_found_over_a_finite_field():
     places = spec.signals(f, [e for e in f.values.entries if e.value != 0]).places
     exact = {place: (s, sign) for place, s, sign in places}
     folder = Path(__file__).parents[2] / "generated"
-    e = distinct_entries(load_model(folder / "tx40.py", trust=True), {})
+    e = distinct_entries(load_model(folder / "tx40.py", trust=True))
     assert set(exact) == set(zip(e.k.tolist(), e.j.tolist(), strict=True))
     pairs = {
         (w, *exact[k, j][:1], s * exact[k, j][1])
@@ -176,7 +179,7 @@ def test_signals_are_those_found_over_a_finite_field():
 
 
 def test_pieces_of_the_regressor_equal_the_whole():
-    entries = distinct_entries(planar, {})
+    entries = distinct_entries(planar)
     states = States(*motion(np.arange(10000) / RATE))  # longer than two pieces
     D = planar.regressor(states.q, states.qd, states.qdd).transpose(2, 1, 0)
     expected = D[entries.k[entries.source], entries.j[entries.source]]
@@ -204,11 +207,16 @@ def test_rows_left_out_are_counted(record):
 def test_mask_of_samples_and_joints(record):
     keep = np.ones((N, 2), dtype=bool)
     keep[:3000, 1] = False
-    o = observe(planar, record, study(rows={"trim": 0}), keep=keep)
+
+    def masked(keep, sections):
+        reading = problem(planar, record, study(**sections)).prepared[0]
+        return replace(reading, keep=keep).observation(planar)
+
+    o = masked(keep, {"rows": {"trim": 0}})
     assert o.dropped["mask"] == (0, 375) and o.t[o.joint(1)].min() == pytest.approx(3.0)
-    assert observe(planar, record, study(rows={"trim": 0}), keep=keep[:, 1]).rows == (375, 375)
+    assert masked(keep[:, 1], {"rows": {"trim": 0}}).rows == (375, 375)
     with pytest.raises(InputError, match="expected bool"):
-        observe(planar, record, study(), keep=np.ones(5, dtype=bool))
+        masked(np.ones(5, dtype=bool), {})
 
 
 def test_settings_are_written_in_full(record):
@@ -252,13 +260,14 @@ def test_constants_in_place_of_the_robot_file(record):
 
 def test_wanted_columns_alone(record):
     names = ["FS2", "ZZ2", "ZZ1R"]
-    some, every = observe(planar, record, study(), columns=names), observe(planar, record, study())
+    reading = problem(planar, record, study()).prepared[0]
+    some, every = reading.observation(planar, names), reading.observation(planar)
     np.testing.assert_allclose(
         some.W, every.columns(names).W, rtol=0, atol=1e-13 * np.abs(every.W).max()
     )  # sums in another order
     assert some.names == tuple(names)
     with pytest.raises(InputError, match="no column FV9"):
-        observe(planar, record, study(), columns=["FV9"])
+        reading.observation(planar, ["FV9"])
 
 
 def test_no_filters_at_all(record):
@@ -299,8 +308,6 @@ def test_several_records_are_stacked(record):
     assert np.array_equal(observe(planar, [record, record], s).W, stack([alone, alone]).W)
     with pytest.raises(InputError, match="no record"):
         observe(planar, [], s)
-    with pytest.raises(InputError, match="2 records; keep goes with one"):
-        observe(planar, [record, record], s, keep=np.ones(N, dtype=bool))
 
 
 def test_rows_are_factored_once(record, monkeypatch):
@@ -310,7 +317,7 @@ def test_rows_are_factored_once(record, monkeypatch):
         "runtime.core.rows.observation.factor", lambda *given: calls.append(1) or factor(*given)
     )
     o = observe(planar, record, study())
-    fits = estimate(planar, o), essential(planar, o)
+    fits = estimate_of(o, model=planar), essential_of(o, EssentialSettings(), EstimateSettings())
     weak_directions(o)
     block_bootstrap(o, EstimateSettings(), fits[1].estimate)
     assert len(calls) == 1 and fits[1].all_parameters.names == fits[0].names
@@ -380,7 +387,9 @@ def test_refusals(record, sections, said):
 
 
 def test_model_of_another_robot(record):
-    with pytest.raises(InputError, match=r"emps: q has shape \(6000, 2\)"):
+    with pytest.raises(
+        InputError, match=r"arm\.csv: 2 joints; emps has 1: a record of another robot"
+    ):
         observe(emps_model, record, study())
 
 
