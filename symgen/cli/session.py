@@ -87,7 +87,7 @@ def _noted_angles() -> Iterator[None]:
 def results_in(output: Path | None) -> Iterator[Any]:
     """Like `reported_errors`; the context gives the folder as `Results`, or None."""
     with reported_errors():
-        from runtime import result_files
+        from runtime.reporting import result_files
 
         with result_files.results_in(output) as results:
             yield results
