@@ -33,11 +33,11 @@ from scipy.special import stdtrit  # noqa: E402
 
 import symgen  # noqa: E402
 from runtime.advisor.advice import LIMITS, crossing  # noqa: E402
+from runtime.advisor.coarse_encoders import CoarseEncoders  # noqa: E402
 from runtime.compose import advise, cestac, observe, problem  # noqa: E402
 from runtime.core.essential import essential_of  # noqa: E402
 from runtime.core.model import drives_of  # noqa: E402
 from runtime.core.study import study_from_mapping  # noqa: E402
-from runtime.counts.coarse_encoders import CoarseEncoders  # noqa: E402
 from runtime.reading.datasets import dataset_study  # noqa: E402
 from runtime.reading.records import read_records  # noqa: E402
 from symgen.demo import MAIN  # noqa: E402

@@ -36,6 +36,7 @@ from scipy.io import loadmat
 
 import symgen
 from runtime import InputError, load_model
+from runtime.advisor.coarse_encoders import READERS
 from runtime.compose import cestac, estimate_of, observe
 from runtime.core.essential import essential_of
 from runtime.core.record import Record
@@ -44,7 +45,6 @@ from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import Study, study_from_mapping
 from runtime.core.table import aligned
-from runtime.counts.coarse_encoders import READERS
 from runtime.counts.lattice import lattice
 from runtime.counts.reading import read_counts
 from runtime.reading.datasets import dataset_study

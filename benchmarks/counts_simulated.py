@@ -44,13 +44,13 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.special import erf
 from simulation import LAW
 
-from runtime.advisor.sign_errors import switches
 from runtime.compose import estimate_of
 from runtime.core.essential import essential_of
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import certain_rows, select_rows
+from runtime.core.rows.switches import switches
 from runtime.core.signals.filters import States, filtered_states
 from runtime.core.study import Study, study_from_mapping
 from runtime.core.table import aligned

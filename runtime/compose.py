@@ -29,8 +29,9 @@ from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem, Step, prepared
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.signals.states import Reader, counted, lowpassed
+from runtime.core.signals.states import Reader, lowpassed
 from runtime.core.study import EstimateSettings, Study
+from runtime.counts.reader import counted
 from runtime.laws.scalars import fitted_scalars
 from runtime.laws.transmitted import transmitted_torque
 from runtime.link_side import torques_of_links
@@ -44,7 +45,7 @@ from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
 from runtime.speeds import recorded_speeds
-from runtime.threads import single_threaded
+from runtime.threads import alone_each, single_threaded
 from runtime.wrench import force_sensors
 
 if TYPE_CHECKING:
@@ -375,16 +376,21 @@ def cestac(
     study: Study | None = None,
     *,
     simulator: Simulator | None = None,
+    map: Callable[..., Iterable[Any]] = map,
     **options: Any,
 ) -> Cestac:
     """Change of the estimate under coarser encoders and torque sensors, eqs. (15) to (22), (28).
 
-    options : columns, map, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
+    map : as the built-in one; makes the runs, in processes (`runtime.parallel.processes.processes`) or on a Dask cluster (`runtime.parallel.cluster.cluster`).
+    options : columns, progress, checkpoint, provenance, as of `runtime.core.cestac.cestac.cestac`.
     """
     from runtime.core.cestac import cestac as resolution
 
     return resolution.cestac(
-        problem(model, records, study, simulator=simulator), simulator=simulator, **options
+        problem(model, records, study, simulator=simulator),
+        simulator=simulator,
+        map=alone_each(map),
+        **options,
     )
 
 
@@ -455,7 +461,7 @@ def excite(
     from runtime.excitation import search
 
     whole = problem(model, records, study)
-    return search.excite(whole, map=map, progress=progress)
+    return search.excite(whole, map=alone_each(map), progress=progress)
 
 
 @single_threaded

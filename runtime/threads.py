@@ -4,8 +4,8 @@ bit of a sum.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
+from collections.abc import Callable, Iterable
+from functools import partial, wraps
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -39,3 +39,8 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
 def alone(function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
     """The value of the function, made with one BLAS thread."""
     return single_threaded(function)(*args, **kwargs)
+
+
+def alone_each(map: Callable[..., Iterable[R]]) -> Callable[..., Iterable[R]]:
+    """The map, of which each value is made with one BLAS thread, in whatever process."""
+    return lambda function, keys: map(partial(alone, function), keys)

@@ -47,7 +47,9 @@ from runtime.advisor.advice import (
     confirmed,
     limits_of,
 )
+from runtime.advisor.coarse_encoders import READERS, CoarseEncoders, ReaderName
 from runtime.advisor.position_errors import Perturbation, perturbation, solution
+from runtime.advisor.readers import reader_advice
 from runtime.core.cestac.perturbed import study_columns
 from runtime.core.cestac.result import deciding_names
 from runtime.core.cestac.rounding import VARIANCE, Mode
@@ -63,8 +65,6 @@ from runtime.core.record import Record
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import common_drives
 from runtime.core.study import Study, to_mapping
-from runtime.counts.advice import reader_advice
-from runtime.counts.coarse_encoders import READERS, CoarseEncoders, ReaderName
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]
@@ -123,7 +123,7 @@ def advise(
     side, rounding, columns and runs by study.cestac.
 
     Real encoders, law phase, are judged by each of `readers`: read as positions, read as counts
-    (`runtime.counts.advice`).
+    (`runtime.advisor.readers`).
 
     Parameters
     ----------

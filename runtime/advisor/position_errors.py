@@ -1,7 +1,7 @@
 """What errors of the position do to the normal equations, on average and without sampling.
 
 With e the errors of the encoders, independent from sample to sample and of variance v, and filters
-that are linear (`runtime.advisor.noise_gain`), the
+that are linear (`runtime.core.signals.noise_gain`), the
 columns of W move by dW = sum_i W_qi dq_i + W_qdi dqd_i + W_qddi dqdd_i + second order. Over the
 rows t of joint j that are used
 
@@ -28,17 +28,18 @@ from math import floor, log
 
 import numpy as np
 
-from runtime.advisor.noise_gain import Bandwidth, bandwidth
-from runtime.advisor.sign_errors import Kernels, Switch, Switched, kernels, switched, switches
-from runtime.core.drives import Drives
+from runtime.advisor.sign_errors import Kernels, Switched, kernels, switched
+from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.missing import require_positions
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.regressor import in_time
 from runtime.core.rows.selection import Selection
+from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import States
-from runtime.core.signals.states import encoder_drives, encoder_root, lowpassed
+from runtime.core.signals.noise_gain import Bandwidth, bandwidth
+from runtime.core.signals.states import lowpassed
 from runtime.core.study import Study, to_mapping
 
 Array = np.ndarray

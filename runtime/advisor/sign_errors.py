@@ -23,19 +23,16 @@ References: Price (1958) and Bussgang (1952) for the covariances; Mehler's expan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial
-from typing import Literal
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.special import erf
 
-from runtime.advisor.noise_gain import Bandwidth
-from runtime.core.errors import ModelError
-from runtime.core.model import GeneratedModel, elements_of
+from runtime.core.rows.switches import Switch
 from runtime.core.signals.filters import decimated
+from runtime.core.signals.noise_gain import Bandwidth
 from runtime.core.study import Decimate
 
 Array = np.ndarray
@@ -48,35 +45,6 @@ MEMORY = 40
 """Length of the kernels in kept samples: there the decimation's response has decayed below 1e-4."""
 FAR = 4.0
 """|s|/sigma from which the sign never flips: once in 16000 samples."""
-
-SHAPES = {
-    ("coulomb", "both"): (0.0, 1.0, 0.0),
-    ("coulomb", "positive"): (0.0, 0.5, 0.0),
-    ("coulomb", "negative"): (0.0, 0.5, 0.0),
-    ("viscous", "positive"): (0.5, 0.0, 0.5),
-    ("viscous", "negative"): (0.5, 0.0, -0.5),
-}
-"""linear, jump, kink of the elements of friction that switch."""
-
-
-@dataclass(frozen=True, eq=False)
-class Switch:
-    """One column f(s), s = G qd, that enters joint j as G_j f(s), f(s) = linear s + jump sign(s) +
-    kink |s| + a constant.
-
-    column : its number.   G : ndarray, shape (n,).
-    """
-
-    column: int
-    G: Array
-    linear: float
-    jump: float
-    kink: float
-
-    @property
-    def joints(self) -> tuple[int, ...]:
-        """Joints (from 0) on whose rows it acts."""
-        return tuple(int(j) for j in np.flatnonzero(self.G))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,43 +76,6 @@ class Switched:
             (1 - share) * a + share * b for a, b in zip(here, there, strict=True)
         )
         return Switched(sigma, shift, slope / sigma, variance * sigma)
-
-
-def switches(
-    model: GeneratedModel,
-    names: Sequence[str],
-    passive: Literal["refused", "left out"] = "refused",
-) -> tuple[Switch, ...]:
-    """Columns among `names` that switch, from the elements of the model; ModelError where it has
-    none.
-
-    passive : what is done about one that acts along a passive joint.
-    """
-    elements = elements_of(model)
-    switching = []
-    for column, name in enumerate(names):
-        element = elements.get(name, elements.get(name.removesuffix("R")))
-        if element is None:
-            continue
-        kind, direction, along = element
-        shape = SHAPES.get((kind, direction))
-        if shape is None:
-            continue
-        strange = [j for j in along if j not in model.JOINTS]
-        if strange and passive == "left out":
-            continue
-        if strange:
-            raise ModelError(
-                (
-                    f"{name} acts along {strange}, which are no actuated joints; no prediction is "
-                    "made "
-                    "for it"
-                ),
-                file=model.NAME,
-            )
-        G = np.array([along.get(j, 0.0) for j in model.JOINTS])
-        switching.append(Switch(column, G, *shape))
-    return tuple(switching)
 
 
 def switched(

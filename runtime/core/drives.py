@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from runtime.core.errors import InputError
+from runtime.core.errors import InputError, SettingsError
 
 Array = np.ndarray
 Coupling = Literal["both", "position", "torque", "none"]
@@ -129,3 +129,29 @@ class Drives:
                 f"{self.n})"
             )
         return x
+
+
+def encoder_drives(side: str, drives: Drives | None, section: str = "signals") -> Drives | None:
+    """The drives between the joints and encoders on that side; None where these are at the joints.
+
+    section : of the study, which names the side.
+    """
+    if side == "joint":
+        return None
+    if drives is None:
+        raise SettingsError(
+            "motor, but the robot has no drives; use side: joint or give drives in the robot file",
+            path=(section, "side"),
+        )
+    return drives
+
+
+def encoder_root(drives: Drives | None, n: int) -> Array:
+    """Joint motion per encoder motion, shape (n, n): the identity on the joint side, R^-1 on the
+    motor side.
+    """
+    if drives is None:
+        return np.eye(n)
+    return np.asarray(
+        drives.joint_position(np.eye(n)).T - drives.joint_position(np.zeros((1, n))).T
+    )

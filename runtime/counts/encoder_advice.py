@@ -13,14 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime.advisor.noise_gain import bandwidth
-from runtime.core.drives import Drives
+from runtime.core.drives import Drives, encoder_root
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Record
 from runtime.core.signals.filters import States
-from runtime.core.signals.states import encoder_position, encoder_root
+from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Signals
 from runtime.counts.lattice import Lattice, lattice
+from runtime.counts.reader import encoder_position
 
 Array = np.ndarray
 

@@ -29,7 +29,6 @@ from typing import Any
 
 import numpy as np
 
-from runtime.advisor.noise_gain import bandwidth
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, base_columns, joint_labels, require
@@ -37,6 +36,7 @@ from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.filters import decimation_factor
+from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Signals
 from runtime.excitation.settings import ExcitationSettings
 from runtime.excitation.trajectories import Motion

@@ -3,8 +3,8 @@
     with processes(4) as several:
         result = cestac(model, record, study, map=several)
 
-The processes are spawned, never forked (a fork after BLAS has started its threads may hang), and
-have one BLAS thread each. Results come in the order of the arguments and agree in every bit with
+The processes are spawned, never forked (a fork after BLAS has started its threads may hang).
+Results come in the order of the arguments and agree in every bit with
 those of one process.
 """
 
@@ -23,7 +23,6 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from runtime.core.errors import InputError
-from runtime.threads import alone
 
 Map = Callable[..., Iterator[Any]]
 
@@ -61,7 +60,7 @@ def packed(function: Callable[[Any], Any]) -> bytes:
 
 def there(sent: bytes, key: Any) -> Any:
     """The value of a packed function, in the process that computes it."""
-    return alone(_unpacked(sent), key)
+    return _unpacked(sent)(key)
 
 
 @lru_cache(maxsize=1)

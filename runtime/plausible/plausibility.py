@@ -21,8 +21,9 @@ from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, is_axis, require_no_channels
 from runtime.core.problem import Problem
 from runtime.core.progress import at
-from runtime.core.signals.states import require_motion, unwrapped
+from runtime.core.signals.states import require_motion
 from runtime.core.table import Table
+from runtime.counts.reader import unwrapped
 from runtime.plausible.case import Case
 from runtime.plausible.delay import Delay
 from runtime.plausible.jumps import cut_torques, jumps

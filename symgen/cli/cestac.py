@@ -54,7 +54,7 @@ def cestac(
     """
     with session.results_in(output) as results:
         import runtime
-        from runtime.counts.coarse_encoders import READERS
+        from runtime.advisor.coarse_encoders import READERS
         from runtime.parallel.checkpoint import Checkpoint
         from runtime.reading.records import read_records
 

@@ -17,6 +17,7 @@ from scipy.signal import decimate
 
 from oracles.random_robots import random_robot
 from runtime import load_model
+from runtime.advisor.coarse_encoders import CoarseEncoders
 from runtime.compiled.cache import FallbackWarning
 from runtime.compiled.model import CompiledModel, compiled_model
 from runtime.compose import cestac, problem
@@ -39,7 +40,6 @@ from runtime.core.study import (
     Study,
     study_from_mapping,
 )
-from runtime.counts.coarse_encoders import CoarseEncoders
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records

@@ -24,8 +24,8 @@ from runtime.core.missing import Missing, bridged
 from runtime.core.model import drives_of
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
-from runtime.core.signals.states import encoder_position
 from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study
+from runtime.counts.reader import encoder_position
 from runtime.reading.records import read_record
 from runtime.reading.settings import RecordSettings
 from symgen.cli.main import app

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_info
 
 from runtime.core.errors import InputError
 from runtime.parallel.processes import processes
+from runtime.threads import alone_each
 
 
 def told(key):
@@ -56,7 +57,7 @@ def test_one_is_this_process():
 
 def test_several_have_one_thread_of_blas_each():
     with processes(2) as several:
-        answers = list(several(told, range(4)))
+        answers = list(alone_each(several)(told, range(4)))
     assert [key for key, *_ in answers] == [0, 1, 2, 3]
     assert os.getpid() not in {process for _, process, _ in answers}
     assert all(threads and set(threads) == {1} for *_, threads in answers)

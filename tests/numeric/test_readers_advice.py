@@ -9,12 +9,12 @@ from campaign import campaign
 from test_cestac_counts import RECORD, SIGNALS, STEP, planar
 
 from runtime.advisor.advice import crossing
+from runtime.advisor.coarse_encoders import PHASES, CoarseEncoders, mean_change
+from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
 from runtime.core.limits import LIMIT
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Rows, Study
-from runtime.counts.advice import curves
-from runtime.counts.coarse_encoders import PHASES, CoarseEncoders, mean_change
 from runtime.reporting.resolution import advice_section
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")

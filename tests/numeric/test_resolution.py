@@ -12,17 +12,18 @@ import pytest
 
 from runtime.advisor.advice import crossing, sampled
 from runtime.advisor.advisor import ALL, Predictor, torque_sigma
-from runtime.advisor.noise_gain import bandwidth
 from runtime.advisor.position_errors import perturbation
-from runtime.advisor.sign_errors import Switch, kernels, switched, switches
+from runtime.advisor.sign_errors import kernels, switched
 from runtime.compose import advise, observe
+from runtime.core.drives import encoder_drives
 from runtime.core.errors import InputError, ModelError, SettingsError
 from runtime.core.limits import LIMIT
 from runtime.core.model import load_model
 from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque
+from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import decimated, filtered_states
-from runtime.core.signals.states import encoder_drives
+from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Decimate, Lowpass, Signals, study_from_mapping
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records

@@ -28,7 +28,7 @@ import numpy as np
 from runtime.advisor.advice import Sampled, sampled
 from runtime.core.cestac.perturbed import PreparedRecord, Task, prepared_record
 from runtime.core.cestac.rounding import Mode, counted, rounded, stream
-from runtime.core.drives import Drives
+from runtime.core.drives import Drives, encoder_drives, encoder_root
 from runtime.core.least_squares.method import linear_system
 from runtime.core.limits import LIMIT
 from runtime.core.missing import require_positions
@@ -37,14 +37,9 @@ from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
-from runtime.core.signals.states import (
-    Reader,
-    encoder_drives,
-    encoder_position,
-    encoder_root,
-    lowpassed,
-)
-from runtime.core.signals.states import counted as counted_states
+from runtime.core.signals.states import Reader, lowpassed
+from runtime.counts.reader import counted as counted_states
+from runtime.counts.reader import encoder_position
 from runtime.counts.reading import Starts, read_counts
 
 Array = np.ndarray

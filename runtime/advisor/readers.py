@@ -1,5 +1,5 @@
 """How coarse a real encoder may be, read as positions and read as counts: the change of the
-estimate along steps of law phase, by both readers (`runtime.counts.coarse_encoders`).
+estimate along steps of law phase, by both readers (`runtime.advisor.coarse_encoders`).
 
 White noise does not describe a sawtooth that is locked to the motion, still less what a reader of
 counts leaves of it, so no first-order law is used: the curve is a quadrature over the phase.
@@ -24,10 +24,10 @@ from runtime.advisor.advice import (
     limits_of,
     step_text,
 )
+from runtime.advisor.coarse_encoders import CoarseEncoders, ReaderName, mean_change
 from runtime.core.cestac.result import deciding_names
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
-from runtime.counts.coarse_encoders import CoarseEncoders, ReaderName, mean_change
 
 Array = np.ndarray
 

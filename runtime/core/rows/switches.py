@@ -1,0 +1,83 @@
+"""Columns of W that switch with the direction of motion: dry friction, and viscous friction of one direction.
+
+f(s) = linear s + jump sign(s) + kink |s| + a constant,  s = G qd
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from runtime.core.errors import ModelError
+from runtime.core.model import GeneratedModel, elements_of
+
+Array = np.ndarray
+
+SHAPES = {
+    ("coulomb", "both"): (0.0, 1.0, 0.0),
+    ("coulomb", "positive"): (0.0, 0.5, 0.0),
+    ("coulomb", "negative"): (0.0, 0.5, 0.0),
+    ("viscous", "positive"): (0.5, 0.0, 0.5),
+    ("viscous", "negative"): (0.5, 0.0, -0.5),
+}
+"""linear, jump, kink of the elements of friction that switch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Switch:
+    """One column f(s), s = G qd, that enters joint j as G_j f(s), f(s) = linear s + jump sign(s) +
+    kink |s| + a constant.
+
+    column : its number.   G : ndarray, shape (n,).
+    """
+
+    column: int
+    G: Array
+    linear: float
+    jump: float
+    kink: float
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints (from 0) on whose rows it acts."""
+        return tuple(int(j) for j in np.flatnonzero(self.G))
+
+
+def switches(
+    model: GeneratedModel,
+    names: Sequence[str],
+    passive: Literal["refused", "left out"] = "refused",
+) -> tuple[Switch, ...]:
+    """Columns among `names` that switch, from the elements of the model; ModelError where it has
+    none.
+
+    passive : what is done about one that acts along a passive joint.
+    """
+    elements = elements_of(model)
+    switching = []
+    for column, name in enumerate(names):
+        element = elements.get(name, elements.get(name.removesuffix("R")))
+        if element is None:
+            continue
+        kind, direction, along = element
+        shape = SHAPES.get((kind, direction))
+        if shape is None:
+            continue
+        strange = [j for j in along if j not in model.JOINTS]
+        if strange and passive == "left out":
+            continue
+        if strange:
+            raise ModelError(
+                (
+                    f"{name} acts along {strange}, which are no actuated joints; no prediction is "
+                    "made "
+                    "for it"
+                ),
+                file=model.NAME,
+            )
+        G = np.array([along.get(j, 0.0) for j in model.JOINTS])
+        switching.append(Switch(column, G, *shape))
+    return tuple(switching)

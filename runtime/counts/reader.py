@@ -1,0 +1,57 @@
+"""Reader `counts`: positions as counts of encoders (`runtime.counts.reading`), whose posterior mean goes through the filters of the study; errors of the velocities are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from runtime.core.drives import Drives, encoder_drives, encoder_root
+from runtime.core.missing import Missing
+from runtime.core.record import Record
+from runtime.core.signals.filters import SpeedErrors, States, filtered_states
+from runtime.core.study import Signals
+from runtime.counts.lattice import unwrapped_counts
+from runtime.counts.reading import read_counts
+
+Array = np.ndarray
+
+
+def counted(record: Record, signals: Signals) -> States:
+    """Reader `counts`: positions as counts of encoders, whose posterior mean goes through the filters of the study.
+
+    Raises
+    ------
+    InputError
+        Positions that are no counts (`runtime.counts.reading.read_counts`).
+    """
+    drives = encoder_drives(signals.side, record.origin.drives)
+    position = encoder_position(record.q, drives, record.missing)
+    reading = read_counts(position, record.rate, signals.step, name=record.name)
+    q, deviation = reading.motion
+    q = q if drives is None else drives.joint_position(q)
+    states = filtered_states(q, record.rate, replace(signals, median=1))
+    errors = SpeedErrors(deviation, encoder_root(drives, q.shape[1]))
+    findings = tuple(f"{record.name}: {text}." for text in reading.findings)
+    return replace(states, errors=errors, findings=findings)
+
+
+def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) -> Record:
+    """The record as reader counts takes it: counts that start anew after a turn of the counter go
+    on; another reader leaves it as it is. drives : of the robot, for encoders on the motor side.
+    """
+    if signals.reader != "counts":
+        return record
+    drives = encoder_drives(signals.side, drives)
+    position = encoder_position(record.q, drives)
+    known, counts, wraps = unwrapped_counts(position, signals.step, name=record.name)
+    if not wraps:
+        return record
+    x = known.position(counts)
+    return replace(record, q=x if drives is None else drives.joint_position(x))
+
+
+def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
+    """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing."""
+    x = q if drives is None else drives.motor_position(q)
+    return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)
