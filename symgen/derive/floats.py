@@ -1,8 +1,8 @@
-"""Floats, a domain of graph nodes: arrays of any one shape."""
+"""Floats, a domain of graph nodes: arrays of any one shape, or symbols of a package that has their functions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -13,6 +13,7 @@ from symgen.description.expression import FUNCTIONS
 from symgen.description.robot import Robot
 
 Array = np.ndarray[Any, Any]
+NUMPY = {name: getattr(np, f.numpy) for name, f in FUNCTIONS.items() if f.numpy} | {POS: np.maximum}
 LETTERS = {"q": "q", "qd": "QP", "qdd": "QDP"}
 
 
@@ -27,6 +28,8 @@ class Floats:
         Value of each input that is no constant; rad or m and seconds.
     constants : mapping, optional
         In place of those of the robot file.
+    functions : mapping, optional
+        Functions of another package that states are of, such as CasADi.
     """
 
     def __init__(
@@ -34,8 +37,9 @@ class Floats:
         robot: Robot,
         states: Mapping[Symbol, Any] | None = None,
         constants: Mapping[str, Any] | None = None,
+        functions: Mapping[str, Callable[..., Any]] = NUMPY,
     ) -> None:
-        self.robot, self.states = robot, states or {}
+        self.robot, self.states, self.functions = robot, states or {}, functions
         self.constants = {**robot.constants, **(constants or {})}
 
     def symbol(self, symbol: Symbol) -> Any:
@@ -56,12 +60,12 @@ class Floats:
         return float(c)
 
     def function(self, node: Node, x: list[Any]) -> Any:
-        """A function of NumPy."""
+        """A function of the package."""
         if node.op == INV:
             return 1.0 / x[0]
         if node.op == POS:
-            return np.maximum(x[0], 0.0)
-        function = getattr(np, FUNCTIONS[node.op].numpy)
+            return self.functions[POS](x[0], 0.0)
+        function = self.functions[node.op]
         if node.op == SQRT and node.fixed:  # of constants, which may have none
             with np.errstate(invalid="raise"):
                 return function(*x)
