@@ -28,9 +28,9 @@ import numpy as np
 from symgen.certify import call_c
 from symgen.certify.importing import END, HEAD, imported, without_certificate
 from symgen.certify.witness import STATES, Check, Witness
-from symgen.derive.columns import acting, element_names
 from symgen.derive.exact import Array
 from symgen.derive.models import MODELS
+from symgen.derive.regressor import acting, element_names
 from symgen.emit.generate import EMITTERS
 from symgen.emit.targets import TARGETS
 from symgen.version import VERSION

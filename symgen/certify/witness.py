@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symgen.certify.on_request import of_elements, requested_values
+from symgen.derive.assembly import inertia_of
 from symgen.derive.exact import Array
-from symgen.derive.loop_residual import inertia_of
 from symgen.derive.loops import close
 from symgen.derive.models import EMITTED, ON_REQUEST
 from symgen.description.expression import ONE

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from symgen.derive.columns import element_names
 from symgen.derive.geometry import Geometry, Rotation
 from symgen.derive.names import Names
+from symgen.derive.regressor import element_names
 from symgen.derive.scalar import Scalar, Vector, add, cross, dot, mul, scale, sub, vadd
 from symgen.description.robot import FIXED, INERTIAL, PRISMATIC, parameter
 

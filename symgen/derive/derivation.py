@@ -16,15 +16,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import columns, element_names
 from symgen.derive.composite import CompositeLinks
 from symgen.derive.elements import element_column
+from symgen.derive.frames import frame_poses
 from symgen.derive.geometry import Geometry
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.kinematics import frame_poses
 from symgen.derive.loops import close
 from symgen.derive.newton_euler import Motion, joint_torques
 from symgen.derive.numbers import numbered
+from symgen.derive.regressor import columns, element_names
 from symgen.derive.scalar import Matrix, Scalar, Vector, add, mul
 from symgen.description.robot import Robot
 

@@ -44,7 +44,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symgen.derive.loop_residual import inertia_of, newton
+from symgen.derive.assembly import inertia_of, newton
 from symgen.derive.loops import close
 from symgen.description.expression import FUNCTIONS, Expression
 from symgen.description.kinds import CHANNEL

@@ -1,6 +1,6 @@
 """The closure equations of general loops: as many as there are tied joints, with Jacobian and curvature.
 
-`equations` are the rows of `loop_residual.residuals` that determine the tied joints best at the start configuration. Then
+`equations` are the rows of `assembly.residuals` that determine the tied joints best at the start configuration. Then
 
     r(q) = 0 ,    J qd = 0 ,    J qdd + Jd qd = 0 .
 
@@ -15,11 +15,11 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from symgen.derive.assembly import Array, differences, loop_ends, newton, residuals
 from symgen.derive.closure import Closure
 from symgen.derive.derivation import Derivation, derive
 from symgen.derive.floats import Floats, states_of
 from symgen.derive.graph import Symbol, interpret, rates
-from symgen.derive.loop_residual import Array, differences, loop_ends, newton, residuals
 from symgen.derive.scalar import Scalar, dot
 from symgen.description.robot import REVOLUTE, Robot
 

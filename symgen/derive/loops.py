@@ -19,15 +19,23 @@ from itertools import product
 
 import numpy as np
 
-from symgen.derive.assembly import STEPS, TOLERANCE, Assembly, declared_relations
+from symgen.derive.assembly import (
+    STEPS,
+    TOLERANCE,
+    Array,
+    Assembly,
+    coincidence,
+    declared_relations,
+    loop_ends,
+    newton,
+)
 from symgen.derive.closure import Closure, Relation, open_tree
 from symgen.derive.exact import Draw
 from symgen.derive.floats import Floats, states_of
+from symgen.derive.frames import frame_poses
 from symgen.derive.geometry import Geometry
 from symgen.derive.graph import interpret
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.kinematics import frame_poses
-from symgen.derive.loop_residual import Array, coincidence, loop_ends, newton
 from symgen.description.expression import ONE, PI, ZERO, Expression, quarter_turns
 from symgen.description.robot import PRISMATIC, REVOLUTE, Loop, Robot
 from symgen.errors import DescriptionError

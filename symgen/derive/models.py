@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from symgen.derive.columns import element_names
 from symgen.derive.derivation import Derivation
 from symgen.derive.energies import (
     Columns,
@@ -24,6 +23,7 @@ from symgen.derive.graph import Symbol
 from symgen.derive.loop_equations import LoopSystem
 from symgen.derive.model import Case, Entry, Model, Place, Request, equations
 from symgen.derive.names import Names
+from symgen.derive.regressor import element_names
 from symgen.derive.rewrite import Input
 from symgen.derive.scalar import Vector
 from symgen.description.expression import ONE, ZERO

@@ -1,21 +1,79 @@
-"""The regressor in axis form: Gamma_i = sum_k D_ik chi_k, column by column, without propagating a
-wrench.
+"""The columns of the standard regressor, by name: Gamma_a = sum_k D_k chi_k in the actuated joints; those of the inertial parameters in axis form, without propagating a wrench.
 
-Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame
-j,
+Joint i feels the unit wrench (F, N) of a parameter of link j through its own axis seen from frame j,
 
     D_ik = z_ij . N_k + v_ij . F_k
 
-z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are
-carried outward:
-z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its direction.
+z_ij the axis of joint i in frame j, v_ij the velocity of O_j per unit rate of joint i; both are carried outward: z <- jRi' z, v <- jRi' (v + z x P). A prismatic joint has z = 0 and v = its direction.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+from symgen.derive.elements import element_column
 from symgen.derive.newton_euler import LinkMotion, Motion, force, moment
 from symgen.derive.scalar import E3, ZERO3, Scalar, Vector, add, cross, dot, vadd
-from symgen.description.robot import FIXED, INERTIAL, REVOLUTE
+from symgen.derive.time_limit import require_time
+from symgen.description.expression import Expression
+from symgen.description.robot import (
+    FIXED,
+    INERTIAL,
+    KINDS,
+    PRISMATIC,
+    REVOLUTE,
+    Element,
+    Robot,
+    parameter,
+)
+
+UNITS_OF_LINKS = {"M": "kg", "MX": "kg*m", "MY": "kg*m", "MZ": "kg*m"}
+
+
+@lru_cache(maxsize=16)
+def inertial_names(robot: Robot) -> dict[str, tuple[str, int]]:
+    """{name: (inertial parameter, link)}."""
+    return {parameter(p, j): (p, j) for j in robot.links for p in INERTIAL}
+
+
+def element_names(robot: Robot) -> dict[str, tuple[Element, int]]:
+    """{name: (element, key)}."""
+    return {parameter(e.family, j): (e, j) for e in robot.elements for j in e.keys}
+
+
+def acting(e: Element, j: int) -> dict[Any, Expression]:
+    """Row {joint: G}, or form {(i, k): B}, i <= k, of an element's key."""
+    form = {place: b for place, b in sorted(e.form.get(j, {}).items()) if place[0] <= place[1]}
+    return form or dict(e.along[j])
+
+
+def unit(robot: Robot, name: str) -> str:
+    """Unit of a standard parameter, by family and by what its joint does."""
+    inertial = inertial_names(robot)
+    if name in inertial:
+        return UNITS_OF_LINKS.get(inertial[name][0], "kg*m**2")
+    e, j = element_names(robot)[name]
+    return e.unit or KINDS[e.kind].units[robot.frame(j).sigma == PRISMATIC]
+
+
+def columns(motion: Motion, names: Iterable[str]) -> dict[str, dict[int, Scalar]]:
+    """{name: {actuated joint: D}} of the standard parameters `names`."""
+    robot, closure, algebra = motion.robot, motion.geometry.closure, motion.algebra
+    inertial, elements = inertial_names(robot), element_names(robot)
+    axes = Axes(motion)
+    algebra.section("Contributions that several joints share")
+    result: dict[str, dict[int, Scalar]] = {}
+    for name in names:
+        require_time()
+        tree = (
+            axes.column(*inertial[name])
+            if name in inertial
+            else element_column(motion, *elements[name])
+        )
+        result[name] = closure.project(algebra, tree)
+    return result
 
 
 def unit_wrench(m: LinkMotion, parameter: str) -> tuple[Vector, Vector]:

@@ -9,8 +9,8 @@ from textwrap import wrap
 from typing import Any
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import element_names, unit
 from symgen.derive.names import FAMILIES, families_of
+from symgen.derive.regressor import element_names, unit
 from symgen.description.kinds import TRANSMITTED
 from symgen.description.robot import FIXED, KINDS, Element, Robot
 from symgen.emit.printers import Text

@@ -12,10 +12,10 @@ from textwrap import wrap
 from typing import Any
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import acting, element_names
 from symgen.derive.loop_equations import loop_system
 from symgen.derive.model import Model
 from symgen.derive.models import EMITTED, ON_REQUEST
+from symgen.derive.regressor import acting, element_names
 from symgen.description.expression import Expression
 from symgen.description.robot import FIXED, PRISMATIC, Robot
 from symgen.emit.blocks import Block, FunctionPrinter

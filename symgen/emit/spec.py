@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.derivation import Derivation, derive
 from symgen.derive.graph import ADD, COS, MUL, SIN, SYM, Node, Scalar, Symbol, reachable
 from symgen.derive.model import Entry, Model, Place, Request, Values, labels, rewriting
 from symgen.derive.models import MODELS
+from symgen.derive.regressor import element_names, inertial_names
 from symgen.derive.rewrite import Rewrite
 from symgen.description.naming import Namespace
 from symgen.description.robot import Robot

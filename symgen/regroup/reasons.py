@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from symgen.derive.columns import inertial_names
+from symgen.derive.regressor import inertial_names
 from symgen.description.expression import ONE
 from symgen.description.fields import Path, dotted
 from symgen.description.robot import PRISMATIC, REVOLUTE, Robot

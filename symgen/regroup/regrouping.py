@@ -14,11 +14,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from symgen.derive.columns import element_names, inertial_names
 from symgen.derive.elements import is_opaque
 from symgen.derive.exact import Draw
 from symgen.derive.loops import close
 from symgen.derive.numbers import numbered
+from symgen.derive.regressor import element_names, inertial_names
 from symgen.derive.time_limit import limited
 from symgen.description.expression import (
     ONE,

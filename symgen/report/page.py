@@ -22,8 +22,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from symgen.derive.closure import Closure
-from symgen.derive.columns import unit
 from symgen.derive.loops import close
+from symgen.derive.regressor import unit
 from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
 from symgen.emit.header import informative_columns

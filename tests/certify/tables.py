@@ -12,9 +12,9 @@ from certify.printed import definitions, evaluated
 
 from symgen.certify.texts import same_elements
 from symgen.certify.witness import Witness
-from symgen.derive.columns import unit
 from symgen.derive.exact import Array
 from symgen.derive.loops import close
+from symgen.derive.regressor import unit
 from symgen.emit.header import channels, scalars
 
 EVALUATED_TWICE = 1e-9  # of the largest: formulas and rows evaluated twice

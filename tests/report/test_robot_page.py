@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from oracles.named_robots import planar_2r
 from runtime.core.model import load_model
 from symgen.cli.main import app
-from symgen.derive.columns import inertial_names
+from symgen.derive.regressor import inertial_names
 from symgen.description import load_robot
 from symgen.description.expression import Call, Expression
 from symgen.description.grammar import parse
