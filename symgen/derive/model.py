@@ -19,6 +19,8 @@ from symgen.description.expression import ZERO
 Place = tuple[int, ...]
 LOOP_RESIDUALS = 6  # of a loop: three of position, three of orientation
 
+TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")  # of an origin, and the angular velocity
+
 
 @dataclass(frozen=True)
 class Request:
@@ -208,7 +210,7 @@ def labels(d: Derivation, axis: str, parameters: Sequence[str]) -> tuple[str, ..
         case "pose":
             return ("1", "2", "3", "4")
         case "twist":
-            return ("vx", "vy", "vz", "wx", "wy", "wz")
+            return TWIST
         case "wrench":
             return ("fx", "fy", "fz", "nx", "ny", "nz")
         case "energies":

@@ -1,10 +1,9 @@
 """The page of a robot as one HTML file that opens anywhere: one script and one style sheet inside,
-no request to anyone. jinja2 only here.
+no request to anyone.
 
-Names, titles and expressions are escaped by the template or by `mathml`; numbers for the
-script are JSON in which <, > and & are
-written as escapes; the content security policy allows this script and this style sheet by their
-hashes, hence nothing else.
+Names, titles and expressions are escaped by the template or by `symbols.printers`; numbers for the
+script are JSON in which <, > and & are written as escapes; the content security policy allows this
+script and this style sheet by their hashes, hence nothing else.
 """
 
 from __future__ import annotations

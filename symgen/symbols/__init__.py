@@ -2,7 +2,6 @@
 SymPy, LaTeX, MathML, text.
 
 The recursions of `derive` give every model as nodes of one graph, as they do for emitted modules. A
-closed form multiplies the graph out
-(`polynomial`, `closed`), a listing reads its steps in their order (`listing`). sympy is loaded by
-`sympy_objects` alone, when an object is asked for.
+closed form multiplies the graph out (`expansion`), a listing reads its steps in their order
+(`listing`); both are written by SymPy's printers with the letters of the literature (`printers`).
 """

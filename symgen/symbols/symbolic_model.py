@@ -13,7 +13,7 @@ from typing import Any
 from symgen.derive.frames import Frames
 from symgen.derive.graph import Angle, Scalar, Symbol
 from symgen.derive.graph_algebra import GraphAlgebra
-from symgen.derive.model import Model, Place, Request, labels, rewriting
+from symgen.derive.model import TWIST, Model, Place, Request, labels, rewriting
 from symgen.derive.models import MODELS
 from symgen.description.expression import Expression
 from symgen.errors import SymgenError
@@ -23,7 +23,6 @@ from symgen.symbols.expansion import Expansion, Polynomial, TooManyTermsError, l
 from symgen.symbols.expressions import Tree
 from symgen.symbols.listing import Listing
 
-TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 LARGEST_DIRECT = 3  # joints of a direct model in closed form
 LARGEST = 10_000  # terms of a model, multiplied out
 

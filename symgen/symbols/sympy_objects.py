@@ -94,6 +94,14 @@ def source_text(name: str, steps: list[tuple[Any, Any]], value: Any) -> str:
         made_by = f"{package}.symbols({' '.join(free)!r}, real=True, seq=True)"
         lines.append(f"{', '.join(free)}{',' * (len(free) == 1)} = {made_by}")
     for x, e in [*steps, (name, value)]:
-        exact = RATIONAL.sub(r"Rational(\1, \2)", sympy.printing.sstr(e))
+        exact = RATIONAL.sub(r"Rational(\1, \2)", _written(e))
         lines.append(f"{x} = {OF_SYMPY.sub(f'{package}.', exact)}")
     return "\n".join(lines)
+
+
+def _written(e: Any) -> str:
+    """An expression, or a matrix row by row without the blanks that align its columns."""
+    if not isinstance(e, sympy.MatrixBase):
+        return str(sympy.printing.sstr(e))
+    rows = (f"[{', '.join(map(sympy.printing.sstr, row))}]" for row in e.tolist())
+    return "Matrix([\n" + ",\n".join(rows) + "])"
