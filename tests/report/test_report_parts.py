@@ -21,7 +21,7 @@ from runtime.expected import Expected
 from runtime.reporting.parameters import cad_values, correlation_matrix, roles_of
 from runtime.reporting.sections import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
-from symgen.symbols.letters import letter as other_symbol
+from symgen.symbols.printers import letter as other_symbol
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = ("tx40", "haptic", "panda", "emps", "sr400")
