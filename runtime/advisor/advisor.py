@@ -56,14 +56,13 @@ from runtime.core.cestac.rounding import VARIANCE, Mode
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.least_squares.linear import assemble
-from runtime.core.least_squares.method import linear_system
+from runtime.core.least_squares.method import linear_estimate, linear_system
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import stack
-from runtime.core.rows.prepared import common_drives
+from runtime.core.rows.prepared import common_drives, stacked
 from runtime.core.study import Study, to_mapping
 
 Array = np.ndarray
@@ -168,10 +167,10 @@ def advise(
     measured = (
         stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     )
+    rows = stacked(model, as_measured, names)
+    origins = {**problem.provenance, **(provenance or {})}
+    reference = linear_estimate(rows, linear, model=model, provenance=origins)
     system = linear_system(measured, linear)
-    reference = assemble(
-        system, system.solve(), model=model, provenance={**problem.provenance, **(provenance or {})}
-    )
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])
     decisive = [names.index(name) for name in deciding_names(reference)]
     every = range(len(model.JOINTS))

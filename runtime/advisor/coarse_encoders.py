@@ -106,7 +106,7 @@ class CoarseEncoders:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
             part = prepared_record(own, study, drives)
             read = part.states or filtered_states(part.q, part.rate, part.selection.signals)
-            states = replace(read, errors=None)
+            states = replace(read, errors=None, channels=part.channels)
             q = encoder_position(states.q, side)
             at_encoders = States(q, states.qd @ into, states.qdd @ into)
             x = encoder_position(own.record.q, side)
@@ -263,7 +263,7 @@ class CoarseEncoders:
         for part, error in zip(self.parts, errors, strict=True):
             q, qd, qdd = (self.root * chosen) @ error[:3]
             own, selection = part.states, part.record.selection
-            states = States(own.q + q.T, own.qd + qd.T, own.qdd + qdd.T)
+            states = replace(own, q=own.q + q.T, qd=own.qd + qd.T, qdd=own.qdd + qdd.T)
             speeds = replace(states, errors=SpeedErrors(error[3].T * chosen, self.root))
             rows = speeds[selection.samples][selection.kept]
             certain = selection.mask & certain_rows(self.task.model, rows)

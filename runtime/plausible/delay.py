@@ -24,8 +24,9 @@ from runtime.core.documents import Result
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
 from runtime.core.markup import number
-from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.model import GeneratedModel, is_axis, joint_labels
 from runtime.core.problem import Problem
+from runtime.core.rows.regressor import in_time
 from runtime.core.signals.states import require_motion
 from runtime.core.table import Table
 from runtime.plausible.bodies import Grams, solved
@@ -176,8 +177,11 @@ class Shifts:
         spline = CubicSpline(record.t, tau)
         self.torques = [PPoly(spline.c[:, :, j], spline.x) for j in range(self.n)]
 
+        channels = in_time(model, states)
+
         def W(k: Array) -> Array:
-            return np.asarray(model.regressor(states.q[k], states.qd[k], states.qdd[k]))
+            timed = {name: x[k] for name, x in channels.items()}
+            return np.asarray(model.regressor(states.q[k], states.qd[k], states.qdd[k], **timed))
 
         self.D = W(kept)
         self.rate = (W(kept + 1) - W(kept - 1)) * (record.rate / 2)
@@ -191,6 +195,8 @@ class Shifts:
             for k in (-smeared, -smeared // 2, smeared // 2, smeared)
         ]
         moving = np.abs(states.qd[kept]) > LIMIT.STANDING * np.abs(states.qd).max(axis=0)
+        axes = [is_axis(joint) for joint in model.JOINTS]  # of force sensors, which joints move
+        moving[:, axes] = moving.any(axis=1, keepdims=True)
         self.mask = moving & ~(np.any(steps, axis=0) & flat).any(axis=2)
 
     def shifted(self, shift: Array) -> Array:
@@ -204,7 +210,7 @@ class Shifts:
         Y = self.shifted(shift)
         grams = Grams.of(self.D, Y, self.mask)
         rows = np.maximum(self.mask.sum(axis=0), 1)
-        sigma = np.sqrt(np.maximum(grams.measured, 1e-300) / rows)
+        sigma = np.sqrt(np.where(grams.measured > 0, grams.measured, 1.0) / rows)
         for _ in range(4):
             X = solved(*grams.weighted(sigma))
             sigma = np.maximum(np.sqrt(grams.squares(X) / rows), 1e-6 * sigma)

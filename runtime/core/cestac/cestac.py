@@ -5,6 +5,7 @@ done to the estimate?
               eqs. (15), (28), `runtime.core.cestac.rounding`
     W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC), through the filters of the study: eq. (16)
     X_CESTAC = least squares of Y on W_CESTAC, Y as measured: eq. (17)
+    X_LS     = the estimate of the identification on these columns, with the median of the study
 
 N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the deviation (19), %sigma (20), %e
 (21) and the residual (22); `runtime.core.cestac.result` holds them
@@ -33,7 +34,7 @@ from runtime.compiled.model import target_of
 from runtime.core.cestac.perturbed import (
     PreparedRecord,
     Task,
-    perturbed,
+    measured_rows,
     prepared_records,
     study_columns,
 )
@@ -141,7 +142,7 @@ def cestac(
         methods=problem.methods,
         loop=loop,
     )
-    measured = perturbed(task.columns, task, Level(0.0), ())
+    measured = measured_rows(task, as_measured)
     whole = [reading.record for reading in as_measured]
     origins = {**problem.provenance, **(provenance or {})}
     point = point_estimate(task.estimate, problem.methods)

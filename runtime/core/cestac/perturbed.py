@@ -277,6 +277,13 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
     return observation if loop is None else loop.perturbed(observation, positions)
 
 
+def measured_rows(task: Task, records: Sequence[Prepared]) -> Observation:
+    """Rows of the records as the identification has them, with the median of its signals; those of a run without steps where the loop is simulated and where positions that are no counts count as exact."""
+    if task.loop is not None or any(record.note for record in task.records):
+        return perturbed(task.columns, task, Level(0.0), ())
+    return stacked(task.model, records, task.names)
+
+
 def run_position(task: Task, record: PreparedRecord, level: Level, key: Sequence[int]) -> Array:
     """q_CESTAC of one run, from the measured positions or, where steps are hardly coarser than
     those of the record, from a draw.

@@ -61,7 +61,7 @@ class Observation:
     record : ndarray of int, shape (r,)
         Number of the record of each row, from 0.
     rate : float, Hz
-        Rows per second of one joint after decimation.
+        Rows per second of one joint after decimation, of the fastest record.
     dropped : mapping of str to tuple of int
         Rows left out, per joint, by reason ("trim", "low_speed", "mask"), counted after decimation.
     settings : mapping
@@ -72,6 +72,8 @@ class Observation:
         What can simulate the same rows with other parameters, where it is known.
     findings : tuple of str
         What the reader of counts says of the encoders, a sentence each.
+    rates : tuple of float, Hz
+        Rows per second of each record; none of an observation of one record.
     """
 
     W: Array
@@ -86,6 +88,7 @@ class Observation:
     files: Mapping[str, str] = field(default_factory=dict)
     closed_loop: LoopRows | None = None
     findings: tuple[str, ...] = ()
+    rates: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         r = sum(self.rows)
@@ -187,7 +190,8 @@ class Observation:
 
     def of_record(self, number: int) -> Observation:
         """The rows of one record, number from 0."""
-        return self.where(self.record == number)
+        rate = self.rates[number] if self.rates else self.rate
+        return replace(self.where(self.record == number), rate=rate, rates=())
 
     def norms(self, names: Sequence[str], X: Array) -> tuple[Array, Array]:
         """||Y_j - W_j X|| with the columns `names`, and ||Y_j||, of every joint, N m or N, shape
@@ -324,6 +328,7 @@ def stack(observations: Sequence[Observation]) -> Observation:
         settings=same_settings([o.settings for o in observations]),
         files=all_files([o.files for o in observations]),
         findings=tuple(dict.fromkeys(text for o in observations for text in o.findings)),
+        rates=tuple(rate for o in observations for rate in (o.rates or (o.rate,))),
     )
 
 
