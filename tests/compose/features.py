@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 import symgen
-from runtime.reading.records import read_records
 from runtime.core.record import Record
 from runtime.core.study import Study, study_from_mapping
+from runtime.reading.records import read_records
 from runtime.wrench import WrenchModel
 from symgen.description.yaml import parse_robot
 
@@ -61,6 +61,7 @@ class Case:
     records: tuple[Record, ...]
     unseen: tuple[Record, ...]
     study: Study
+    feature: str = ""
 
 
 def arm(columns: str = "", values: str = "", options: tuple[str, ...] = ()) -> Any:
@@ -98,9 +99,11 @@ def noise(seed: int, shape: tuple[int, ...], deviation: float = 0.03) -> Any:
     return deviation * np.random.default_rng(seed + 100).standard_normal(shape)
 
 
-def record(model: Any, seed: int, rate: float = RATE, **functions: Any) -> Record:
+def record(
+    model: Any, seed: int, rate: float = RATE, seconds: float = SECONDS, **functions: Any
+) -> Record:
     """A record of the motion; functions : constants and channels of the module."""
-    t, q, qd, qdd = motion(seed, rate)
+    t, q, qd, qdd = motion(seed, rate, seconds)
     tau = model.inverse_dynamics(q, qd, qdd, parameters(model), **functions)
     return Record(t, q, tau + noise(seed, q.shape), rate=rate, name=f"run {seed}")
 
@@ -111,7 +114,9 @@ def study(**sections: Any) -> Study:
     return study_from_mapping({"signals": signals, "cestac": CESTAC, **sections})
 
 
-def pair(model: Any, change: Callable[[Record], Record] = lambda record: record, **options: Any) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+def pair(
+    model: Any, change: Callable[[Record], Record] = lambda record: record, **options: Any
+) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
     """A record that is fitted and one that is predicted."""
     return (change(record(model, 0, **options)),), (change(record(model, 1, **options)),)
 
@@ -190,7 +195,6 @@ def _by_law(folder: Path, late: float = 0.0, **law: Any) -> Case:
     model = arm()
     for seed in (0, 1):
         t, q, qd, qdd = motion(seed)
-        _, *future = motion(seed)
         tau = model.inverse_dynamics(q, qd, qdd, parameters(model))
         ahead = np.array([np.interp(t + late, t, x) for x in tau.T]).T
         followed = q + (ahead + LAW["kd"] * qd - LAW["kd"] * 1.1 * qd) / LAW["kp"]
@@ -198,9 +202,7 @@ def _by_law(folder: Path, late: float = 0.0, **law: Any) -> Case:
         np.savez(folder / f"law{seed}.npz", **arrays)
     columns = {"t": "t", "q": "q", "qd": "qd", "q_ref": "r", "qd_ref": "rd"}
     both = [{"files": str(folder / f"law{seed}.npz"), "columns": columns} for seed in (0, 1)]
-    settings = study(
-        record=both[0], validate={"record": both[1]}, controller={"law": LAW | law}
-    )
+    settings = study(record=both[0], validate={"record": both[1]}, controller={"law": LAW | law})
     fitted = read_records(settings.record, model)
     unseen = read_records(settings.validate.record, model)
     return Case(model, tuple(fitted), tuple(unseen), settings)
@@ -216,7 +218,7 @@ def law_with_delay(folder: Path) -> Case:
 
 def counts(folder: Path) -> Case:
     model = arm()
-    records = pair(model, lambda r: replace(r, q=STEP * np.round(r.q / STEP)))
+    records = pair(model, lambda r: replace(r, q=STEP * np.round(r.q / STEP)), seconds=5.0)
     settings = study(
         signals={"reader": "counts", "step": STEP}, cestac=CESTAC | {"rounding": "phase"}
     )
@@ -229,9 +231,7 @@ def missing_samples(folder: Path) -> Case:
     samples[400:403, 0] = True
 
     def with_gap(record: Record) -> Record:
-        return Record(
-            record.t, record.q, record.tau, rate=RATE, name=record.name, missing=samples
-        )
+        return Record(record.t, record.q, record.tau, rate=RATE, name=record.name, missing=samples)
 
     records = tuple(map(with_gap, case.records))
     return replace(case, records=records, unseen=tuple(map(with_gap, case.unseen)))
