@@ -77,7 +77,7 @@ MENDING: dict[str, set[str]] = {  # edges that are to go
     "json_files": {"reading"},
     "link_side": {"reading"},
     "loop": {"compiled", "excitation", "reading"},
-    "plausible": {"excitation", "reading", "speeds"},
+    "plausible": {"speeds"},
     "reading": {"controller", "loop", "study_files", "yaml_text"},
     "reporting": {
         "advisor",

@@ -24,7 +24,8 @@ import numpy as np
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
-from runtime.excitation.criteria import MotionLimits, Weights
+from runtime.core.rows.predicted import Weights
+from runtime.excitation.criteria import MotionLimits
 from runtime.excitation.families import Fourier
 from runtime.excitation.result import Start
 from runtime.excitation.settings import ExcitationSettings

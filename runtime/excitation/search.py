@@ -24,17 +24,10 @@ from runtime.core.estimation import estimated, observed
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, require, require_no_channels
 from runtime.core.problem import Problem
+from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.signals.states import require_motion
 from runtime.core.study import Study
-from runtime.excitation.criteria import (
-    Weights,
-    criterion_of,
-    excesses,
-    kept_correlation,
-    limits_of,
-    planned,
-    weights_of,
-)
+from runtime.excitation.criteria import criterion_of, excesses, limits_of, planned, weights_of
 from runtime.excitation.optimiser import Search, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.excitation.settings import ExcitationSettings

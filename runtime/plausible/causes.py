@@ -24,7 +24,6 @@ import numpy as np
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, drives_of, joint_labels, joint_units
 from runtime.plausible.samples import Samples
-from runtime.reading.units import torque_unit
 
 Array = np.ndarray
 Item = Mapping[str, Any]
@@ -35,7 +34,15 @@ Maps = dict[str, Any]
 DEGREE = np.pi / 180
 TURNS = {"90 degrees": np.pi / 2, "-90 degrees": -np.pi / 2, "180 degrees": np.pi}
 LENGTHS = {"1000": 1e3, "1/1000": 1e-3}
-TORQUE_UNITS = ("kN*m", "N*mm", "N*cm", "kgf*cm", "lbf*inch", "ozf*inch")
+TORQUE_UNITS = {
+    "kN*m": 1e3,
+    "N*mm": 1e-3,
+    "N*cm": 1e-2,
+    "kgf*cm": 0.0980665,
+    "lbf*inch": 0.1129848290276167,
+    "ozf*inch": 0.0070615518142260435,
+}
+"""Units of torque that are read as N m, in N m."""
 GUESSES = {
     2**0.5: "1.41: effective for peak values",
     3**0.5: "1.73: phase for line values",
@@ -301,8 +308,8 @@ def orders(robot: Robot) -> Iterator[Item]:
 
 def torque_units(robot: Robot) -> Iterator[Item]:
     """Units of torques of turning joints."""
-    for unit in TORQUE_UNITS if robot.turning.all() else ():
-        yield {"unit": unit, "factor": torque_unit(unit)[1]}
+    for unit, factor in TORQUE_UNITS.items() if robot.turning.all() else ():
+        yield {"unit": unit, "factor": factor}
 
 
 def position_units(robot: Robot) -> Iterator[Item]:

@@ -3,7 +3,7 @@ tell, from W alone, before anything is fitted? Friction at rest is no law of mot
 
     share_i = 100 sigma_i ||W_w,i|| / ||Y_w||
             rows of W_w, Y_w divided by the deviation of their torque, sigma_i as
-            `runtime.excitation` predicts it
+            `runtime.core.rows.predicted` predicts it
 
 is the predicted deviation of parameter i in % of the value with which it alone would make all of
 the measured torque. A larger value is not to be expected, so
@@ -23,10 +23,10 @@ from runtime.core.estimation import estimate_of
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
 from runtime.core.rows.observation import Observation
+from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
 from runtime.core.study import EstimateSettings, Signals, Study
-from runtime.excitation.criteria import Weights, kept_correlation
 from runtime.plausible.case import Case
 from runtime.plausible.samples import Samples
 from runtime.speeds import agreement

@@ -1,0 +1,96 @@
+"""Deviations that the parameters of an observation will have, from W alone.
+
+    W_w = diag(1/s_j) W diag(|X_i|)               rows of joint j over the deviation s_j of its torque
+    C = A W_w'Omega W_w A,  A = (W_w'W_w)^-1      predicted covariance of X_i/|X_i|
+
+Omega is what the decimation makes of white torque noise: neighbouring rows are correlated, which
+costs a tenth of the precision or more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from runtime.core.rows.observation import Observation
+from runtime.core.signals.filters import decimation_factor
+from runtime.core.signals.noise_gain import bandwidth
+from runtime.core.study import Signals
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Scales of the rows and columns of W_w.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Columns, c of them.
+    s : ndarray, shape (n,), N m or N
+        Deviation of each torque.
+    size : ndarray, shape (c,), SI
+        Of each parameter.
+    """
+
+    names: tuple[str, ...]
+    s: Array
+    size: Array
+
+    def matrix(self, observation: Observation) -> Array:
+        """W_w, shape (r, c)."""
+        return np.asarray(
+            observation.columns(self.names).W / self.s[observation.joints][:, None] * self.size
+        )
+
+    def condition(self, observation: Observation) -> float:
+        """Condition number of W_w; inf where it is singular."""
+        values = np.linalg.svd(np.linalg.qr(self.matrix(observation), mode="r"), compute_uv=False)
+        return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+    def relative_sigma(
+        self, observation: Observation, correlation: Sequence[float] | Array = (1.0,)
+    ) -> Array:
+        """Predicted %sigma of the parameters, shape (c,), of their size.
+
+        correlation : of the torque noise of a joint between rows 0, 1, 2 ... sampling periods apart
+        (`kept_correlation`).
+        """
+        W = self.matrix(observation)
+        inverse = np.linalg.inv(np.linalg.qr(W, mode="r"))
+        spread = np.zeros((W.shape[1], W.shape[1]))  # W' Omega W
+        instant = np.rint((observation.t - observation.t.min()) * observation.rate).astype(int)
+        instant += observation.record * (
+            int(instant.max(initial=0)) + len(correlation)
+        )  # no two records are neighbours
+        known = np.append(correlation, 0.0)
+        for j in range(observation.n):
+            own = observation.joint(j)
+            acting = np.flatnonzero(W[own].any(axis=0))
+            at, rows = instant[own], W[own][:, acting]
+            upper = correlation[0] / 2 * rows  # Omega W_j, of Omega the upper half alone
+            for k in range(
+                1, len(correlation)
+            ):  # rows: as many periods apart, or more where some between are left out
+                r = known[np.minimum(at[k:] - at[:-k], len(correlation))]
+                upper[:-k] += r[:, None] * rows[k:]
+            product = rows.T @ upper
+            spread[np.ix_(acting, acting)] += product + product.T
+        C = inverse @ inverse.T @ spread @ inverse @ inverse.T
+        return np.asarray(100 * np.sqrt(np.diag(C)))
+
+
+def kept_correlation(signals: Signals, rate: float) -> Array:
+    """Correlation that the decimation leaves between rows 0, 1, 2 ... kept samples apart where the
+    torque noise is white at `rate`, Hz.
+    """
+    factor = decimation_factor(signals, rate)
+    kept = (
+        bandwidth(replace(signals, median=1), rate).decimation[::factor]
+        if factor > 1
+        else np.ones(1)
+    )
+    return np.asarray(kept[: 1 + np.max(np.flatnonzero(np.abs(kept) > 1e-3 * kept[0]))] / kept[0])
