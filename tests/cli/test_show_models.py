@@ -15,7 +15,7 @@ def run(*arguments):
 
 
 def of_links(model, *arguments):
-    """Of the smallest arm in standard parameters, which ask for no certificate."""
+    """Of the smallest arm in standard parameters."""
     return run("planar_2r", "--model", model, "--parameters", "standard", *arguments).stdout
 
 
@@ -33,6 +33,7 @@ def test_frames_values_forms_and_formats():
     listed = of_links("inverse_dynamics", "--form", "recursive")
     assert "  W32 = QP1 + QP2" in listed and "28 standard parameters" in listed
     assert of_links("pose", "--format", "latex").startswith("\\documentclass")
+    assert of_links("pose", "--format", "latex-fragment").startswith("\\begin{align*}")
     assert "A = sympy.Matrix([" in of_links("inertia_matrix", "--format", "sympy")
     assert (
         json.loads(of_links("friction", "--json"))["entries"]["F(1)"] == "QP1*FV1 + sign(QP1)*FS1"
@@ -63,6 +64,7 @@ def test_frames_values_forms_and_formats():
         (("planar_2r", "--model", "gravity", "--html"), "--html shows everything"),
         (("tx40", "--frame", "2"), "need --model"),
         (("tx40", "--format", "sympy"), "need --model"),
+        (("tx40", "--format", "latex-fragment"), "need --model"),
     ],
 )
 def test_bad_input(arguments, told):
