@@ -1,18 +1,17 @@
-"""One run of a resolution study: the plain pipeline, the path of NumPy and that with the regressor
-in C, and two workers against one.
+"""One run of a resolution study: the plain pipeline and ours, and two workers against one.
 
     python benchmarks/cestac_run.py [--rounds 7] [--runs 2000]
 
 A run perturbs every sample of the position (two-point, 2 pi/5000), filters, evaluates W, decimates
 by 40 and solves Y = W X. Plain: low-pass by
 scipy, the dense W of the emitted NumPy module, scipy.signal.decimate column by column,
-numpy.linalg.lstsq; Y is decimated once for all three. TX40,
+numpy.linalg.lstsq; Y is decimated once for both. TX40,
 on its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000
 samples with 60 columns.
 
 One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every
-round, ratios per round as median [range]. X of the
-three is compared before timing. Workers: processes, the one that asks among them, wall time of a
+round, ratios per round as median [range]. X of both
+is compared before timing. Workers: processes, the one that asks among them, wall time of a
 whole study with its start, with the load of the
 machine. Goal: two workers 1.6 times faster than one.
 """
@@ -30,7 +29,6 @@ import argparse
 import platform
 import statistics
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -41,8 +39,6 @@ import scipy
 from rounds import interleave, processor, ratio
 
 from runtime import Record, Study, load_model
-from runtime.compiled.cache import FallbackWarning, compiler
-from runtime.compiled.model import compiled_model
 from runtime.compose import cestac, observe, problem
 from runtime.core.cestac.cestac import levels_of
 from runtime.core.cestac.perturbed import Task, perturbed_position, prepared_record
@@ -105,33 +101,23 @@ def measure(
     names: tuple[str, ...],
     rounds: int,
 ) -> None:
-    task, in_c = (
-        task_of(module, record, study, names),
-        task_of(compiled_model(module), record, study, names),
-    )
+    task = task_of(module, record, study, names)
     part = task.records[0]
-    columns, columns_in_c = task.columns, in_c.columns
+    columns = task.columns
     N, K = part.selection.samples.stop - part.selection.samples.start, len(part.selection.kept)
     print(f"\n{title}: {len(record.q)} samples, {N} of them used, {K} kept, {len(names)} columns")
     X = plain_run(task, KEY)
-    for label, found in (
-        ("NumPy", one_run(columns, task, KEY).X),
-        ("C", one_run(columns_in_c, in_c, KEY).X),
-    ):
-        print(
-            f"    {label:6} largest difference from plain "
-            f"{np.abs(np.array(found) - X).max() / np.abs(X).max():.1e} of the largest parameter"
-        )
+    found = np.array(one_run(columns, task, KEY).X)
+    difference = np.abs(found - X).max() / np.abs(X).max()
+    print(f"    largest difference from plain {difference:.1e} of the largest parameter")
     contenders: dict[str, Callable[[], object]] = {
         "plain": lambda: plain_run(task, KEY),
-        "NumPy": lambda: one_run(columns, task, KEY),
-        "C": lambda: one_run(columns_in_c, in_c, KEY),
+        "ours": lambda: one_run(columns, task, KEY),
     }
     times = interleave(contenders, rounds)
     for name, row in times.items():
         print(f"    {name:24} {1e3 * statistics.median(row):8.2f} ms")
-    for below in ("NumPy", "C"):
-        print(f"    plain / {below:16} {ratio(times, 'plain', below)}")
+    print(f"    plain / ours {ratio(times, 'plain', 'ours')}")
 
 
 def workers(model: GeneratedModel, record: Record, study: Study, runs: int, rounds: int) -> None:
@@ -157,7 +143,7 @@ def workers(model: GeneratedModel, record: Record, study: Study, runs: int, roun
         for count, row in spent.items()
     )
     print(
-        f"\n{runs} runs in C, 60 columns, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} "
+        f"\n{runs} runs, 60 columns, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} "
         f"(this study included): {shown}"
     )
     print(
@@ -173,17 +159,16 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--runs", type=int, default=2000)
     settings = parser.parse_args()
-    warnings.simplefilter("error", FallbackWarning)
     load, cores = os.getloadavg(), os.sched_getaffinity(0)
     os.sched_setaffinity(0, {max(cores)})
     versions = (
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
     )
-    print(f"{processor()}, {compiler()[1].partition(chr(10))[0]}, {versions}, load {load[0]:.1f}")
+    print(f"{processor()}, {versions}, load {load[0]:.1f}")
     print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
     with TemporaryDirectory() as folder:
         for file, text in generate_files(
-            load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT
+            load_robot(ROBOT), targets=("numpy",), command=ROBOT
         ).items():
             Path(folder, file).write_text(text, encoding="utf-8")
         model = load_model(ROBOT, folder=Path(folder), trust=True)
@@ -204,7 +189,7 @@ def main() -> None:
         measure("TX40 in motion, all columns", model, record, study, every, settings.rounds)
         measure("TX40, all samples, all columns", model, record, whole, every, settings.rounds)
         os.sched_setaffinity(0, cores)
-        workers(compiled_model(model), record, study, settings.runs, max(3, settings.rounds // 2))
+        workers(model, record, study, settings.runs, max(3, settings.rounds // 2))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """A resolution study on a Dask cluster of two workers, on two processes, and in one: wall time, and
 the bits.
 
-    python benchmarks/cluster.py [--runs 2000] [--rounds 3] [--target c]
+    python benchmarks/cluster.py [--runs 2000] [--rounds 3]
 
 TX40 record in motion, its essential columns, two-point rounding, 2 pi/5000; `runs` runs in all. In
 each round every way is taken once, in
@@ -34,10 +34,9 @@ from tempfile import TemporaryDirectory
 
 import distributed
 import numpy as np
-from c_speed import processor
+from rounds import processor
 
 from runtime import Record, Study, load_model, observe
-from runtime.compiled.model import compiled_model
 from runtime.compose import cestac
 from runtime.core.cestac.cestac import Cestac
 from runtime.core.essential import essential_of
@@ -53,20 +52,16 @@ from symgen.emit.generate import generate_files
 ROBOT, DELTA = "tx40", 2 * np.pi / 5000
 
 
-def prepared(
-    folder: Path, runs: int, target: str
-) -> tuple[GeneratedModel, Record, Study, tuple[str, ...]]:
+def prepared(folder: Path, runs: int) -> tuple[GeneratedModel, Record, Study, tuple[str, ...]]:
     """Model, record, study and the names of the columns."""
-    for file, text in generate_files(
-        load_robot(ROBOT), targets=("numpy", "c"), command=ROBOT
-    ).items():
+    for file, text in generate_files(load_robot(ROBOT), targets=("numpy",), command=ROBOT).items():
         Path(folder, file).write_text(text, encoding="utf-8")
     model = load_model(ROBOT, folder=folder, trust=True)
     study = study_from_mapping(dataset_study(ROBOT))
     record = read_records(study.record, model)[0]
     names = essential_of(observe(model, record, study), study.essential, study.estimate).names
     study = replace(study, cestac=replace(study.cestac, delta=(DELTA,), runs=runs))
-    return (compiled_model(model) if target == "c" else model), record, study, names
+    return model, record, study, names
 
 
 def same_bits(a: Cestac, b: Cestac) -> bool:
@@ -96,7 +91,6 @@ def main() -> None:
     )
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--target", choices=("c", "numpy"), default="c")
     settings = parser.parse_args()
     print(
         f"{processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, distributed "
@@ -112,7 +106,7 @@ def main() -> None:
             host="127.0.0.1",
         ) as cluster,
     ):
-        model, record, study, names = prepared(Path(folder), settings.runs, settings.target)
+        model, record, study, names = prepared(Path(folder), settings.runs)
         address = cluster.scheduler_address
 
         def way(**how: object) -> Cestac:
@@ -154,10 +148,7 @@ def main() -> None:
         seconds = time.perf_counter() - start
         if not same_bits(with_kill, first):
             raise SystemExit("one worker killed: other bits")
-    print(
-        f"{settings.runs} runs, target {settings.target}, {len(names)} columns; all of them agree "
-        "in every bit"
-    )
+    print(f"{settings.runs} runs, {len(names)} columns; all of them agree in every bit")
     for name, above, goal in (
         ("cluster of 2", "one process", 1.5),
         ("2 workers", "one process", 1.6),

@@ -28,7 +28,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import statistics
 import subprocess
 import sys
@@ -44,7 +43,6 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from runtime.compiled.model import compiled_model
 from runtime.compose import estimate_of, observe
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel, load_model
@@ -178,17 +176,15 @@ def main() -> None:
             (Path(folder) / name).write_bytes(read_bytes(fetch("tx40", name)))
             files.append(str(Path(folder) / name))
         for name, text in generate_files(
-            load_robot("tx40"), targets=("numpy", "c"), command="tx40"
+            load_robot("tx40"), targets=("numpy",), command="tx40"
         ).items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         study = study_of(files)
         model = load_model("tx40", folder=Path(folder), trust=True)
-        c = compiled_model(model, cache=Path(folder) / "cache")
         figaroh = Figaroh(arguments.figaroh, settings_of(files, study))
         contenders: dict[str, Callable[[], Done]] = {
             "figaroh": lambda: Done(**figaroh.ask("run")),
             "symgen, NumPy": lambda: job(model, study)[0],
-            "symgen, C": lambda: job(c, study)[0],
         }
         for run in contenders.values():
             run()
@@ -199,7 +195,6 @@ def main() -> None:
                 name = list(contenders)[(k + r) % len(contenders)]
                 times[name].append(contenders[name]())
         figaroh.process.terminate()
-        shutil.rmtree(Path(folder) / "cache", ignore_errors=True)
     print(f"CPU time on one core, {arguments.rounds} rounds, load at the start {load:.1f}")
     for name, row in times.items():
         print(f"{name:14} {milliseconds(row, 'seconds')} ms, of which reading {milliseconds(row, 'reading')}   "

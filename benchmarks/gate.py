@@ -39,7 +39,6 @@ from cestac_run import KEY, plain_run, task_of
 from rounds import Clock, Times, interleave, user_time
 
 from runtime import identify, load_model
-from runtime.compiled.model import compiled_model, target_of
 from runtime.compose import observe
 from runtime.core.cestac.run import one_run
 from runtime.core.essential import essential_of
@@ -137,13 +136,12 @@ def plain_job(model: GeneratedModel, study: Study, files: list[Path]) -> np.ndar
 def ratios(folder: Path) -> list[Ratio]:
     """The set."""
     for file, text in generate_files(
-        load_robot("tx40"), targets=("numpy", "c"), command="tx40"
+        load_robot("tx40"), targets=("numpy",), command="tx40"
     ).items():
         (folder / file).write_text(text, encoding="utf-8")
     model, rng = load_model("tx40", folder=folder, trust=True), np.random.default_rng(0)
-    compiled = compiled_model(model)
     q, qd, qdd = rng.uniform(-1, 1, (3, 7103, 6))
-    room, room_c = model.store(7103), compiled.store(7103)
+    room = model.store(7103)
 
     study = study_from_mapping(dataset_study("tx40"))
     files = [folder / name for name in FILES]
@@ -163,7 +161,7 @@ def ratios(folder: Path) -> list[Ratio]:
     )
     record = read_records(stepped.record, model)[0]
     names = essential_of(observe(model, record, stepped), stepped.essential, stepped.estimate).names
-    task, in_c = (task_of(m, record, stepped, names) for m in (model, compiled))
+    task = task_of(model, record, stepped, names)
     columns = task.columns
 
     def timed(
@@ -184,7 +182,7 @@ def ratios(folder: Path) -> list[Ratio]:
 
     robots = {name: load_robot(name) for name in ("tx40", "panda")}
     sympy = Command("import sympy")
-    lines = [
+    return [
         Ratio(
             "NumPy regressor, TX40, 7103 samples",
             "filling its store",
@@ -231,21 +229,6 @@ def ratios(folder: Path) -> list[Ratio]:
             ),
         ),
     ]
-    if target_of(compiled) == "c":
-        columns_in_c = in_c.columns
-        lines += [
-            Ratio(
-                "C regressor, TX40, 7103 samples",
-                "filling its store",
-                timed(lambda: compiled.regressor(q, qd, qdd, out=room_c), fill),
-            ),
-            Ratio(
-                "resolution run, essential columns, C",
-                "plain NumPy and SciPy",
-                timed(lambda: one_run(columns_in_c, in_c, KEY), lambda: plain_run(task, KEY)),
-            ),
-        ]
-    return lines
 
 
 def main() -> int:

@@ -3,10 +3,9 @@ figure.
 
     python benchmarks/growth.py [-o docs/growth.png] [--quick]
 
-Samples: the TX40 regressor into a reused store and the distinct signals through the decimation, by
-the NumPy and the C module; largest resident set of
+Samples: the TX40 regressor into a reused store and the distinct signals through the decimation; largest resident set of
 `symgen identify`. Joints, 2 to 30: revolute chains and binary trees with friction; generation
-from the robot file to the text of the module, the time of compiling C up to 12, and the regressor
+from the robot file to the text of the module, and the regressor
 of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
 
 One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core,
@@ -25,7 +24,6 @@ import resource
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,8 +35,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from runtime.compiled.cache import FallbackWarning
-from runtime.compiled.model import compiled_model
 from runtime.compose import cestac
 from runtime.core.model import GeneratedModel, load_model
 from runtime.core.record import Record
@@ -51,7 +47,6 @@ from symgen.emit.generate import generate_files, generate_module
 
 SAMPLES = (1_000, 10_000, 100_000, 1_000_000)
 JOINTS = (2, 4, 6, 9, 12, 16, 20, 30)
-COMPILED = 12  # joints up to which C is compiled: chains of more take minutes
 RUNS = (4, 16, 64, 256)
 COLUMNS = (3, 6, 12, 24, 60)
 WORKERS = (1, 2, 4, 8)  # as many as there are cores
@@ -69,14 +64,11 @@ def least(function: Callable[[], object], repeats: int = 3) -> float:
     return min(times)
 
 
-def emitted(name: str, folder: Path) -> tuple[GeneratedModel, GeneratedModel]:
-    """(NumPy, C) modules of a packaged robot."""
-    for file, text in generate_files(
-        load_robot(name), targets=("numpy", "c"), command=name
-    ).items():
+def emitted(name: str, folder: Path) -> GeneratedModel:
+    """The module of a packaged robot."""
+    for file, text in generate_files(load_robot(name), targets=("numpy",), command=name).items():
         (folder / file).write_text(text, encoding="utf-8")
-    model = load_model(name, folder=folder, trust=True)
-    return model, compiled_model(model, cache=folder / "cache")
+    return load_model(name, folder=folder, trust=True)
 
 
 def motion(N: int, n: int) -> States:
@@ -166,28 +158,10 @@ def by_joints(folder: Path, joints: tuple[int, ...], N: int = 4000) -> tuple[Cur
             generation.setdefault(shape, []).append((n, least(lambda: generate_module(robot), 1)))  # noqa: B023
             own = folder / f"{shape}{n}"
             own.mkdir()
-            for file, text in generate_files(robot, targets=("numpy", "c")).items():
+            for file, text in generate_files(robot, targets=("numpy",)).items():
                 (own / file).write_text(text, encoding="utf-8")
             model = load_model(f"arm{n}", folder=own, trust=True)
-            start = os.times()
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", FallbackWarning)
-                c = compiled_model(model, cache=own / "cache") if n <= COMPILED else model
-            end = os.times()
-            states = motion(N, n)
-            contenders = {"NumPy": model} | ({"C": c} if c is not model else {})
-            for label, found in contenders.items():
-                speed.setdefault(f"{shape}, {label}", []).append(
-                    (n, 1e9 * evaluation(found, states) / N)
-                )
-            if c is not model:
-                spent = (
-                    end.children_user
-                    + end.children_system
-                    - start.children_user
-                    - start.children_system
-                )
-                generation.setdefault(f"{shape}, compiling C", []).append((n, spent))
+            speed.setdefault(shape, []).append((n, 1e9 * evaluation(model, motion(N, n)) / N))
     return generation, speed
 
 
@@ -303,13 +277,14 @@ def main() -> None:
     os.sched_setaffinity(0, {max(cores)})
     with TemporaryDirectory() as name:
         folder = Path(name)
-        numpy_model, c = emitted("tx40", folder)
-        models = {"NumPy": numpy_model} | ({"C": c} if c is not numpy_model else {})
+        model = emitted("tx40", folder)
+        models = {"NumPy": model}
         peaks = memory(
-            folder, numpy_model, samples[1:]
+            folder, model, samples[1:]
         )  # first: a process inherits the largest resident set of the one that starts it
         figure, record = Figure(figsize=(14.5, 6.6), layout="constrained"), study_record()
         axes = figure.subplots(2, 4).ravel()
+        axes[7].axis("off")
         panel(axes[0], by_samples(models, samples), "samples, TX40", "CPU time, s")
         panel(axes[1], peaks, "samples, TX40", "peak memory of an identification, MB")
         panel(
@@ -327,21 +302,15 @@ def main() -> None:
         generation, speed = by_joints(folder, joints)
         panel(
             axes[4],
-            {k: v for k, v in generation.items() if "C" not in k},
+            generation,
             "joints",
             "CPU time of generation, s",
         )
-        panel(
-            axes[5],
-            {k: v for k, v in generation.items() if "C" in k},
-            "joints",
-            "CPU time of compiling C, s",
-        )
-        panel(axes[6], speed, "joints", "regressor, ns a sample")
+        panel(axes[5], speed, "joints", "regressor, ns a sample")
         os.sched_setaffinity(0, cores)
         elapsed = by_workers(models, record, workers, runs[-1])
         panel(
-            axes[7],
+            axes[6],
             elapsed,
             f"workers, {len(cores)} cores, {runs[-1]} runs, TX40",
             "elapsed time of a resolution study, s",

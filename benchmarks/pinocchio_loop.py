@@ -31,7 +31,6 @@ import os
 import shutil
 import statistics
 import subprocess
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,8 +55,6 @@ import pinocchio as pin
 from oracles.pinocchio_model import PinocchioModel, placement
 from oracles.random_robots import random_state
 from runtime import load_model
-from runtime.compiled.cache import FallbackWarning, compiler
-from runtime.compiled.model import compiled_model
 from runtime.core.model import GeneratedModel
 from symgen.description import load_robot
 from symgen.description.robot import PRISMATIC, Robot
@@ -165,22 +162,21 @@ class CppLoop:
         return np.fromfile(self.W_file).reshape(10 * n, n, N).transpose(2, 1, 0)
 
 
-def emitted(robot: Robot, folder: Path) -> tuple[GeneratedModel, GeneratedModel]:
-    """The NumPy module and the C target of a robot."""
-    for file, text in generate_files(robot, targets=("numpy", "c")).items():
+def emitted(robot: Robot, folder: Path) -> GeneratedModel:
+    """The NumPy module of a robot."""
+    for file, text in generate_files(robot, targets=("numpy",)).items():
         (folder / file).write_text(text, encoding="utf-8")
-    model = load_model(robot.name, folder=folder, trust=True)
-    return model, compiled_model(model, cache=folder / "cache")
+    return load_model(robot.name, folder=folder, trust=True)
 
 
 def measure(robot: Robot, title: str, programs: dict[str, Path], N: int, rounds: int) -> None:
     states, oracle = random_state(robot, N, seed=7), PinocchioModel(robot)
     with TemporaryDirectory() as name:
         folder = Path(name)
-        model, c = emitted(robot, folder)
+        model = emitted(robot, folder)
         n, b = len(model.JOINTS), len(model.BASE_PARAMETERS)
         loop = PinocchioLoop(oracle, states)
-        out, out_c, plain = model.store(N), model.store(N), np.ones((b, n, N))
+        out, plain = model.store(N), np.ones((b, n, N))
         cpp = {
             key: CppLoop.start(program, robot, states, folder) for key, program in programs.items()
         }
@@ -189,15 +185,14 @@ def measure(robot: Robot, title: str, programs: dict[str, Path], N: int, rounds:
             **cpp,
             "C++ calls": replace(cpp["C++ library"], request="calls"),
             "NumPy": lambda: model.regressor(*states, out=out),
-            "C": lambda: c.regressor(*states, out=out_c),
             "fill": lambda: fill(plain, 1.0),
         }
         for run in contenders.values():
             run()
         module = cast(ModuleType, model)
         loops = [loop.W, *(x.W(n, N) for x in cpp.values())]
-        found = [m.regressor(*states, out=S) for m, S in ((model, out), (c, out_c))]
-        defects = [compare(module, oracle, D, W) for D in found for W in loops]
+        D = model.regressor(*states, out=out)
+        defects = [compare(module, oracle, D, W) for W in loops]
         report(
             f"{title}, {N} samples, {n} joints, {b} base columns",
             defects,
@@ -210,19 +205,14 @@ def measure(robot: Robot, title: str, programs: dict[str, Path], N: int, rounds:
 
 
 def report(title: str, defects: list[float], times: dict[str, list[float]], N: int) -> None:
-    print(
-        f"\n{title}; W of NumPy and C against that of each loop: at most {max(defects):.1e} of the "
-        "column"
-    )
+    print(f"\n{title}; W against that of each loop: at most {max(defects):.1e} of the column")
     if max(defects) > TOLERANCE:
         raise SystemExit("the regressors differ; nothing was timed")
     for key, row in times.items():
         print(f"  {key:12} {1e9 * statistics.median(row) / N:9.1f} ns/sample")
-    for below in ("NumPy", "C"):
-        for above in ("C++ library", "C++ headers", "C++ calls", "Python loop"):
-            print(f"  {above + ' / ' + below:22} {ratio(times, above, below)}")
-    for above in ("C", "NumPy"):
-        print(f"  {above + ' / fill':22} {ratio(times, above, 'fill')}")
+    for above in ("C++ library", "C++ headers", "C++ calls", "Python loop"):
+        print(f"  {above + ' / NumPy':22} {ratio(times, above, 'NumPy')}")
+    print(f"  {'NumPy / fill':22} {ratio(times, 'NumPy', 'fill')}")
 
 
 def main() -> None:
@@ -238,13 +228,9 @@ def main() -> None:
         help="folder that keeps the C++ programs, which take a minute to build",
     )
     settings = parser.parse_args()
-    warnings.simplefilter("error", FallbackWarning)
     load = os.getloadavg()
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})  # of the programs too
-    print(
-        f"{processor()}, {compiler()[1].partition(chr(10))[0]}, numpy {np.__version__}, pinocchio "
-        f"{pin.__version__}, load {load[0]:.1f}"
-    )
+    print(f"{processor()}, numpy {np.__version__}, pinocchio {pin.__version__}, load {load[0]:.1f}")
     print(f"CPU time on one core, {settings.rounds} interleaved rounds, ratios as median [range]")
     with TemporaryDirectory() as folder:
         programs = build(settings.programs or Path(folder))

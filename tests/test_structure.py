@@ -55,7 +55,6 @@ MENDING: dict[str, set[str]] = {  # edges that are to go
     "core": {
         "advisor",
         "agreement",
-        "compiled",
         "controller",
         "counts",
         "elastic",
@@ -76,7 +75,7 @@ MENDING: dict[str, set[str]] = {  # edges that are to go
     "estimate_files": {"json_files"},
     "json_files": {"reading"},
     "link_side": {"reading"},
-    "loop": {"compiled", "excitation", "reading"},
+    "loop": {"excitation", "reading"},
     "plausible": {"speeds"},
     "reading": {"controller", "loop", "study_files", "yaml_text"},
     "reporting": {

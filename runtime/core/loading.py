@@ -1,8 +1,7 @@
 """Emitted files as modules: a module is code, and runs with every right of who runs it.
 
-    generated/tx40.py, tx40.c
-            run where this installation has emitted and certified them, or where their reader trusts
-            them
+    generated/tx40.py
+            runs where this installation has emitted and certified it, or where its reader trusts it
 
 symgen keeps each text that it emits and certifies in a cache by content: `cache_folder("modules")`
 holds a folder of the first 32 digits of the SHA-256 of the text. What runs is the text that was
@@ -23,14 +22,10 @@ from types import ModuleType
 from runtime.core.errors import ModelError
 
 KEY = 32  # digits of the SHA-256 that name a text in the cache
-UNTRUSTED = (
-    "is code that this installation has not emitted and certified; pass trust=True (--trust) if "
-    "you "
-    "would run any program of its author, or emit it here with `symgen generate`"
-)
+UNTRUSTED = "is code that this installation has not emitted and certified; pass trust=True (--trust) if you would run any program of its author, or emit it here with `symgen generate`"
 
 
-def cache_folder(of: str = "compiled") -> Path:
+def cache_folder(of: str) -> Path:
     """The folder `of` ("modules", "compiled") in SYMGEN_CACHE, or in that of the platform for files
     that can be made again.
     """
@@ -59,11 +54,6 @@ def is_emitted(text: bytes) -> bool:
         return False
 
 
-def is_trusted(model: object) -> bool:
-    """Whether the files beside a module may run: not if `load_model` looked it up in the cache."""
-    return bool(getattr(model, "__trusted__", True))
-
-
 class _Text(importlib.abc.InspectLoader):
     """Loader of a text."""
 
@@ -85,9 +75,7 @@ def module_of(path: Path, *, trust: bool = False) -> ModuleType:
         raise ModelError(f"cannot be read: {e}", file=str(path)) from e
     if not (trust or is_emitted(data)):
         raise ModelError(UNTRUSTED, file=str(path))
-    module = run(text, path)
-    vars(module)["__trusted__"] = trust
-    return module
+    return run(text, path)
 
 
 def run(text: str, path: Path) -> ModuleType:

@@ -93,8 +93,7 @@ def load_model(
     folder : str or Path, optional
         Where names are looked up; default: ./generated.
     trust : bool
-        Run a file that this installation has not emitted and certified, and the C file beside it:
-        a module is code (`runtime.core.loading`).
+        Run a file that this installation has not emitted and certified: a module is code (`runtime.core.loading`).
 
     Raises
     ------

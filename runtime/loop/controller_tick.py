@@ -25,10 +25,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from runtime.compiled.cache import FallbackWarning, NotCompiledError, shared_object
 from runtime.core.limits import LIMIT
 from runtime.core.loading import cache_folder
 from runtime.core.model import GeneratedModel
+from runtime.loop.compile_cache import FallbackWarning, NotCompiledError, shared_object
 from runtime.loop.control_law import VECTORS
 from runtime.loop.dry_friction import DryFriction
 from runtime.loop.stick_slip import event_function, friction_function, kinetic, rest_function
@@ -338,7 +338,9 @@ def compiled(function: Any, cache: Path | None = None) -> Any:
         return library
 
     try:
-        shared_object(Path(f"{function.name()}.c"), text, cache or cache_folder(), opened, FLAGS)
+        shared_object(
+            Path(f"{function.name()}.c"), text, cache or cache_folder("compiled"), opened, FLAGS
+        )
     except (NotCompiledError, OSError) as e:
         warnings.warn(
             f"simulation: CasADi's own interpreter in place of C: {e}",

@@ -175,7 +175,7 @@ def provenance_section(result: Identification) -> Section:
         ("record file", name, f"SHA-256 {digest}") for name, digest in provenance["files"].items()
     ]
     rows += [("version", name, version) for name, version in provenance["versions"].items()]
-    labels = {"target": "kernels", "processor": "processor", "seed": "seed", "note": "note"}
+    labels = {"processor": "processor", "seed": "seed", "note": "note"}
     rows += [
         ("run", label, str(provenance[key]))
         for key, label in labels.items()

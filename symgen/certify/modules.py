@@ -133,14 +133,6 @@ def model(robot: str | Path | Robot, *, options: Sequence[str] = ()) -> ModuleTy
     return imported(path)
 
 
-def c_file(robot: str | Path | Robot) -> Path:
-    """The C file of a robot, certified, in the cache by content; an empty one of a robot whose
-    loops are closed by iteration, which has none.
-    """
-    robot = robot if isinstance(robot, Robot) else load_robot(robot)
-    return _certified_path(robot, "c") or stored_path(f"{robot.name}.c", "")
-
-
 def _certified_path(robot: Robot, target: str, options: Sequence[str] = ()) -> Path | None:
     """Path of a text in the cache: what lies there has been certified. None where the robot has no
     text of the target.

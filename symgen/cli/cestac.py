@@ -38,7 +38,6 @@ def cestac(
     workers: options.Workers = 0,
     scheduler: options.Scheduler = None,
     advise: options.Advise = False,
-    target: options.Target = "numpy",
     trust: options.Trust = False,
     exact: options.Exact = False,
     json: options.Json = False,
@@ -58,9 +57,7 @@ def cestac(
         from runtime.parallel.checkpoint import Checkpoint
         from runtime.reading.records import read_records
 
-        model = session.model_of(
-            robot, "numpy" if advise else target, trust=trust, exact=exact, records=record
-        )
+        model = session.model_of(robot, trust=trust, exact=exact, records=record)
         study = session.changed(
             session.study_of_arguments(record, recorded=False),
             cestac={

@@ -21,7 +21,6 @@ def identify(
             "report.html, estimate.json (.mat, .npz), parameters.csv (.tex), figures, study.yaml"
         ),
     ] = None,
-    target: options.Target = "numpy",
     physical: Annotated[
         bool,
         typer.Option("--physical", help="Tell whether a physical robot can have these parameters."),
@@ -62,11 +61,10 @@ def identify(
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime
-        from runtime.compiled.model import target_of
         from runtime.core.provenance import processor
         from runtime.reading.records import read_records
 
-        model = session.model_of(robot, target, trust=trust, exact=exact, records=record)
+        model = session.model_of(robot, trust=trust, exact=exact, records=record)
         study = session.study_of_arguments(record)
         study = study if suggest is None else session.suggested_study(study, model, suggest)
         records = read_records(study.record, model, missing=study.signals.admits_missing)
@@ -78,7 +76,7 @@ def identify(
             friction=friction,
             variants=session.variants_of(robot, exact=exact) if plausible else None,
             plausible=plausible,
-            provenance={"target": target_of(model), "processor": processor()},
+            provenance={"processor": processor()},
         )
         if results is not None:
             runtime.report(result, results)

@@ -63,7 +63,6 @@ Scheduler = Annotated[
         help="Address of a Dask scheduler whose workers do the work, such as tcp://10.0.0.1:8786."
     ),
 ]
-Target = Annotated[str, typer.Option(help="numpy, or c: compiled, where there is a compiler.")]
 Side = Annotated[Text, typer.Option(help="joint or motor: where positions are rounded.")]
 Rounding = Annotated[
     Text,

@@ -126,22 +126,18 @@ def end(*, good: bool) -> None:
 
 def model_of(
     robot: str,
-    target: str = "numpy",
     *,
     trust: bool = False,
     exact: bool = False,
     records: Sequence[str] = (),
 ) -> GeneratedModel:
-    """The model of a ROBOT argument. target : "numpy", or "c" for the same in C; one line says why
-    where NumPy serves instead. trust : run a module that was not emitted here. exact : as of
+    """The model of a ROBOT argument. trust : run a module that was not emitted here. exact : as of
     `load_robot`. records : RECORD arguments; where they name wrenches the model has their columns.
     """
     import symgen
     from runtime.core.model import load_model
     from runtime.reading.formats import is_measured
 
-    if target not in ("numpy", "c"):
-        fail(f"--target {target}; expected numpy or c")
     path = Path(robot)
     if path.suffix != ".py" and path.is_file() and is_measured(path):
         fail(
@@ -154,7 +150,7 @@ def model_of(
         named = study_of_arguments(records, recorded=False).record if records else ()
         options = ("base_wrench_regressor",) * any(one.columns.wrench for one in named)
         model = load_model(symgen.model(described_robot(robot, exact=exact), options=options))
-    return model if target == "numpy" else _in_c(model, robot, exact)
+    return model
 
 
 def described_robot(source: str, at_values: bool = False, exact: bool = False) -> Robot:
@@ -202,31 +198,6 @@ def assumptions_of(robot: str, records: Any, study: Study, *, exact: bool = Fals
     if fit.status != "ok":
         return ["assume: the record does not determine the model without the assumptions"]
     return [a.text for a in assumptions_asked(free, fit, sorted(described.assume))]
-
-
-def _source(robot: str, exact: bool) -> Path:
-    """The C file of a ROBOT argument: emitted, or beside the module."""
-    from symgen.certify.modules import c_file
-    from symgen.description import load_robot
-
-    path = Path(robot)
-    return (
-        path.with_suffix(".c") if path.suffix == ".py" else c_file(load_robot(robot, exact=exact))
-    )
-
-
-def _in_c(model: GeneratedModel, robot: str, exact: bool) -> GeneratedModel:
-    """The model of a ROBOT argument with its regressor in C."""
-    import warnings
-
-    from runtime.compiled.model import compiled_model
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        compiled = compiled_model(model, source=_source(robot, exact))
-    for warning in caught:
-        typer.echo(str(warning.message), err=True)
-    return compiled
 
 
 def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Study:

@@ -185,7 +185,7 @@ def test_results_replace_no_pipe_and_no_folder(target):
         ("cestac", "--delta", "9**9**9**9"), ("cestac", "--delta", "__import__('os')"), ("cestac", "--delta", "1/0"), ("cestac", "--delta", "nan"),
         ("cestac", "--delta", "-1"), ("cestac", "--delta", "(" * 3000), ("cestac", "--torque", "1e999"), ("cestac", "--rounding", "\x1b[2J"),
         ("cestac", "--columns", "XX1,\x1b[2J"), ("cestac", "--delta", "0.001", "--runs", "-5"), ("cestac", "--delta", "0.001", "--seed", "-1"),
-        ("report", "--encoder", "\x1b[2J"), ("identify", "--target", "../x"), ("excite", "--criterion", "\x1b[2J"), ("excite", "--rate", "nan"),
+        ("report", "--encoder", "\x1b[2J"), ("excite", "--criterion", "\x1b[2J"), ("excite", "--rate", "nan"),
         ("excite", "--columns", "\x1b[2J"), ("cestac", "--delta", "1e-400"), ("cestac", "--side", "\n"),
     ],
     ids=ascii,

@@ -315,3 +315,30 @@ def test_nan_and_infinity_as_in_numpy(tmp_path: Path) -> None:
         rtol=1e-12,
         atol=1e-12,
     )
+
+
+@needs_compiler
+@pytest.mark.parametrize("shift", range(8))
+def test_streamed_rows_at_every_place_in_a_cache_line(tmp_path: Path, shift: int) -> None:
+    """Written past the caches in whole lines: the bits of ordinary stores, nothing beside the rows,
+    whatever their length.
+    """
+    texts = files("planar_2r")
+    module = numpy_module("planar_2r", texts["planar_2r.py"])
+    library = ctypes.CDLL(str(compiled(tmp_path, texts["planar_2r.c"], COMPILERS[0], FAST)))
+    constants, (b, n) = np.array([*module.CONSTANTS.values(), 0.0]), module.STRUCTURE.shape
+    for N in (*range(1, 68), 203):
+        given = np.random.default_rng(0).uniform(-2, 2, (3, N, n))
+        results = []
+        for flags in (0, 1):
+            memory = np.full(b * n * N + 32, np.nan)
+            start = (-memory.ctypes.data // 8) % 8 + 8 + shift
+            rows = memory[start : start + b * n * N]
+            pointers = [ctypes.c_void_p(x.ctypes.data) for x in (*given, constants, rows)]
+            assert (
+                library.planar_2r_regressor(ctypes.c_int64(N), *pointers, ctypes.c_int32(flags))
+                == 0
+            )
+            assert np.isnan(memory[:start]).all() and np.isnan(memory[start + b * n * N :]).all()
+            results.append(rows)
+        assert np.array_equal(*results, equal_nan=True) and np.isfinite(results[0]).any(), N

@@ -30,7 +30,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from runtime.compiled.model import target_of
 from runtime.core.cestac.perturbed import (
     PreparedRecord,
     Task,
@@ -153,7 +152,6 @@ def cestac(
         "estimate": asked,
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in whole],
-        "target": target_of(model),
         "torque_side": "joint" if drives is None else "motor",
         **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
     }

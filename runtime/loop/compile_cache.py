@@ -1,4 +1,4 @@
-"""C files compiled on first use into a cache that is checked.
+"""The C of CasADi functions, compiled on first use into a cache that is checked.
 
 The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder
 (compiled in `SYMGEN_CACHE`, else that of the platform). Its name
@@ -24,19 +24,7 @@ from runtime.core.limits import LIMIT
 from runtime.core.loading import is_writable_by_all
 from runtime.core.provenance import cpuinfo
 
-FLAGS = (
-    "-std=c11",
-    "-O2",
-    "-ftree-vectorize",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-ffp-contract=off",
-    "-shared",
-    "-fPIC",
-)
 LIBRARIES = ("-lm",)
-WIDTHS = {"avx512f": 8, "avx2": 4}
-"""Vectors on x86-64, widest first, and how many doubles they hold."""
 UNSAFE = (
     "-ffast-math",
     "-Ofast",
@@ -45,7 +33,7 @@ UNSAFE = (
 
 
 class FallbackWarning(UserWarning):
-    """NumPy is used in place of C; the message says why."""
+    """CasADi's own interpreter is used in place of C; the message says why."""
 
 
 class NotCompiledError(Exception):
@@ -57,7 +45,7 @@ def shared_object(
     text: bytes,
     folder: Path,
     opened: Callable[[Path], ctypes.CDLL],
-    flags: Sequence[str] = FLAGS,
+    flags: Sequence[str],
 ) -> ctypes.CDLL:
     """The shared object of a C file, from the cache or compiled; one that does not open is compiled
     again, once.
@@ -81,7 +69,6 @@ def shared_object(
         No compiler, or one that fails; or a cache that cannot be used.
     """
     command, version = compiler()
-    flags = (*flags, *_width())
     parts = (
         text,
         " ".join((*flags, *LIBRARIES)).encode(),
@@ -144,17 +131,6 @@ def _compiled(
         final = folder / f"{key}-{hashlib.sha256(target.read_bytes()).hexdigest()[:32]}.so"
         target.replace(final)
     return final
-
-
-def _width() -> tuple[str, ...]:
-    """Macros WIDTH and DOUBLES: the widest vectors of this processor and their numbers, as the C
-    files ask for one width instead of several.
-    """
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        return ()
-    known = cpuinfo("flags").split()
-    width = next((width for width in WIDTHS if width in known), "sse2")
-    return f'-DWIDTH="{width}"', f"-DDOUBLES={WIDTHS.get(width, 2)}"
 
 
 def compiler() -> tuple[tuple[str, ...], str]:
