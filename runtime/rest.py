@@ -40,7 +40,7 @@ def poses_at_rest(problem: Problem) -> Problem:
         A method that makes rows of its own, which needs a motion.
     """
     settings = problem.settings
-    if settings.signals.reader != "static":
+    if settings.signals.reader != "static" or not problem.records:
         return problem
     if problem.method.observe is not None:
         require_motion(settings.signals, "a method that simulates the loop,")

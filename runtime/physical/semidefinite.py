@@ -243,7 +243,7 @@ class Program:
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
-            solver = clarabel.DefaultSolver(
+            data = (
                 sparse.csc_matrix(np.triu(Q)),
                 self.linear,
                 sparse.csc_matrix(-whole),
@@ -251,7 +251,7 @@ class Program:
                 list(cones),
                 settings,
             )
-            solution = _solution(solver)
+            solution = _solution(data)
             if solution is None:
                 status = "Clarabel stopped by an error of its own"
                 continue
@@ -366,10 +366,10 @@ class Quadratic:
         return clarabel.DefaultSolver(Q, linear, self.A, b, self.cones, settings)
 
 
-def _solution(solver: Any) -> Any:
-    """What Clarabel gives; None where it stops by an error of its own."""
+def _solution(data: Sequence[Any]) -> Any:
+    """What Clarabel gives for the data of a program; None where it stops by an error of its own."""
     try:
-        return solver.solve()
+        return clarabel.DefaultSolver(*data).solve()
     except BaseException as e:  # a panic of Rust is no Exception
         if type(e).__name__ != "PanicException":
             raise

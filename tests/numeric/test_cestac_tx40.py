@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime.compose import cestac, estimate_of, observe
+from runtime.compose import cestac, estimate_of, observe, stated
 from runtime.core.essential import essential_of
 from runtime.core.model import load_model
 from runtime.core.study import EstimateSettings, study_from_mapping
@@ -109,8 +109,9 @@ def test_weights_sharpen_the_wrist(observation, study, model, found):
         assert weighted.relative_sigma[i] < 0.65 * found.all_parameters.relative_sigma[i]
 
 
-def test_essential_parameters_predict_better(observation, study, found):
+def test_essential_parameters_predict_better(observation, study, found, model):
     result = split_validation(
+        stated(model, ()),
         observation,
         study.validate.split,
         {"all": EstimateSettings(), "essential": EstimateSettings(columns=found.names)},

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime import InputError, observe
-from runtime.compose import estimate_of
+from runtime.compose import estimate_of, stated
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_companion, linear_system
@@ -528,7 +528,9 @@ def test_tx40_record(tx40, tx40_data) -> None:
         study.validate.split[::-1],
     ):  # each half predicts the other better than by least squares
         errors = [
-            split_validation(seen, split, {"all": how}, model=tx40).predictions[1].relative_error
+            split_validation(stated(tx40, ()), seen, split, {"all": how})
+            .predictions[1]
+            .relative_error
             for how in (EstimateSettings(), FEASIBLE)
         ]
         assert errors[1] < 0.98 * errors[0]

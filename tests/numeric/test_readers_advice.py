@@ -33,16 +33,7 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     one encoder of two alike.
     """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
-    real = CoarseEncoders(
-        planar,
-        [problem(planar, RECORD, STUDY).prepared[0]],
-        STUDY,
-        NAMES,
-        None,
-        {},
-        "phase",
-        "lowpass",
-    )
+    real = CoarseEncoders(problem(planar, RECORD, STUDY), NAMES, None, "phase", "lowpass")
     change = real.asked(STEP)
     level = found.levels[0]
     sampled = 100 * (level.mean / found.reference.X - 1)
@@ -137,16 +128,7 @@ def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):
             states.q, states.qd, states.qdd, planar.base_parameters(planar.VALUES)
         ),
     )
-    real = CoarseEncoders(
-        planar,
-        [problem(planar, record, STUDY).prepared[0]],
-        STUDY,
-        NAMES,
-        None,
-        {},
-        "phase",
-        "lowpass",
-    )
+    real = CoarseEncoders(problem(planar, record, STUDY), NAMES, None, "phase", "lowpass")
     locked, free, half = real.locking(np.array([2e-3, 2.3e-3, 4e-3]))
     assert locked > 5 * free and half > 2 * free
     monkeypatch.setattr(LIMIT, "READER_UP", 2)
@@ -187,16 +169,7 @@ def test_more_phases_at_the_steps_beside_a_limit():
 
 
 def test_further_nodes_lie_in_the_middle_between_those_before():
-    real = CoarseEncoders(
-        planar,
-        [problem(planar, PART, STUDY).prepared[0]],
-        STUDY,
-        NAMES,
-        None,
-        {},
-        "phase",
-        "lowpass",
-    )
+    real = CoarseEncoders(problem(planar, PART, STUDY), NAMES, None, "phase", "lowpass")
     real._counts = lambda delta, phases, moving, key: phases
     few = PHASES["lowpass"]
     phases = np.concatenate([real.nodes(2.0, (0, 1), read) for read in (0, few, 2 * few)])

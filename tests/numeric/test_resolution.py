@@ -10,11 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import runtime
 from runtime.advisor.advice import crossing, sampled
 from runtime.advisor.advisor import ALL, Predictor, torque_sigma
 from runtime.advisor.position_errors import perturbation
 from runtime.advisor.sign_errors import kernels, switched
 from runtime.compose import advise, observe
+from runtime.core.bound import BoundModel
 from runtime.core.drives import encoder_drives
 from runtime.core.errors import InputError, ModelError, SettingsError
 from runtime.core.limits import LIMIT
@@ -52,6 +54,11 @@ TX40_COLUMNS = (
     "FS4",
 )
 TX40_COLUMNS += ("MY5R", "Ia5", "FV5", "FS5", "FV6", "FVM6", "FSM6")
+
+
+def reading(model, record, study):
+    """The record as a study reads it."""
+    return runtime.problem(model, record, study).prepared[0]
 
 
 def opened(name):
@@ -245,7 +252,7 @@ def test_uniform_rounding_allows_root_three_more(emps, emps_advice):
 def test_torque_noise_adds_to_sigma_and_does_not_bias(emps, emps_advice):
     model, study, record = emps
     W = observe(model, record, study)
-    part = perturbation(model, record, study, W.names)
+    part = perturbation(model, reading(model, record, study), study, W.names)
     found = torque_sigma(Predictor((part,), np.ones(1), 1.0), None)
     assert np.allclose(found, emps_advice.torque_sigma)
     rng = np.random.default_rng(0)
@@ -291,10 +298,10 @@ def test_tx40_steps_predicted_and_sampled(tx40_data):
 def test_motor_side_goes_through_the_drives(tx40_data):
     model, study, record = opened("tx40")
     motor = replace(study, cestac=replace(study.cestac, side="motor"))
-    part = perturbation(model, record, motor, ("ZZ1R", "Ia5", "FSM6"))
+    part = perturbation(model, reading(model, record, motor), motor, ("ZZ1R", "Ia5", "FSM6"))
     R = np.array(model.DRIVES["ratio"])
     assert np.allclose(part.root @ R, np.eye(6), atol=1e-12)
-    joint = perturbation(model, record, study, ("ZZ1R", "Ia5", "FSM6"))
+    joint = perturbation(model, reading(model, record, study), study, ("ZZ1R", "Ia5", "FSM6"))
     G, of_joint = (x.smooth[0][:, :-1, :-1] for x in (part, joint))
     assert np.allclose(G, of_joint / R[0, 0] ** 2, rtol=1e-5, atol=1e-9)
 
@@ -325,10 +332,11 @@ def test_switches_follow_the_constants_given():
     def elements(*, KR=1.0):
         return {"FSM2": ("coulomb", "both", {1: KR, 2: 1.0})}
 
-    belt = SimpleNamespace(NAME="belt", JOINTS=(1, 2), elements=elements, ELEMENTS=elements())
-    assert [
-        switches(belt, ("FSM2",), constants)[0].G.tolist() for constants in (None, {"KR": 2.0})
-    ] == [[1.0, 1.0], [2.0, 1.0]]
+    belt = SimpleNamespace(
+        NAME="belt", JOINTS=(1, 2), CONSTANTS={"KR": 1.0}, elements=elements, ELEMENTS=elements()
+    )
+    along = [switches(m, ("FSM2",))[0].G.tolist() for m in (belt, BoundModel(belt, {"KR": 2.0}))]
+    assert along == [[1.0, 1.0], [2.0, 1.0]]
 
 
 def test_where_a_curve_crosses():

@@ -71,12 +71,8 @@ def test_poses_that_were_sought_tell_more_than_random_ones(name):
     before = np.array(list(result.sigma.values()))[:, 1]
     rng, sigma = np.random.default_rng(7), []
     for q in (result.poses, *rng.uniform(-2, 2, (20, *result.poses.shape))):
-        W = runtime.observe(
-            model,
-            runtime.Record(np.arange(len(q)), q, 0 * q, rate=1.0),
-            study,
-            columns=tuple(result.sigma),
-        ).W
+        record = runtime.Record(np.arange(len(q)), q, 0 * q, rate=1.0)
+        W = runtime.observe(model, record, study).columns(tuple(result.sigma)).W
         sigma.append(np.sqrt(np.diag(np.linalg.inv(W.T @ W))))
     assert sigma[0] == pytest.approx([pair[0] for pair in result.sigma.values()], rel=1e-6)
     assert sigma[0].max() <= before.max()

@@ -8,7 +8,7 @@ import planar_2r_model as planar
 import pytest
 from planar_data import OLS, TRUE, motion, observation
 
-from runtime.compose import estimate_of
+from runtime.compose import estimate_of, stated
 from runtime.core.errors import InputError
 from runtime.core.parameter_sets import held_out_validation
 from runtime.core.study import EstimateSettings
@@ -19,6 +19,8 @@ from runtime.core.validation import (
     split_validation,
     weak_directions,
 )
+
+PROBLEM = stated(planar, ())
 
 
 def test_comparison_holds_the_torques_of_every_joint():
@@ -51,6 +53,7 @@ def test_other_records_are_predicted():
     fit = observation(noise=(0.3, 0.05), seed=1)
     other = observation(noise=(0.3, 0.05), seed=2, motion=lambda t: motion(1.3 * t + 5))
     result = cross_validation(
+        PROBLEM,
         fit,
         {"second": other},
         {
@@ -74,7 +77,7 @@ def test_other_records_are_predicted():
 
 def test_windows_of_one_record():
     seen = observation(noise=(0.3, 0.05), seed=1)
-    result = split_validation(seen, [(0, 5), (5.01, None)], {"all": OLS})
+    result = split_validation(PROBLEM, seen, [(0, 5), (5.01, None)], {"all": OLS})
     assert [p.part for p in result.predictions] == ["[0, 5] s", "[5.01, ] s"]
     found = estimate_of(seen.between(0, 5))
     late = seen.between(5.01, None)
@@ -86,12 +89,12 @@ def test_windows_of_one_record():
     parts = [
         p.part
         for p in split_validation(
-            epoch, [(1.795e9, 1.795e9 + 5), (1.795e9 + 5.01, None)], {"all": OLS}
+            PROBLEM, epoch, [(1.795e9, 1.795e9 + 5), (1.795e9 + 5.01, None)], {"all": OLS}
         ).predictions
     ]
     assert parts == ["[1795000000.000, 1795000005.000] s", "[1795000005.010, ] s"]
     with pytest.raises(InputError, match="at least two"):
-        split_validation(seen, [(0, 5)], {"all": OLS})
+        split_validation(PROBLEM, seen, [(0, 5)], {"all": OLS})
 
 
 def test_parameters_that_trade_are_named():
@@ -131,7 +134,7 @@ def test_correlations_are_those_of_the_covariance():
 
 def test_each_fifth_is_predicted_by_the_others():
     whole = observation(noise=(0.3, 0.05), seed=1)
-    result = held_out_validation(whole, {"all": OLS})
+    result = held_out_validation(PROBLEM, whole, {"all": OLS})
     number = whole.equal_parts(5)
     assert [np.ptp(whole.t[number == p]) for p in range(5)] == pytest.approx([2] * 5, abs=0.1)
     assert not any(p.fitted for p in result.predictions) and not result.missing
