@@ -23,9 +23,9 @@ for the cones.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal
 
 import clarabel
@@ -251,7 +251,7 @@ class Program:
                 list(cones),
                 settings,
             )
-            solution = _solution(data)
+            solution = _solution(partial(_solved, *data))
             if solution is None:
                 status = "Clarabel stopped by an error of its own"
                 continue
@@ -342,7 +342,7 @@ class Quadratic:
             self.solver = self._solver(squares, linear, scaled=True)
         else:
             self.solver.update(P=squares, q=linear)
-        solution = _solution(self.solver)
+        solution = _solution(self.solver.solve)
         if solution is None or STATUS.get(str(solution.status)) not in SOLVED:
             self.solver = None
             solution = _solution(self._solver(squares, linear, scaled=False))
@@ -366,10 +366,15 @@ class Quadratic:
         return clarabel.DefaultSolver(Q, linear, self.A, b, self.cones, settings)
 
 
-def _solution(data: Sequence[Any]) -> Any:
-    """What Clarabel gives for the data of a program; None where it stops by an error of its own."""
+def _solved(*data: Any) -> Any:
+    """The solution of one program."""
+    return clarabel.DefaultSolver(*data).solve()
+
+
+def _solution(solve: Callable[[], Any]) -> Any:
+    """What Clarabel gives; None where it stops by an error of its own."""
     try:
-        return clarabel.DefaultSolver(*data).solve()
+        return solve()
     except BaseException as e:  # a panic of Rust is no Exception
         if type(e).__name__ != "PanicException":
             raise
