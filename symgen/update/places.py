@@ -252,7 +252,8 @@ class Places:
     def heed_inertials(self, edits: XmlEdits) -> None:
         """The edit by which MuJoCo heeds an <inertial> that was inserted."""
         own = (e for body in self.links.values() for e in body.own("inertial"))
-        if self.from_geoms and (ignored := next(own, None)):
+        ignored = next(own, None)
+        if self.from_geoms and ignored is not None:
             raise DescriptionError(
                 "inertiafromgeom is true and this <inertial> without effect; remove the one or the "
                 "other",
