@@ -42,8 +42,11 @@ class CompositeLinks:
     """
 
     def __init__(self, geometry: Geometry, chi: Mapping[str, Scalar]) -> None:
-        self.geometry, self.robot, self.algebra = geometry, geometry.robot, geometry.algebra
-        self.named, self.chi = Names(len(self.robot.frames)), chi
+        self.geometry = geometry
+        self.robot = geometry.robot
+        self.algebra = geometry.algebra
+        self.named = Names(len(self.robot.frames))
+        self.chi = chi
         self.JP: dict[int, Tensor] = {}
         self.MSP: dict[int, Vector] = {}
         self.MP: dict[int, Scalar] = {}
@@ -69,7 +72,8 @@ class CompositeLinks:
 
     def _take(self, j: int, i: int) -> None:
         """Add composite link j to the frame i that carries it."""
-        R, P = self.geometry.rotation[j], self.geometry.P[j]
+        R = self.geometry.rotation[j]
+        P = self.geometry.P[j]
         AS = R.up(self.MSP[j])
         for k, x in enumerate(AS, start=1):
             self.algebra.name(x, self.named("AS", k, j))
@@ -119,7 +123,8 @@ class CompositeLinks:
                 column[i] = E[2] if frame.sigma == PRISMATIC else NE[2]
             rotation = self.geometry.rotation[i]
             FDI = rotation.up(E)
-            E, NE = FDI, vadd(rotation.up(NE), cross(self.geometry.P[i], FDI))
+            NE = vadd(rotation.up(NE), cross(self.geometry.P[i], FDI))
+            E = FDI
         return column
 
 

@@ -53,7 +53,8 @@ class Fp:
     __slots__ = ("p", "x")
 
     def __init__(self, x: Array, p: int) -> None:
-        self.x, self.p = x, p
+        self.x = x
+        self.p = p
 
     def _lift(self, other: Fp | int) -> Array | int:
         return other.x if isinstance(other, Fp) else other % self.p
@@ -108,7 +109,9 @@ class Draw:
         geometry: Mapping[Variable, Array] | None = None,
         count: int = 0,
     ) -> None:
-        self.robot, self.seed, self.samples = robot, seed, samples
+        self.robot = robot
+        self.seed = seed
+        self.samples = samples
         self.shape: tuple[int, ...] = (count, samples) if count else (samples,)
         self.written = numbered(robot)
         self.units = units_of(self.written)
@@ -235,7 +238,8 @@ class Draw:
     @cached_property
     def half_turn(self) -> Point:
         """The point of the angle pi/D: of order 2D, and its multiple pi/2 is (0, 1)."""
-        order, rng = 2 * self.units.D, np.random.default_rng([self.seed, 1])
+        order = 2 * self.units.D
+        rng = np.random.default_rng([self.seed, 1])
         while True:
             circle = self._point_at(rng.integers(1, self.p, 1))
             root = self._multiple(circle, (self.p + 1) // order)

@@ -39,7 +39,9 @@ class Floats:
         constants: Mapping[str, Any] | None = None,
         functions: Mapping[str, Callable[..., Any]] = NUMPY,
     ) -> None:
-        self.robot, self.states, self.functions = robot, states or {}, functions
+        self.robot = robot
+        self.states = states or {}
+        self.functions = functions
         self.constants = {**robot.constants, **(constants or {})}
 
     def symbol(self, symbol: Symbol) -> Any:

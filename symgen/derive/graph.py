@@ -97,7 +97,9 @@ class Scalar:
     __slots__ = ("graph", "node", "sign")
 
     def __init__(self, graph: Graph, node: Node, sign: int) -> None:
-        self.graph, self.node, self.sign = graph, node, sign
+        self.graph = graph
+        self.node = node
+        self.sign = sign
 
     def __neg__(self) -> Scalar:
         return Scalar(self.graph, self.node, -self.sign)
@@ -151,11 +153,14 @@ class Graph:
         return nodes, self._sealed
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
-        self.nodes, self._node = [], {}
+        self.nodes = []
+        self._node = {}
         for key, operands, op, value, fixed, name, hint, name_sign in state[0]:
             scalars = tuple(self.scalar(k, sign) for k, sign in operands)
             node = self._scalar(key, op, scalars, value, fixed).node
-            node.name, node.hint, node.name_sign = name, hint, name_sign
+            node.name = name
+            node.hint = hint
+            node.name_sign = name_sign
         self._sealed = state[1]
 
     def scalar(self, index: int, sign: int) -> Scalar:
@@ -235,13 +240,15 @@ class Graph:
     def name(self, value: Scalar | int, name: str) -> Scalar | int:
         """Call an operation `name`; the first name holds, inputs and numbers keep theirs."""
         if isinstance(value, Scalar) and self._may_be_named(value.node):
-            value.node.name, value.node.name_sign = name, value.sign
+            value.node.name = name
+            value.node.name_sign = value.sign
         return value
 
     def hint(self, value: Scalar | int, name: str) -> Scalar | int:
         """Suggest a name for an operation, to be used if it is needed more than once."""
         if isinstance(value, Scalar) and self._may_be_named(value.node) and value.node.hint is None:
-            value.node.hint, value.node.name_sign = name, value.sign
+            value.node.hint = name
+            value.node.name_sign = value.sign
         return value
 
     def _may_be_named(self, node: Node) -> bool:
@@ -336,7 +343,8 @@ def rates(
         return rate[s.node.index] if s.sign > 0 else -rate[s.node.index]
 
     for node in reachable(outputs):
-        x, xd = node.operands, [signed(operand) for operand in node.operands]
+        x = node.operands
+        xd = [signed(operand) for operand in x]
         still = all(isinstance(v, int) and v == 0 for v in xd)
         match node.op:
             case "sym":

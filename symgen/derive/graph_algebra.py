@@ -46,7 +46,9 @@ class GraphAlgebra:
     """
 
     def __init__(self, robot: Robot, *, written: bool = True) -> None:
-        self.robot, self.graph, self.written = robot, Graph(), written
+        self.robot = robot
+        self.graph = Graph()
+        self.written = written
         self.named = Names(len(robot.frames))
         self.sections: list[tuple[int, str]] = []
         self.labels: dict[str, Angle] = {}

@@ -137,7 +137,8 @@ class LoopSystem:
         (PACE); in rad, and in the longest length for slides.
         """
         J = self.jacobian_floats(self.start)
-        n, frames = self.tied.start, map(self.robot.frame, self.closure.independent)
+        n = self.tied.start
+        frames = map(self.robot.frame, self.closure.independent)
         units = np.array([1.0 if f.sigma == REVOLUTE else self.robot.longest for f in frames])
         G = np.linalg.solve(J[:, n:], J[:, :n]) * units[:n] / units[n:, None]
         return float(min(PACE[0], PACE[1] / np.abs(G).max()))
@@ -148,7 +149,8 @@ class LoopSystem:
         """
         if [self.robot.frame(j).sigma for j in self.robot.joints] != [REVOLUTE]:
             return None
-        q, mode = self.start, self.mode()
+        q = self.start
+        mode = self.mode()
         for _ in range(TURN_STEPS):
             q[0] += 2 * np.pi / TURN_STEPS
             q = self.closed(q, steps=5, tolerance=TURN_CLOSED)
@@ -168,7 +170,8 @@ def loop_system(robot: Robot) -> LoopSystem:
     configuration.
     """
     d = derive(robot)
-    closure, rows = d.closure, LoopSystem(d, tuple(range(6 * len(robot.loops))))
+    closure = d.closure
+    rows = LoopSystem(d, tuple(range(6 * len(robot.loops))))
     J = rows.jacobian_floats(rows.start)[:, rows.tied]
     equations: list[int] = []
     for _ in closure.tied:

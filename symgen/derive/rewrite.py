@@ -64,7 +64,8 @@ class Rewrite:
     """
 
     def __init__(self, source: GraphAlgebra, inputs: Inputs) -> None:
-        self.source, self.inputs = source, inputs
+        self.source = source
+        self.inputs = inputs
         self.algebra = GraphAlgebra(source.robot, written=False)
         self.algebra.labels |= source.labels  # one name, one angle, here as there
         self.graph = self.algebra.graph
@@ -82,7 +83,8 @@ class Rewrite:
 
         Names of steps that depend on them end in `tag`.
         """
-        self._case, self._tag = inputs or {}, tag
+        self._case = inputs or {}
+        self._tag = tag
         for index in self._replaced:
             del self._image[index]
         self._replaced = set()

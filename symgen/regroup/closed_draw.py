@@ -126,7 +126,9 @@ class ClosedDraw(Draw):
 
         r = sum_ik R_ik y_i z_k with y = (1, cos u, sin u) or (1, u), z = (1, cos v, sin v).
         """
-        p, slides, q_u = self.p, self.robot.frame(u).sigma == PRISMATIC, Symbol("q", f"q{u}")
+        p = self.p
+        slides = self.robot.frame(u).sigma == PRISMATIC
+        q_u = Symbol("q", f"q{u}")
         # where half-angle tangents are zero: a fold has half a turn, whose tangent is none
         zero = self._point_at(self.rng.integers(1, p, 1))
         whole = np.ones(self.samples, dtype=np.int64)
@@ -199,7 +201,8 @@ class ClosedDraw(Draw):
         hinges = [
             i for i in self.robot.joints if i in around and self.robot.frame(i).sigma == REVOLUTE
         ]
-        start, p = self.system.closure.start, self.p
+        start = self.system.closure.start
+        p = self.p
         for turns in product((0, 1, -1), repeat=len(hinges)):
             turned: Point = (
                 np.ones(self.samples, dtype=np.int64),
@@ -230,7 +233,8 @@ class ClosedDraw(Draw):
         """Leave the first samples that close of each geometry; `closed` is (geometries,
         samples).
         """
-        count, whole = self.shape[1], self.samples
+        count = self.shape[1]
+        whole = self.samples
         if (closed.sum(axis=1) < count).any():
             raise ArithmeticError(SINGULAR)
         places = np.flatnonzero(closed & (closed.cumsum(axis=1) <= count))
@@ -244,7 +248,8 @@ class ClosedDraw(Draw):
 
     def _move(self) -> None:
         """Rates and accelerations of the tied joints."""
-        joints, n = self.robot.joints, len(self.robot.joints)
+        joints = self.robot.joints
+        n = len(joints)
         named = self.system.derivation.algebra.named
         rows = [interpret(row, self) for row in self.system.jacobian]
         J = np.stack([np.stack([self._array(x) for x in row]) for row in rows])

@@ -86,7 +86,8 @@ def float_regressor(robot: Robot, names: Sequence[str]) -> Array:
 
 def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
     """D of the parameters `names` at `count` states, shape (actuated joints, count, names)."""
-    robot, D = floats.robot, derive(floats.robot).columns
+    robot = floats.robot
+    D = derive(robot).columns
     entries = [D[name].get(j, 0) for j in robot.joints for name in names]
     values = [
         np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
@@ -98,7 +99,9 @@ def _columns_near_start(
     system: LoopSystem, names: Sequence[str], count: int, rng: np.random.Generator
 ) -> Array:
     """Columns `names` at those of `count` random states that close, (joints, states, columns)."""
-    robot, closure, n = system.robot, system.closure, len(system.robot.joints)
+    robot = system.robot
+    closure = system.closure
+    n = len(robot.joints)
     size = robot.longest
     slides = np.array([robot.frame(j).sigma == PRISMATIC for j in robot.joints])
     away = SPREAD * np.where(slides, size / 2, 1.0) * rng.uniform(-1, 1, (n, count)).T
@@ -109,8 +112,10 @@ def _columns_near_start(
     r, J = system.residual_floats(q), system.jacobian_floats(q)
     good = (np.abs(r).max(axis=1) < 1e-11 * size) & (np.linalg.cond(J[..., n:]) < 1e6)
     good &= np.linalg.det(J[..., n:]) * system.mode() > 0  # beyond a dead point is another mode
-    q, J = q[good], J[good]
-    J_u, G = J[..., n:], -np.linalg.solve(J[..., n:], J[..., :n])
+    q = q[good]
+    J = J[good]
+    J_u = J[..., n:]
+    G = -np.linalg.solve(J_u, J[..., :n])
     qd, qdd = rng.standard_normal((2, n, len(q)))[..., None].swapaxes(1, 2)
 
     def joints(x: Array) -> dict[int, Array]:

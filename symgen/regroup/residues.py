@@ -37,7 +37,8 @@ def sample(draw: Draw, names: tuple[str, ...]) -> Array:
     """The regressor columns `names` at the draw's states, shape (..., n_active * samples,
     len(names)), int64 residues.
     """
-    robot, D = draw.robot, derive(draw.robot).columns
+    robot = draw.robot
+    D = derive(robot).columns
     entries = {
         (k, row): D[name][j]
         for k, name in enumerate(names)
