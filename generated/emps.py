@@ -51,7 +51,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: eb5de657e24108089a07427d2e5a15afb25bcd65c7b5f0b34b42f1ca9b085bf7
+sha256 of all but these lines: 44c4550061d83cf11b72a04d251e418e39c613a58f24326ad152b8fd5a463020
 """
 
 import numpy as np
@@ -124,10 +124,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -156,8 +160,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -447,7 +454,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, g=g)
     inertia = inertia_matrix(q, X, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -519,25 +526,19 @@ def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
 def _inertia_matrix_block(xp, q, A, X):
     """Fill A, shape (1, 1, N), from q (1, N)."""
     # Inputs
-    M1R = X[0]
-    # Inertia matrix
-    A[0, 0] = M1R
+    A[0, 0] = X[0]
 
 
 def _gravity_block(xp, q, GAM, X):
     """Fill GAM, shape (1, N), from q (1, N)."""
     # Inputs
-    OFFSET1 = X[3]
-    # Torques
-    GAM[0] = OFFSET1
+    GAM[0] = X[3]
 
 
 def _frame_poses_block(xp, q, T):
     """Fill T, shape (1, 4, 4, N), from q (1, N)."""
     # Inputs
-    q1 = q[0]
-    # Poses
-    T[0, 2, 3] = q1
+    T[0, 2, 3] = q[0]
     # Constants
     T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
 

@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 7cfe5d97b1d07bc051b692490900ab6c1782bd182fbad1801e14b6042683650d
+sha256 of all but these lines: ba79c853daccad19f26f93ae73abc47accb9f214415b9fdd0508a86bd2f4fece
 """
 
 import numpy as np
@@ -124,10 +124,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -156,8 +160,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -448,7 +455,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, g=g)
     inertia = inertia_matrix(q, X, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -527,9 +534,7 @@ def _inverse_dynamics_block(xp, q, qd, qdd, GAM, X):
 def _inertia_matrix_block(xp, q, A, X):
     """Fill A, shape (1, 1, N), from q (1, N)."""
     # Inputs
-    M1R = X[0]
-    # Inertia matrix
-    A[0, 0] = M1R
+    A[0, 0] = X[0]
 
 
 def _gravity_block(xp, q, GAM, X):
@@ -539,9 +544,7 @@ def _gravity_block(xp, q, GAM, X):
 def _frame_poses_block(xp, q, T):
     """Fill T, shape (1, 4, 4, N), from q (1, N)."""
     # Inputs
-    q1 = q[0]
-    # Poses
-    T[0, 2, 3] = q1
+    T[0, 2, 3] = q[0]
     # Constants
     T[0, 0, 0] = T[0, 1, 1] = T[0, 2, 2] = T[0, 3, 3] = 1.0
 

@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: fef20350bb8db526b7f52ddda15ee548ec96919f3898061ca0b2cbeb4f8d3d98
+sha256 of all but these lines: 4a1db771e4d591f4dd0026feb1e58680f78b7322c5026ee0eb18841af2bde089
 """
 
 import numpy as np
@@ -168,10 +168,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -344,7 +348,8 @@ def forward_dynamics(
     if xp is np:
         _states(q, qd, tau)
         tau = np.asarray(tau, dtype=float)
-    rest = tau - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4,
+        g=g)
     inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -405,23 +410,26 @@ def passive_joints(
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd
     also their accelerations.
     """
+    given = [state for state in (q, qd, qdd) if state is not None]
+    xp = np
+    rows = _passive(xp)
     states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
     states = _closed(states, ((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
-    asked = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
+    given = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
+    origin, rates = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
     shape = (*np.shape(q)[:-1], 3)
-    results = [
-        _filled(_passive_joints_block, np.zeros((3, len(x))), (x,), (float(k ==
-            0),)).T.reshape(shape)
-        for k, x in enumerate(asked)
-    ]
+    results = [(x @ rates.T).reshape(shape) for x in given]
+    results[0] += origin
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _passive_joints_block(xp, x, P, one):
-    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
-    P[0] = 1.0*x[2]
-    P[1] = 1.0*x[3]
-    P[2] = 1.0*x[1] + 1.0*x[3] - 1.0*x[0] - 1.0*x[2]
+def _passive(xp):
+    """(origin, rates) of the joints PASSIVE over the joints of the columns."""
+    return (
+        (0.0, (0.0, 0.0, 1.0, 0.0)),
+        (0.0, (0.0, 0.0, 0.0, 1.0)),
+        (0.0, (-1.0, 1.0, -1.0, 1.0)),
+    )
 
 
 def _closed(states, constants):
@@ -710,15 +718,7 @@ def _gravity_block(xp, q, qd, qdd, G, GAM, X, g):
     # Inputs
     q1, q3, q2, q4 = q
     G21, G23, G41, G43 = G
-    MX1R = X[1]
-    MY1 = X[2]
-    OFFSET1 = X[5]
-    MX2R = X[7]
-    MY2 = X[8]
-    MX3R = X[10]
-    MY3 = X[11]
-    OFFSET3 = X[14]
-    MY4 = X[16]
+    _, MX1R, MY1, _, _, OFFSET1, _, MX2R, MY2, _, MX3R, MY3, _, _, OFFSET3, _, MY4 = X
     # Trigonometry
     C1 = xp.cos(q1)
     S1 = xp.sin(q1)
@@ -759,62 +759,34 @@ def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3, L4):
     # Inputs
     q1, q3, q2, q4 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
     th12 = q1 + q2
-    C12 = xp.cos(th12)
-    S12 = xp.sin(th12)
-    C3 = xp.cos(q3)
-    S3 = xp.sin(q3)
+    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
+    S12 = T[1, 1, 0] = xp.sin(th12)
+    C3 = T[2, 0, 0] = T[2, 1, 1] = xp.cos(q3)
+    S3 = T[2, 1, 0] = xp.sin(q3)
     th34 = q3 + q4
-    C34 = xp.cos(th34)
-    S34 = xp.sin(th34)
+    C34 = T[3, 0, 0] = T[3, 1, 1] = T[4, 0, 0] = T[4, 1, 1] = T[5, 0, 0] = T[5, 1, 1] = xp.cos(th34)
+    S34 = T[3, 1, 0] = T[4, 1, 0] = T[5, 1, 0] = xp.sin(th34)
     # Frame 2
-    P12 = L1*C1
-    P22 = L1*S1
+    P12 = T[1, 0, 3] = L1*C1
+    P22 = T[1, 1, 3] = L1*S1
     # Frame 4
-    P14 = L0 + L3*C3
-    P24 = L3*S3
+    P14 = T[3, 0, 3] = L0 + L3*C3
+    P24 = T[3, 1, 3] = L3*S3
     # Frame 5
-    P15 = P12 + L2*C12
-    P25 = P22 + L2*S12
+    T[4, 0, 3] = P12 + L2*C12
+    T[4, 1, 3] = P22 + L2*S12
     # Frame 6
-    P16 = P14 + L4*C34
-    P26 = P24 + L4*S34
+    T[5, 0, 3] = P14 + L4*C34
+    T[5, 1, 3] = P24 + L4*S34
     # Poses
-    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = S12
-    T[1, 1, 1] = C12
-    T[1, 1, 3] = P22
-    T[2, 0, 0] = C3
     T[2, 0, 1] = -S3
     T[2, 0, 3] = L0
-    T[2, 1, 0] = S3
-    T[2, 1, 1] = C3
-    T[3, 0, 0] = C34
-    T[3, 0, 1] = -S34
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = S34
-    T[3, 1, 1] = C34
-    T[3, 1, 3] = P24
-    T[4, 0, 0] = C34
-    T[4, 0, 1] = -S34
-    T[4, 0, 3] = P15
-    T[4, 1, 0] = S34
-    T[4, 1, 1] = C34
-    T[4, 1, 3] = P25
-    T[5, 0, 0] = C34
-    T[5, 0, 1] = -S34
-    T[5, 0, 3] = P16
-    T[5, 1, 0] = S34
-    T[5, 1, 1] = C34
-    T[5, 1, 3] = P26
+    T[3, 0, 1] = T[4, 0, 1] = T[5, 0, 1] = -S34
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
     T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = T[5, 2, 2] = T[5, 3, 3] = 1.0
@@ -843,25 +815,21 @@ def _linearised_closure_block(xp, q, R, L0, L1, L2, L3, L4):
     P14 = L0 + C3L3
     P24 = L3*S3
     # Frame 5
-    C12L2 = L2*C12
-    P15 = P12 + C12L2
+    C12L2 = R[1, 3] = L2*C12
+    P15 = R[1, 1] = P12 + C12L2
     S12L2 = L2*S12
     P25 = P22 + S12L2
     # Frame 6
     C34L4 = L4*C34
     P16 = P14 + C34L4
-    S34L4 = L4*S34
-    P26 = P24 + S34L4
+    S34L4 = R[0, 4] = L4*S34
+    P26 = R[0, 2] = P24 + S34L4
     # Residuals and their derivatives by the joints
     R[0, 0] = P15 - P16
     R[0, 1] = -P25
-    R[0, 2] = P26
     R[0, 3] = -S12L2
-    R[0, 4] = S34L4
     R[1, 0] = P25 - P26
-    R[1, 1] = P15
     R[1, 2] = -C3L3 - C34L4
-    R[1, 3] = C12L2
     R[1, 4] = -C34L4
 
 

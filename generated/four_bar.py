@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: df375c80f8720a91a7936607ced16b1caef28fb677cbd371af1cab4306984196
+sha256 of all but these lines: 57bb53697da2a337c1c449b98830394b36cc168ce1d16e1e24f541396d1f4256
 """
 
 import numpy as np
@@ -161,10 +161,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -328,7 +332,7 @@ def forward_dynamics(
     if xp is np:
         _states(q, qd, tau)
         tau = np.asarray(tau, dtype=float)
-    rest = tau - bias(q, qd, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
     inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -388,23 +392,26 @@ def passive_joints(
     """Positions of the joints PASSIVE, shape (N, 3); with qd also their velocities, with qdd
     also their accelerations.
     """
+    given = [state for state in (q, qd, qdd) if state is not None]
+    xp = np
+    rows = _passive(xp)
     states = _states(*[np.zeros_like(q) if x is None else x for x in (q, qd, qdd)])
     states = _closed(states, ((L0, L1, L2, L3), (L1, L2, L3)))
-    asked = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
+    given = [x for x, state in zip(states, (q, qd, qdd)) if state is not None]
+    origin, rates = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
     shape = (*np.shape(q)[:-1], 3)
-    results = [
-        _filled(_passive_joints_block, np.zeros((3, len(x))), (x,), (float(k ==
-            0),)).T.reshape(shape)
-        for k, x in enumerate(asked)
-    ]
+    results = [(x @ rates.T).reshape(shape) for x in given]
+    results[0] += origin
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _passive_joints_block(xp, x, P, one):
-    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
-    P[0] = 1.0*x[1]
-    P[1] = 1.0*x[2]
-    P[2] = 1.0*x[2] - 1.0*x[0] - 1.0*x[1]
+def _passive(xp):
+    """(origin, rates) of the joints PASSIVE over the joints of the columns."""
+    return (
+        (0.0, (0.0, 1.0, 0.0)),
+        (0.0, (0.0, 0.0, 1.0)),
+        (0.0, (-1.0, -1.0, 1.0)),
+    )
 
 
 def _closed(states, constants):
@@ -675,50 +682,27 @@ def _frame_poses_block(xp, q, qd, qdd, G, T, L0, L1, L2, L3):
     # Inputs
     q1, q2, q3 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
     th12 = q1 + q2
-    C12 = xp.cos(th12)
-    S12 = xp.sin(th12)
-    C3 = xp.cos(q3)
-    S3 = xp.sin(q3)
+    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
+    S12 = T[1, 1, 0] = xp.sin(th12)
+    C3 = T[2, 0, 0] = T[2, 1, 1] = T[3, 0, 0] = T[3, 1, 1] = T[4, 0, 0] = T[4, 1, 1] = xp.cos(q3)
+    S3 = T[2, 1, 0] = T[3, 1, 0] = T[4, 1, 0] = xp.sin(q3)
     # Frame 2
-    P12 = L1*C1
-    P22 = L1*S1
+    P12 = T[1, 0, 3] = L1*C1
+    P22 = T[1, 1, 3] = L1*S1
     # Frame 4
-    P14 = P12 + L2*C12
-    P24 = P22 + L2*S12
+    T[3, 0, 3] = P12 + L2*C12
+    T[3, 1, 3] = P22 + L2*S12
     # Frame 5
-    P15 = L0 + L3*C3
-    P25 = L3*S3
+    T[4, 0, 3] = L0 + L3*C3
+    T[4, 1, 3] = L3*S3
     # Poses
-    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = S12
-    T[1, 1, 1] = C12
-    T[1, 1, 3] = P22
-    T[2, 0, 0] = C3
-    T[2, 0, 1] = -S3
+    T[2, 0, 1] = T[3, 0, 1] = T[4, 0, 1] = -S3
     T[2, 0, 3] = L0
-    T[2, 1, 0] = S3
-    T[2, 1, 1] = C3
-    T[3, 0, 0] = C3
-    T[3, 0, 1] = -S3
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = S3
-    T[3, 1, 1] = C3
-    T[3, 1, 3] = P24
-    T[4, 0, 0] = C3
-    T[4, 0, 1] = -S3
-    T[4, 0, 3] = P15
-    T[4, 1, 0] = S3
-    T[4, 1, 1] = C3
-    T[4, 1, 3] = P25
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0
     T[3, 3, 3] = T[4, 2, 2] = T[4, 3, 3] = 1.0
@@ -740,22 +724,19 @@ def _linearised_closure_block(xp, q, R, L0, L1, L2, L3):
     P12 = L1*C1
     P22 = L1*S1
     # Frame 4
-    C12L2 = L2*C12
-    P14 = P12 + C12L2
+    C12L2 = R[1, 2] = L2*C12
+    P14 = R[1, 1] = P12 + C12L2
     S12L2 = L2*S12
     P24 = P22 + S12L2
     # Frame 5
     C3L3 = L3*C3
     P15 = L0 + C3L3
-    P25 = L3*S3
+    P25 = R[0, 3] = L3*S3
     # Residuals and their derivatives by the joints
     R[0, 0] = P14 - P15
     R[0, 1] = -P24
     R[0, 2] = -S12L2
-    R[0, 3] = P25
     R[1, 0] = P24 - P25
-    R[1, 1] = P14
-    R[1, 2] = C12L2
     R[1, 3] = -C3L3
 
 

@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 1e5237b78b9e15dd121d60341bbd7a40418d3ec8792ced2fc2c6ab669f4af026
+sha256 of all but these lines: fe08fd12171acaafe249ce0620882f935bc7062b62c5c6ae596899f093ad7b19
 """
 
 import numpy as np
@@ -194,10 +194,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -226,8 +230,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -294,6 +301,14 @@ class _Arrays:
         entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
         return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
 
+    def combined(self, rows, x, origin):
+        """Linear combinations of the columns of x, (origin, rates) each; without the origin for
+        rates."""
+        columns, table = self.rows(x), {}
+        for k, (start, rates) in enumerate(rows):
+            table[k] = start*origin + sum(g*y for g, y in zip(rates, columns))
+        return self.gathered(table, (len(rows),), x)
+
     def solve(self, A, b):
         return self.package.linalg.solve(A, b[..., None])[..., 0]
 
@@ -328,6 +343,8 @@ class _Symbols:
         for place, x in table.items():
             matrix[place] = x
         return matrix
+
+    combined = _Arrays.combined
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
@@ -575,7 +592,8 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, D4=D4, D6=D6, c=c, gx=gx,
+        gy=gy)
     inertia = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -634,19 +652,27 @@ def passive_joints(
     also their accelerations.
     """
     given = [state for state in (q, qd, qdd) if state is not None]
-    results = [
-        _evaluated(_passive_joints_block, (4,), (x,), (), (float(k == 0), c))
-        for k, x in enumerate(given)
-    ]
+    xp = _package(*given)
+    rows = _passive(xp, c)
+    if xp is not np:
+        results = [xp.combined(rows, x, k == 0) for k, x in enumerate(given)]
+        return results[0] if len(results) == 1 else tuple(results)
+    given = _states(*given)
+    origin, rates = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    shape = (*np.shape(q)[:-1], 4)
+    results = [(x @ rates.T).reshape(shape) for x in given]
+    results[0] += origin
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _passive_joints_block(xp, x, P, one, c):
-    """Fill P, shape (4, N), of positions x; of rates where `one` is 0."""
-    P[0] = (xp.pi)*one - 1.0*x[1] + 1.0*x[2]
-    P[1] = (c)*one - 1.0*x[2]
-    P[2] = 1.0*x[1] - 1.0*x[2]
-    P[3] = (xp.pi)*one - 1.0*x[1] + 1.0*x[2]
+def _passive(xp, c):
+    """(origin, rates) of the joints PASSIVE over the joints of the columns."""
+    return (
+        (xp.pi, (0.0, -1.0, 1.0)),
+        (c, (0.0, 0.0, -1.0)),
+        (0.0, (0.0, 1.0, -1.0)),
+        (xp.pi, (0.0, -1.0, 1.0)),
+    )
 
 
 def _motion(xp, q, qd, qdd, D3, D4, D6, c, gx, gy):
@@ -912,21 +938,10 @@ def _inertia_matrix_block(xp, q, A, X, D3, D4, D6, c):
     """Fill A, shape (3, 3, N), from q (3, N)."""
     # Inputs
     q2, q5 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[6]
-    XY2R = X[7]
-    XZ2R = X[8]
-    YZ2R = X[9]
-    ZZ2R = X[10]
-    XX3R = X[16]
-    XY3R = X[17]
-    XZ3R = X[18]
-    YZ3R = X[19]
-    ZZ3R = X[20]
-    MX3R = X[21]
-    MY3 = X[22]
-    MX4R = X[23]
-    MY6 = X[29]
+    (
+        ZZ1R, _, _, _, _, _, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, _, _, _, _, _, XX3R, XY3R, XZ3R,
+        YZ3R, ZZ3R, MX3R, MY3, MX4R, _, _, _, _, _, MY6
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -970,16 +985,14 @@ def _inertia_matrix_block(xp, q, A, X, D3, D4, D6, c):
     JP232 = YZ2R + NE223
     # Composite link 2
     NE312 = -S2*JP132 - C2*JP232
-    JP331 = ZZ1R + JP225*C5**2 + JP125*2*C5*S5 + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    A[0, 0] = ZZ1R + JP225*C5**2 + JP125*2*C5*S5 + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
     # Unit acceleration of joint 3
-    NE313 = -S2*NE123 - C2*NE223
+    NE313 = A[0, 2] = A[2, 0] = -S2*NE123 - C2*NE223
     # Unit acceleration of joint 4
     E224 = -S2m5*AS24 - C2m5*AS14
     # Inertia matrix
-    A[0, 0] = JP331
     A[0, 1] = A[1, 0] = NE312 - NE313
     A[1, 1] = ZZ2R
-    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = NE356 + D3AS13 - D3*E224
     A[2, 2] = ZZ3R
 
@@ -988,19 +1001,10 @@ def _gravity_block(xp, q, GAM, X, c, gx, gy):
     """Fill GAM, shape (3, N), from q (3, N)."""
     # Inputs
     q1, q2, q5 = q
-    MX1 = X[1]
-    MY1R = X[2]
-    OFFSET1 = X[5]
-    MX2R = X[11]
-    MY2 = X[12]
-    OFFSET2 = X[15]
-    MX3R = X[21]
-    MY3 = X[22]
-    MX4R = X[23]
-    MX5R = X[24]
-    MY5 = X[25]
-    OFFSET5 = X[28]
-    MY6 = X[29]
+    (
+        _, MX1, MY1R, _, _, OFFSET1, _, _, _, _, _, MX2R, MY2, _, _, OFFSET2, _, _, _, _, _,
+        MX3R, MY3, MX4R, MX5R, MY5, _, _, OFFSET5, MY6
+    ) = X
     # Trigonometry
     C1 = xp.cos(q1)
     S1 = xp.sin(q1)
@@ -1066,120 +1070,56 @@ def _frame_poses_block(xp, q, T, D3, D4, D6, c):
     # Inputs
     q1, q2, q5 = q
     # Constants
-    Z241 = xp.cos(c)
-    Z141 = xp.sin(c)
+    Z241 = T[3, 2, 1] = xp.cos(c)
+    Z141 = T[3, 2, 0] = xp.sin(c)
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = T[3, 1, 2] = T[4, 1, 2] = T[5, 1,
+        2] = T[6, 1, 2] = T[7, 1, 2] = (xp.cos(q1))
+    S1 = T[0, 1, 0] = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
-    C5 = xp.cos(q5)
-    S5 = xp.sin(q5)
+    C5 = T[2, 2, 1] = T[6, 2, 1] = T[7, 2, 1] = xp.cos(q5)
+    S5 = T[2, 2, 0] = T[6, 2, 0] = T[7, 2, 0] = xp.sin(q5)
     # Frame 2
-    R112 = C1*C2
-    R122 = -C1*S2
-    R212 = S1*C2
-    R222 = -S1*S2
+    R112 = T[1, 0, 0] = T[5, 0, 0] = C1*C2
+    T[1, 0, 1] = T[5, 0, 1] = -C1*S2
+    R212 = T[1, 1, 0] = T[5, 1, 0] = S1*C2
+    T[1, 1, 1] = T[5, 1, 1] = -S1*S2
     # Frame 3
-    R113 = -C1*C5
-    R123 = C1*S5
-    R213 = -S1*C5
-    R223 = S1*S5
-    P13 = D3*R112
-    P23 = D3*R212
-    P33 = -D3*S2
+    R113 = T[2, 0, 0] = T[6, 0, 0] = T[7, 0, 0] = -C1*C5
+    R123 = T[2, 0, 1] = T[6, 0, 1] = T[7, 0, 1] = C1*S5
+    R213 = T[2, 1, 0] = T[6, 1, 0] = T[7, 1, 0] = -S1*C5
+    R223 = T[2, 1, 1] = T[6, 1, 1] = T[7, 1, 1] = S1*S5
+    P13 = T[2, 0, 3] = D3*R112
+    P23 = T[2, 1, 3] = D3*R212
+    P33 = T[2, 2, 3] = -D3*S2
     # Frame 4
-    R114 = -Z241*C1
-    R124 = Z141*C1
-    R214 = -Z241*S1
-    R224 = Z141*S1
-    P14 = P13 + D4*R113
-    P24 = P23 + D4*R213
-    P34 = P33 + D4*S5
+    T[3, 0, 0] = -Z241*C1
+    T[3, 0, 1] = Z141*C1
+    T[3, 1, 0] = -Z241*S1
+    T[3, 1, 1] = Z141*S1
+    T[3, 0, 3] = P13 + D4*R113
+    T[3, 1, 3] = P23 + D4*R213
+    T[3, 2, 3] = P33 + D4*S5
     # Frame 6
-    P16 = -D6*R113
-    P26 = -D6*R213
-    P36 = -D6*S5
+    P16 = T[5, 0, 3] = -D6*R113
+    P26 = T[5, 1, 3] = -D6*R213
+    P36 = T[5, 2, 3] = -D6*S5
     # Frame 7
-    P17 = P13 + P16
-    P27 = P23 + P26
-    P37 = P33 + P36
+    T[6, 0, 3] = T[7, 0, 3] = P13 + P16
+    T[6, 1, 3] = T[7, 1, 3] = P23 + P26
+    T[6, 2, 3] = T[7, 2, 3] = P33 + P36
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
-    T[1, 2, 0] = -S2
-    T[1, 2, 1] = -C2
-    T[2, 0, 0] = R113
-    T[2, 0, 1] = R123
-    T[2, 0, 2] = -S1
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = R213
-    T[2, 1, 1] = R223
-    T[2, 1, 2] = C1
-    T[2, 1, 3] = P23
-    T[2, 2, 0] = S5
-    T[2, 2, 1] = C5
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
-    T[3, 0, 2] = -S1
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
-    T[3, 1, 2] = C1
-    T[3, 1, 3] = P24
-    T[3, 2, 0] = Z141
-    T[3, 2, 1] = Z241
-    T[3, 2, 3] = P34
+    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = T[3, 0, 2] = T[4, 0, 2] = T[5, 0, 2] = T[6, 0, 2] = T[7,
+        0, 2] = (-S1)
+    T[1, 2, 0] = T[5, 2, 0] = -S2
+    T[1, 2, 1] = T[5, 2, 1] = -C2
     T[4, 0, 0] = -R113
     T[4, 0, 1] = -R123
-    T[4, 0, 2] = -S1
     T[4, 1, 0] = -R213
     T[4, 1, 1] = -R223
-    T[4, 1, 2] = C1
     T[4, 2, 0] = -S5
     T[4, 2, 1] = -C5
-    T[5, 0, 0] = R112
-    T[5, 0, 1] = R122
-    T[5, 0, 2] = -S1
-    T[5, 0, 3] = P16
-    T[5, 1, 0] = R212
-    T[5, 1, 1] = R222
-    T[5, 1, 2] = C1
-    T[5, 1, 3] = P26
-    T[5, 2, 0] = -S2
-    T[5, 2, 1] = -C2
-    T[5, 2, 3] = P36
-    T[6, 0, 0] = R113
-    T[6, 0, 1] = R123
-    T[6, 0, 2] = -S1
-    T[6, 0, 3] = P17
-    T[6, 1, 0] = R213
-    T[6, 1, 1] = R223
-    T[6, 1, 2] = C1
-    T[6, 1, 3] = P27
-    T[6, 2, 0] = S5
-    T[6, 2, 1] = C5
-    T[6, 2, 3] = P37
-    T[7, 0, 0] = R113
-    T[7, 0, 1] = R123
-    T[7, 0, 2] = -S1
-    T[7, 0, 3] = P17
-    T[7, 1, 0] = R213
-    T[7, 1, 1] = R223
-    T[7, 1, 2] = C1
-    T[7, 1, 3] = P27
-    T[7, 2, 0] = S5
-    T[7, 2, 1] = C5
-    T[7, 2, 3] = P37
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = 1.0

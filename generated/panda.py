@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: bfe627249e09a0584c65e970f9563eedcd161e879e0ff7bade4f75dfbf80fd16
+sha256 of all but these lines: ecb6d08e9e2da9ac35eb6b1a22990598a21e743bfd9dc5179da378982320acc1
 """
 
 import numpy as np
@@ -198,10 +198,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -230,8 +234,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -593,7 +600,8 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5,
+        D7=D7, g=g)
     inertia = inertia_matrix(q, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -1310,52 +1318,12 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     """Fill A, shape (7, 7, N), from q (7, N)."""
     # Inputs
     q2, q3, q4, q5, q6, q7 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[4]
-    XY2 = X[5]
-    XZ2 = X[6]
-    YZ2 = X[7]
-    ZZ2R = X[8]
-    XX3R = X[14]
-    XY3R = X[15]
-    XZ3 = X[16]
-    YZ3 = X[17]
-    ZZ3R = X[18]
-    MX3R = X[19]
-    MY3R = X[20]
-    Ia3 = X[21]
-    XX4R = X[25]
-    XY4R = X[26]
-    XZ4 = X[27]
-    YZ4 = X[28]
-    ZZ4R = X[29]
-    MX4R = X[30]
-    MY4R = X[31]
-    Ia4 = X[32]
-    XX5R = X[36]
-    XY5 = X[37]
-    XZ5 = X[38]
-    YZ5 = X[39]
-    ZZ5R = X[40]
-    MX5 = X[41]
-    MY5R = X[42]
-    Ia5 = X[43]
-    XX6R = X[47]
-    XY6R = X[48]
-    XZ6 = X[49]
-    YZ6 = X[50]
-    ZZ6R = X[51]
-    MX6R = X[52]
-    MY6R = X[53]
-    Ia6 = X[54]
-    XX7R = X[58]
-    XY7 = X[59]
-    XZ7 = X[60]
-    YZ7 = X[61]
-    ZZ7 = X[62]
-    MX7 = X[63]
-    MY7 = X[64]
-    Ia7 = X[65]
+    (
+        ZZ1R, _, _, _, XX2R, XY2, XZ2, YZ2, ZZ2R, _, _, _, _, _, XX3R, XY3R, XZ3, YZ3, ZZ3R,
+        MX3R, MY3R, Ia3, _, _, _, XX4R, XY4R, XZ4, YZ4, ZZ4R, MX4R, MY4R, Ia4, _, _, _, XX5R,
+        XY5, XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, _, _, _, XX6R, XY6R, XZ6, YZ6, ZZ6R, MX6R, MY6R,
+        Ia6, _, _, _, XX7R, XY7, XZ7, YZ7, ZZ7, MX7, MY7, Ia7, _, _, _
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1376,7 +1344,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     C7S7 = C7*S7
     AJA117 = XX7R*C7C7 - XY7*2*C7S7
     NE167 = XZ7*C7 - YZ7*S7
-    NE367 = XZ7*S7 + YZ7*C7
+    NE367 = A[5, 6] = A[6, 5] = XZ7*S7 + YZ7*C7
     D7AS17 = D7*AS17
     JP226a = 2*D7AS17
     JP116 = XX6R + AJA117
@@ -1394,7 +1362,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP115a = JP116 - JP226
     JP115b = C6C6*JP115a - JP126*2*C6S6
     NE156 = C6*JP136 - S6*JP236
-    NE356 = S6*JP136 + C6*JP236
+    NE356 = A[4, 5] = A[5, 4] = S6*JP136 + C6*JP236
     JP115 = XX5R + JP226 + JP115b
     JP125 = XY5 - NE156
     JP135 = XZ5 + C6S6*JP115a + JP126*2*C6C6 - JP126
@@ -1418,7 +1386,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP124 = XY4R + AJA125 + D4*AS36 - RL5AS15
     JP134 = XZ4 + C5S5*JP114a + JP125 + D4AS35 - JP125*2*C5C5
     JP224 = JP335 - 2*D4AS15
-    NE345 = -S5*JP135 - C5*JP235 - RL5*AS35
+    NE345 = A[3, 4] = A[4, 3] = -S5*JP135 - C5*JP235 - RL5*AS35
     JP234 = YZ4 + NE345
     JP334 = ZZ4R + JP115 + JP114b - 2*(D4AS15 - RL5AS36)
     MSP14 = MX4R + AS15
@@ -1431,7 +1399,7 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     JP113a = JP114 - JP224
     JP113b = C4C4*JP113a - JP124*2*C4S4
     NE134 = C4*JP134 - S4*JP234
-    NE334 = S4*JP134 + C4*JP234
+    NE334 = A[2, 3] = A[3, 2] = S4*JP134 + C4*JP234
     D4AS14 = D4*AS14
     JP223a = 2*D4AS14
     JP113 = XX3R + JP224 + JP113b
@@ -1454,21 +1422,21 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     NE123 = C3*JP133 - S3*JP233 - RL3*AS13
     JP122 = XY2 - NE123
     JP132 = XZ2 + C3S3*JP112a + JP123*2*C3C3 - JP123
-    NE323 = S3*JP133 + C3*JP233 - RL3*AS33
+    NE323 = A[1, 2] = A[2, 1] = S3*JP133 + C3*JP233 - RL3*AS33
     JP232 = YZ2 - NE323
-    JP332 = ZZ2R + JP113 + JP112c - JP112b
+    A[1, 1] = ZZ2R + JP113 + JP112c - JP112b
     # Composite link 2
-    NE312 = -S2*JP132 - C2*JP232
-    JP331 = ZZ1R + JP112 + C2**2*(JP333 - JP112) + JP122*2*C2*S2
+    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232
+    A[0, 0] = ZZ1R + JP112 + C2**2*(JP333 - JP112) + JP122*2*C2*S2
     # Unit acceleration of joint 3
-    NE313 = C2*JP333 - S2*NE123
+    A[0, 2] = A[2, 0] = C2*JP333 - S2*NE123
     # Unit acceleration of joint 4
     NE234 = -JP334 - D4AS14
     E124 = -C3*AS34
     E324 = -S3*AS34
     NE124 = C3*NE134 - S3*NE234 - RL3*E324
-    NE324 = S3*NE134 + C3*NE234 + RL3*E124
-    NE314 = C2*NE334 - S2*NE124
+    A[1, 3] = A[3, 1] = S3*NE134 + C3*NE234 + RL3*E124
+    A[0, 3] = A[3, 0] = C2*NE334 - S2*NE124
     # Unit acceleration of joint 5
     NE145 = AJA125 - RL5AS15
     NE245 = JP335 - D4AS15
@@ -1476,79 +1444,56 @@ def _inertia_matrix_block(xp, q, A, X, RL3, D4, RL5, D7):
     E335 = S4*AS35
     NE135 = C4*NE145 - S4*NE245
     NE235 = -NE345 - D4*E335
-    NE335 = D4AS15 + S4*NE145 + C4*NE245
+    NE335 = A[2, 4] = A[4, 2] = D4AS15 + S4*NE145 + C4*NE245
     E125 = C3*E135 - S3*AS15
     E325 = S3*E135 + C3*AS15
     NE125 = C3*NE135 - S3*NE235 - RL3*E325
-    NE325 = S3*NE135 + C3*NE235 + RL3*E125
-    NE315 = C2*NE335 - S2*NE125
+    A[1, 4] = A[4, 1] = S3*NE135 + C3*NE235 + RL3*E125
+    A[0, 4] = A[4, 0] = C2*NE335 - S2*NE125
     # Unit acceleration of joint 6
     E146 = -C5*AS36
     E346 = S5*AS36
     D4E346 = D4*E346
     NE146 = C5*NE156 + S5*JP336 + RL5*E346
     NE246 = NE356 + D4E346
-    NE346 = C5*JP336 - S5*NE156 - D4*AS16 - RL5*E146
+    NE346 = A[3, 5] = A[5, 3] = C5*JP336 - S5*NE156 - D4*AS16 - RL5*E146
     E136 = C4*E146 - S4*AS16
     E336 = S4*E146 + C4*AS16
     NE136 = C4*NE146 - S4*NE246
     NE236 = -NE346 - D4*E336
-    NE336 = S4*NE146 + C4*NE246 - D4E346
+    NE336 = A[2, 5] = A[5, 2] = S4*NE146 + C4*NE246 - D4E346
     E126 = C3*E136 + S3*E346
     E326 = S3*E136 - C3*E346
     NE126 = C3*NE136 - S3*NE236 - RL3*E326
-    NE326 = S3*NE136 + C3*NE236 + RL3*E126
-    NE316 = C2*NE336 - S2*NE126
+    A[1, 5] = A[5, 1] = S3*NE136 + C3*NE236 + RL3*E126
+    A[0, 5] = A[5, 0] = C2*NE336 - S2*NE126
     # Unit acceleration of joint 7
     NE267 = -ZZ7 - D7AS17
     E157 = -C6*AS37
     E357 = -S6*AS37
     NE157 = C6*NE167 - S6*NE267
-    NE357 = S6*NE167 + C6*NE267
+    NE357 = A[4, 6] = A[6, 4] = S6*NE167 + C6*NE267
     E147 = C5*E157 + S5*AS17
     E347 = C5*AS17 - S5*E157
     D4E347 = D4*E347
     NE147 = C5*NE157 + S5*NE367 + RL5*E347
     NE247 = NE357 + D4E347
-    NE347 = C5*NE367 - S5*NE157 - D4*E357 - RL5*E147
+    NE347 = A[3, 6] = A[6, 3] = C5*NE367 - S5*NE157 - D4*E357 - RL5*E147
     E137 = C4*E147 - S4*E357
     E337 = S4*E147 + C4*E357
     NE137 = C4*NE147 - S4*NE247
     NE237 = -NE347 - D4*E337
-    NE337 = S4*NE147 + C4*NE247 - D4E347
+    NE337 = A[2, 6] = A[6, 2] = S4*NE147 + C4*NE247 - D4E347
     E127 = C3*E137 + S3*E347
     E327 = S3*E137 - C3*E347
     NE127 = C3*NE137 - S3*NE237 - RL3*E327
-    NE327 = S3*NE137 + C3*NE237 + RL3*E127
-    NE317 = C2*NE337 - S2*NE127
+    A[1, 6] = A[6, 1] = S3*NE137 + C3*NE237 + RL3*E127
+    A[0, 6] = A[6, 0] = C2*NE337 - S2*NE127
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
-    A[1, 1] = JP332
-    A[0, 2] = A[2, 0] = NE313
-    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = Ia3 + JP333
-    A[0, 3] = A[3, 0] = NE314
-    A[1, 3] = A[3, 1] = NE324
-    A[2, 3] = A[3, 2] = NE334
     A[3, 3] = Ia4 + JP334
-    A[0, 4] = A[4, 0] = NE315
-    A[1, 4] = A[4, 1] = NE325
-    A[2, 4] = A[4, 2] = NE335
-    A[3, 4] = A[4, 3] = NE345
     A[4, 4] = Ia5 + JP335
-    A[0, 5] = A[5, 0] = NE316
-    A[1, 5] = A[5, 1] = NE326
-    A[2, 5] = A[5, 2] = NE336
-    A[3, 5] = A[5, 3] = NE346
-    A[4, 5] = A[5, 4] = NE356
     A[5, 5] = Ia6 + JP336
-    A[0, 6] = A[6, 0] = NE317
-    A[1, 6] = A[6, 1] = NE327
-    A[2, 6] = A[6, 2] = NE337
-    A[3, 6] = A[6, 3] = NE347
-    A[4, 6] = A[6, 4] = NE357
-    A[5, 6] = A[6, 5] = NE367
     A[6, 6] = ZZ7 + Ia7
 
 
@@ -1556,25 +1501,12 @@ def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (7, N), from q (7, N)."""
     # Inputs
     q2, q3, q4, q5, q6, q7 = q[1:]
-    OFFSET1 = X[3]
-    MX2 = X[9]
-    MY2R = X[10]
-    OFFSET2 = X[13]
-    MX3R = X[19]
-    MY3R = X[20]
-    OFFSET3 = X[24]
-    MX4R = X[30]
-    MY4R = X[31]
-    OFFSET4 = X[35]
-    MX5 = X[41]
-    MY5R = X[42]
-    OFFSET5 = X[46]
-    MX6R = X[52]
-    MY6R = X[53]
-    OFFSET6 = X[57]
-    MX7 = X[63]
-    MY7 = X[64]
-    OFFSET7 = X[68]
+    (
+        _, _, _, OFFSET1, _, _, _, _, _, MX2, MY2R, _, _, OFFSET2, _, _, _, _, _, MX3R, MY3R, _,
+        _, _, OFFSET3, _, _, _, _, _, MX4R, MY4R, _, _, _, OFFSET4, _, _, _, _, _, MX5, MY5R, _,
+        _, _, OFFSET5, _, _, _, _, _, MX6R, MY6R, _, _, _, OFFSET6, _, _, _, _, _, MX7, MY7, _,
+        _, _, OFFSET7
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1656,9 +1588,9 @@ def _frame_poses_block(xp, q, T, RL1, RL3, D4, RL5, D7):
     # Inputs
     q1, q2, q3, q4, q5, q6, q7 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
-    C2 = xp.cos(q2)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
+    C2 = T[2, 2, 2] = xp.cos(q2)
     S2 = xp.sin(q2)
     C3 = xp.cos(q3)
     S3 = xp.sin(q3)
@@ -1671,137 +1603,78 @@ def _frame_poses_block(xp, q, T, RL1, RL3, D4, RL5, D7):
     C7 = xp.cos(q7)
     S7 = xp.sin(q7)
     # Joint axes Z and velocities V seen from link 3
-    Z131 = -S2*C3
-    Z231 = S2*S3
+    Z131 = T[2, 2, 0] = -S2*C3
+    Z231 = T[2, 2, 1] = S2*S3
     # Joint axes Z and velocities V seen from link 4
-    Z141 = C4*Z131 + C2*S4
-    Z241 = C2*C4 - S4*Z131
+    Z141 = T[3, 2, 0] = C4*Z131 + C2*S4
+    Z241 = T[3, 2, 1] = T[4, 2, 2] = C2*C4 - S4*Z131
     # Joint axes Z and velocities V seen from link 5
-    Z151 = C5*Z141 + S5*Z231
-    Z251 = C5*Z231 - S5*Z141
+    Z151 = T[4, 2, 0] = C5*Z141 + S5*Z231
+    Z251 = T[4, 2, 1] = C5*Z231 - S5*Z141
     # Joint axes Z and velocities V seen from link 6
-    Z161 = C6*Z151 + S6*Z241
-    Z261 = C6*Z241 - S6*Z151
+    Z161 = T[5, 2, 0] = C6*Z151 + S6*Z241
+    Z261 = T[5, 2, 1] = C6*Z241 - S6*Z151
     # Joint axes Z and velocities V seen from link 7
-    Z171 = C7*Z161 - S7*Z251
-    Z271 = -C7*Z251 - S7*Z161
+    T[6, 2, 0] = C7*Z161 - S7*Z251
+    T[6, 2, 1] = -C7*Z251 - S7*Z161
     # Frame 2
-    R112 = C1*C2
-    R122 = -C1*S2
-    R212 = S1*C2
-    R222 = -S1*S2
+    R112 = T[1, 0, 0] = C1*C2
+    R122 = T[1, 0, 1] = -C1*S2
+    R212 = T[1, 1, 0] = S1*C2
+    R222 = T[1, 1, 1] = -S1*S2
     # Frame 3
-    R113 = C3*R112 - S1*S3
-    R123 = -S1*C3 - S3*R112
-    R213 = C3*R212 + C1*S3
-    R223 = C1*C3 - S3*R212
-    P13 = -RL3*R122
-    P23 = -RL3*R222
-    P33 = RL1 + RL3*C2
+    R113 = T[2, 0, 0] = C3*R112 - S1*S3
+    R123 = T[2, 0, 1] = -S1*C3 - S3*R112
+    R213 = T[2, 1, 0] = C3*R212 + C1*S3
+    R223 = T[2, 1, 1] = C1*C3 - S3*R212
+    P13 = T[2, 0, 3] = -RL3*R122
+    P23 = T[2, 1, 3] = -RL3*R222
+    P33 = T[2, 2, 3] = RL1 + RL3*C2
     # Frame 4
-    R114 = C4*R113 - S4*R122
-    R124 = -C4*R122 - S4*R113
-    R214 = C4*R213 - S4*R222
-    R224 = -C4*R222 - S4*R213
-    P14 = P13 + D4*R113
-    P24 = P23 + D4*R213
-    P34 = P33 + D4*Z131
+    R114 = T[3, 0, 0] = C4*R113 - S4*R122
+    R124 = T[3, 0, 1] = T[4, 0, 2] = -C4*R122 - S4*R113
+    R214 = T[3, 1, 0] = C4*R213 - S4*R222
+    R224 = T[3, 1, 1] = T[4, 1, 2] = -C4*R222 - S4*R213
+    P14 = T[3, 0, 3] = P13 + D4*R113
+    P24 = T[3, 1, 3] = P23 + D4*R213
+    P34 = T[3, 2, 3] = P33 + D4*Z131
     # Frame 5
-    R115 = C5*R114 + S5*R123
-    R125 = C5*R123 - S5*R114
-    R215 = C5*R214 + S5*R223
-    R225 = C5*R223 - S5*R214
-    P15 = P14 + RL5*R124 - D4*R114
-    P25 = P24 + RL5*R224 - D4*R214
-    P35 = P34 + RL5*Z241 - D4*Z141
+    R115 = T[4, 0, 0] = C5*R114 + S5*R123
+    R125 = T[4, 0, 1] = C5*R123 - S5*R114
+    R215 = T[4, 1, 0] = C5*R214 + S5*R223
+    R225 = T[4, 1, 1] = C5*R223 - S5*R214
+    P15 = T[4, 0, 3] = T[5, 0, 3] = P14 + RL5*R124 - D4*R114
+    P25 = T[4, 1, 3] = T[5, 1, 3] = P24 + RL5*R224 - D4*R214
+    P35 = T[4, 2, 3] = T[5, 2, 3] = P34 + RL5*Z241 - D4*Z141
     # Frame 6
-    R116 = C6*R115 + S6*R124
-    R126 = C6*R124 - S6*R115
-    R216 = C6*R215 + S6*R224
-    R226 = C6*R224 - S6*R215
+    R116 = T[5, 0, 0] = C6*R115 + S6*R124
+    R126 = T[5, 0, 1] = C6*R124 - S6*R115
+    R216 = T[5, 1, 0] = C6*R215 + S6*R224
+    R226 = T[5, 1, 1] = C6*R224 - S6*R215
     # Frame 7
-    R117 = C7*R116 - S7*R125
-    R127 = -C7*R125 - S7*R116
-    R217 = C7*R216 - S7*R225
-    R227 = -C7*R225 - S7*R216
-    P17 = P15 + D7*R116
-    P27 = P25 + D7*R216
-    P37 = P35 + D7*Z161
+    T[6, 0, 0] = C7*R116 - S7*R125
+    T[6, 0, 1] = -C7*R125 - S7*R116
+    T[6, 1, 0] = C7*R216 - S7*R225
+    T[6, 1, 1] = -C7*R225 - S7*R216
+    T[6, 0, 3] = P15 + D7*R116
+    T[6, 1, 3] = P25 + D7*R216
+    T[6, 2, 3] = P35 + D7*Z161
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[0, 2, 3] = RL1
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
+    T[0, 0, 1] = T[1, 0, 2] = -S1
+    T[0, 2, 3] = T[1, 2, 3] = RL1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 3] = RL1
-    T[2, 0, 0] = R113
-    T[2, 0, 1] = R123
     T[2, 0, 2] = -R122
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = R213
-    T[2, 1, 1] = R223
     T[2, 1, 2] = -R222
-    T[2, 1, 3] = P23
-    T[2, 2, 0] = Z131
-    T[2, 2, 1] = Z231
-    T[2, 2, 2] = C2
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
-    T[3, 1, 3] = P24
-    T[3, 2, 0] = Z141
-    T[3, 2, 1] = Z241
     T[3, 2, 2] = -Z231
-    T[3, 2, 3] = P34
-    T[4, 0, 0] = R115
-    T[4, 0, 1] = R125
-    T[4, 0, 2] = R124
-    T[4, 0, 3] = P15
-    T[4, 1, 0] = R215
-    T[4, 1, 1] = R225
-    T[4, 1, 2] = R224
-    T[4, 1, 3] = P25
-    T[4, 2, 0] = Z151
-    T[4, 2, 1] = Z251
-    T[4, 2, 2] = Z241
-    T[4, 2, 3] = P35
-    T[5, 0, 0] = R116
-    T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
-    T[5, 0, 3] = P15
-    T[5, 1, 0] = R216
-    T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
-    T[5, 1, 3] = P25
-    T[5, 2, 0] = Z161
-    T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
-    T[5, 2, 3] = P35
-    T[6, 0, 0] = R117
-    T[6, 0, 1] = R127
     T[6, 0, 2] = -R126
-    T[6, 0, 3] = P17
-    T[6, 1, 0] = R217
-    T[6, 1, 1] = R227
     T[6, 1, 2] = -R226
-    T[6, 1, 3] = P27
-    T[6, 2, 0] = Z171
-    T[6, 2, 1] = Z271
     T[6, 2, 2] = -Z261
-    T[6, 2, 3] = P37
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = 1.0

@@ -67,7 +67,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: f639c00103e7627ea2cc54eb40320182f81bbc74712d838834ec588f80b4816d
+sha256 of all but these lines: df210e0bdb05b33206e446469e16e1056fdbf6562f854a124a8a50bcdee5da3b
 """
 
 import numpy as np
@@ -148,10 +148,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -180,8 +184,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -479,7 +486,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D2=D2, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, g=g)
     inertia = inertia_matrix(q, X, D2=D2, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -620,12 +627,10 @@ def _inertia_matrix_block(xp, q, A, X, D2):
     # Composite link 2
     AS12 = MX2*C2 - MY2*S2
     D2AS12 = D2*AS12
-    JP331 = ZZ1R + ZZ2 + 2*D2AS12
+    A[0, 0] = ZZ1R + ZZ2 + 2*D2AS12
     # Unit acceleration of joint 2
-    NE312 = ZZ2 + D2AS12
+    A[0, 1] = A[1, 0] = ZZ2 + D2AS12
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
     A[1, 1] = ZZ2 + Ia2
 
 
@@ -665,25 +670,17 @@ def _frame_poses_block(xp, q, T, D2):
     # Inputs
     q1, q2 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
     th12 = q1 + q2
-    C12 = xp.cos(th12)
-    S12 = xp.sin(th12)
+    T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
+    S12 = T[1, 1, 0] = xp.sin(th12)
     # Frame 2
-    P12 = D2*C1
-    P22 = D2*S1
+    T[1, 0, 3] = D2*C1
+    T[1, 1, 3] = D2*S1
     # Poses
-    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = S12
-    T[1, 1, 1] = C12
-    T[1, 1, 3] = P22
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = 1.0
 

@@ -73,7 +73,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 1ab122b47eb677bedf3d03fae90625d4337ca18f2af1817653310f3f00ff0037
+sha256 of all but these lines: 2aaaee3647d9efb6592a37ca575a8cf1918b8bc57c1da57f39f760447e878826
 """
 
 import numpy as np
@@ -165,10 +165,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -197,8 +201,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -519,7 +526,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D2=D2, D3=D3, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, D3=D3, g=g)
     inertia = inertia_matrix(q, X, D2=D2, D3=D3, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -713,16 +720,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3):
     """Fill A, shape (4, 4, N), from q (4, N)."""
     # Inputs
     q2, q3 = q[1:3]
-    ZZ1R = X[0]
-    ZZ2R = X[4]
-    MX2R = X[5]
-    MY2 = X[6]
-    Ia2 = X[7]
-    ZZ3R = X[11]
-    MX3R = X[12]
-    MY3R = X[13]
-    Ia3 = X[14]
-    M4R = X[18]
+    ZZ1R, _, _, _, ZZ2R, MX2R, MY2, Ia2, _, _, _, ZZ3R, MX3R, MY3R, Ia3, _, _, _, M4R, _, _, _ = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -739,19 +737,15 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3):
     # Composite link 2
     AS12 = C2*MSP12 - S2*MSP22
     D2AS12 = D2*AS12
-    JP331 = ZZ1R + JP332 + D2AS12 + D2*(AS12 + D2*M4R)
+    A[0, 0] = ZZ1R + JP332 + D2AS12 + D2*(AS12 + D2*M4R)
     # Unit acceleration of joint 2
-    NE312 = JP332 + D2AS12
+    A[0, 1] = A[1, 0] = JP332 + D2AS12
     # Unit acceleration of joint 3
-    NE323 = ZZ3R + D3AS13
+    NE323 = A[1, 2] = A[2, 1] = ZZ3R + D3AS13
     E213 = C2*AS13 - S2*AS23
-    NE313 = NE323 + D2*E213
+    A[0, 2] = A[2, 0] = NE323 + D2*E213
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
     A[1, 1] = Ia2 + JP332
-    A[0, 2] = A[2, 0] = NE313
-    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = ZZ3R + Ia3
     A[3, 3] = M4R
 
@@ -759,17 +753,14 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3):
 def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (4, N), from q (4, N)."""
     # Inputs
-    OFFSET1 = X[3]
-    OFFSET2 = X[10]
-    OFFSET3 = X[17]
+    GAM[0] = X[3]
+    GAM[1] = X[10]
+    GAM[2] = X[17]
     M4R = X[18]
     OFFSET4R = X[21]
     # Constants
     F34 = g*M4R
     # Torques
-    GAM[0] = OFFSET1
-    GAM[1] = OFFSET2
-    GAM[2] = OFFSET3
     GAM[3] = OFFSET4R + F34
 
 
@@ -778,43 +769,24 @@ def _frame_poses_block(xp, q, T, D2, D3):
     # Inputs
     q1, q2, q3, q4 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
     th12 = q1 + q2
-    C12 = xp.cos(th12)
-    S12 = xp.sin(th12)
+    C12 = T[1, 0, 0] = T[1, 1, 1] = xp.cos(th12)
+    S12 = T[1, 1, 0] = xp.sin(th12)
     th123 = th12 + q3
-    C123 = xp.cos(th123)
-    S123 = xp.sin(th123)
+    T[2, 0, 0] = T[2, 1, 1] = T[3, 0, 0] = T[3, 1, 1] = xp.cos(th123)
+    S123 = T[2, 1, 0] = T[3, 1, 0] = xp.sin(th123)
     # Frame 2
-    P12 = D2*C1
-    P22 = D2*S1
+    P12 = T[1, 0, 3] = D2*C1
+    P22 = T[1, 1, 3] = D2*S1
     # Frame 3
-    P13 = P12 + D3*C12
-    P23 = P22 + D3*S12
+    T[2, 0, 3] = T[3, 0, 3] = P12 + D3*C12
+    T[2, 1, 3] = T[3, 1, 3] = P22 + D3*S12
     # Poses
-    T[0, 0, 0] = C1
     T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = C12
     T[1, 0, 1] = -S12
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = S12
-    T[1, 1, 1] = C12
-    T[1, 1, 3] = P22
-    T[2, 0, 0] = C123
-    T[2, 0, 1] = -S123
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = S123
-    T[2, 1, 1] = C123
-    T[2, 1, 3] = P23
-    T[3, 0, 0] = C123
-    T[3, 0, 1] = -S123
-    T[3, 0, 3] = P13
-    T[3, 1, 0] = S123
-    T[3, 1, 1] = C123
-    T[3, 1, 3] = P23
+    T[2, 0, 1] = T[3, 0, 1] = -S123
     T[3, 2, 3] = q4
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 2, 2] = T[1, 3, 3] = T[2, 2, 2] = T[2, 3, 3] = T[3, 2, 2] = 1.0

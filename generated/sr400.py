@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 06dab13b01765698b6e9ddf7402b13021c1132c90a16c2c594e41c110a0e079a
+sha256 of all but these lines: 3891de8bb04d17e67bb88a59d652a8045e0ad7fef27c493cdcaba39b35f06157
 """
 
 import numpy as np
@@ -205,10 +205,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -237,8 +241,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -305,6 +312,14 @@ class _Arrays:
         entries = [x if getattr(x, "shape", None) == zero.shape else zero + x for x in entries]
         return self.package.reshape(self.package.stack(entries, axis=-1), (*zero.shape, *shape))
 
+    def combined(self, rows, x, origin):
+        """Linear combinations of the columns of x, (origin, rates) each; without the origin for
+        rates."""
+        columns, table = self.rows(x), {}
+        for k, (start, rates) in enumerate(rows):
+            table[k] = start*origin + sum(g*y for g, y in zip(rates, columns))
+        return self.gathered(table, (len(rows),), x)
+
     def solve(self, A, b):
         return self.package.linalg.solve(A, b[..., None])[..., 0]
 
@@ -339,6 +354,8 @@ class _Symbols:
         for place, x in table.items():
             matrix[place] = x
         return matrix
+
+    combined = _Arrays.combined
 
     def solve(self, A, b):
         """A = L diag(d) L', L unit lower triangular; A symmetric positive definite."""
@@ -594,7 +611,8 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8,
+        g=g)
     inertia = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -654,18 +672,26 @@ def passive_joints(
     also their accelerations.
     """
     given = [state for state in (q, qd, qdd) if state is not None]
-    results = [
-        _evaluated(_passive_joints_block, (3,), (x,), (), (float(k == 0),))
-        for k, x in enumerate(given)
-    ]
+    xp = _package(*given)
+    rows = _passive(xp)
+    if xp is not np:
+        results = [xp.combined(rows, x, k == 0) for k, x in enumerate(given)]
+        return results[0] if len(results) == 1 else tuple(results)
+    given = _states(*given)
+    origin, rates = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    shape = (*np.shape(q)[:-1], 3)
+    results = [(x @ rates.T).reshape(shape) for x in given]
+    results[0] += origin
     return results[0] if len(results) == 1 else tuple(results)
 
 
-def _passive_joints_block(xp, x, P, one):
-    """Fill P, shape (3, N), of positions x; of rates where `one` is 0."""
-    P[0] = (xp.pi/2)*one - 1.0*x[1] + 1.0*x[5]
-    P[1] = 1.0*x[1] - 1.0*x[5]
-    P[2] = (xp.pi)*one - 1.0*x[1] + 1.0*x[5]
+def _passive(xp):
+    """(origin, rates) of the joints PASSIVE over the joints of the columns."""
+    return (
+        (xp.pi/2, (0.0, -1.0, 0.0, 0.0, 0.0, 1.0)),
+        (0.0, (0.0, 1.0, 0.0, 0.0, 0.0, -1.0)),
+        (xp.pi, (0.0, -1.0, 0.0, 0.0, 0.0, 1.0)),
+    )
 
 
 def _motion(xp, q, qd, qdd, D2, D3, D4, RL4, D8, g):
@@ -1204,48 +1230,12 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     """Fill A, shape (6, 6, N), from q (6, N)."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[4]
-    XY2R = X[5]
-    XZ2R = X[6]
-    YZ2R = X[7]
-    ZZ2R = X[8]
-    MX2R = X[9]
-    MY2 = X[10]
-    XX3R = X[14]
-    XY3R = X[15]
-    XZ3R = X[16]
-    YZ3R = X[17]
-    ZZ3R = X[18]
-    MX3R = X[19]
-    MY3R = X[20]
-    XX4R = X[21]
-    XY4 = X[22]
-    XZ4 = X[23]
-    YZ4 = X[24]
-    ZZ4R = X[25]
-    MX4 = X[26]
-    MY4R = X[27]
-    Ia4 = X[28]
-    XX5R = X[32]
-    XY5 = X[33]
-    XZ5 = X[34]
-    YZ5 = X[35]
-    ZZ5R = X[36]
-    MX5 = X[37]
-    MY5R = X[38]
-    Ia5 = X[39]
-    XX6R = X[43]
-    XY6 = X[44]
-    XZ6 = X[45]
-    YZ6 = X[46]
-    ZZ6 = X[47]
-    MX6 = X[48]
-    MY6 = X[49]
-    Ia6 = X[50]
-    MX7R = X[54]
-    MY7 = X[55]
-    MY8 = X[59]
+    (
+        ZZ1R, _, _, _, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2R, MY2, _, _, _, XX3R, XY3R, XZ3R, YZ3R,
+        ZZ3R, MX3R, MY3R, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, _, _, _, XX5R, XY5, XZ5,
+        YZ5, ZZ5R, MX5, MY5R, Ia5, _, _, _, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, _, _, _,
+        MX7R, MY7, _, _, _, MY8
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1279,7 +1269,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     C6S6 = C6*S6
     AJA1_1_6 = XX6R*C6C6 - XY6*2*C6S6
     NE1_5_6 = XZ6*C6 - YZ6*S6
-    NE3_5_6 = -XZ6*S6 - YZ6*C6
+    NE3_5_6 = A[3, 4] = A[4, 3] = -XZ6*S6 - YZ6*C6
     JP1_1_5 = XX5R + AJA1_1_6
     JP1_2_5 = XY5 + NE1_5_6
     JP1_3_5 = XZ5 + XY6 - XX6R*C6S6 - XY6*2*C6C6
@@ -1294,7 +1284,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     JP1_1_4a = ZZ6 - JP1_1_5
     JP1_1_4b = C5C5*JP1_1_4a + JP1_2_5*2*C5S5
     NE1_4_5 = C5*JP1_3_5 - S5*JP2_3_5
-    NE3_4_5 = S5*JP1_3_5 + C5*JP2_3_5
+    NE3_4_5 = A[2, 3] = A[3, 2] = S5*JP1_3_5 + C5*JP2_3_5
     JP1_1_4 = XX4R + ZZ6 - JP1_1_4b
     JP1_2_4 = XY4 - NE1_4_5
     JP1_3_4 = XZ4 + JP1_2_5*2*C5C5 - C5S5*JP1_1_4a - JP1_2_5
@@ -1317,9 +1307,9 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     JP1_2_3 = XY3R + AJA1_2_4 - D4*AS3_5 - RL4AS1_4
     JP1_3_3 = XZ3R + C4S4*JP1_1_3a + JP1_2_4 - JP1_2_4*2*C4C4 - D4*AS3_4
     JP2_2_3 = JP3_3_4 + 2*D4AS1_4
-    NE3_3_4 = -S4*JP1_3_4 - C4*JP2_3_4 - RL4*AS3_4
+    NE3_3_4 = A[2, 5] = A[5, 2] = -S4*JP1_3_4 - C4*JP2_3_4 - RL4*AS3_4
     JP2_3_3 = YZ3R + NE3_3_4
-    JP3_3_3 = ZZ3R + JP1_1_4 + JP1_1_3b + 2*(D4AS1_4 + RL4AS3_5)
+    A[5, 5] = ZZ3R + JP1_1_4 + JP1_1_3b + 2*(D4AS1_4 + RL4AS3_5)
     MSP1_3 = MX3R + AS1_4
     MSP2_3 = MY3R + AS3_5
     # Composite link 3
@@ -1341,88 +1331,62 @@ def _inertia_matrix_block(xp, q, A, X, D2, D3, D4, RL4, D8):
     # Composite link 2
     AS1_2 = C2*MSP1_2 - S2*MSP2_2
     NE3_1_2 = -S2*JP1_3_2 - C2*JP2_3_2
-    JP3_3_1 = (ZZ1R + JP2_2_7*C7**2 + JP1_2_7*2*C7*S7 + 2*D2*AS1_7 + JP1_1_2 + JP1_2_2*2*C2*S2 +
+    A[0, 0] = (ZZ1R + JP2_2_7*C7**2 + JP1_2_7*2*C7*S7 + 2*D2*AS1_7 + JP1_1_2 + JP1_2_2*2*C2*S2 +
         2*D2*AS1_2 - C2**2*(JP1_1_2 - JP2_2_2))
     # Unit acceleration of joint 3
-    NE3_1_3 = -S2*NE1_2_3 - C2*NE2_2_3
+    NE3_1_3 = A[0, 5] = A[5, 0] = -S2*NE1_2_3 - C2*NE2_2_3
     # Unit acceleration of joint 4
     NE1_3_4 = AJA1_2_4 - RL4AS1_4
     NE2_3_4 = JP3_3_4 + D4AS1_4
     E2_2_4 = C2m7*AS3_4
     NE1_2_4 = S2m7*NE1_3_4 - C2m7*NE2_3_4
     NE2_2_4 = C2m7*NE1_3_4 + S2m7*NE2_3_4 + D3*AS1_4
-    NE3_1_4 = -S2*NE1_2_4 - C2*NE2_2_4 - D2*AS1_4
+    A[0, 2] = A[2, 0] = -S2*NE1_2_4 - C2*NE2_2_4 - D2*AS1_4
     # Unit acceleration of joint 5
     E1_3_5 = -C4*AS3_5
     E3_3_5 = S4*AS3_5
     NE1_3_5 = C4*NE1_4_5 + S4*JP3_3_5 + RL4*E3_3_5
     NE2_3_5 = NE3_4_5 - D4*E3_3_5
-    NE3_3_5 = C4*JP3_3_5 + D4*AS1_5 - S4*NE1_4_5 - RL4*E1_3_5
+    A[3, 5] = A[5, 3] = C4*JP3_3_5 + D4*AS1_5 - S4*NE1_4_5 - RL4*E1_3_5
     E2_2_5 = C2m7*E1_3_5 + S2m7*AS1_5
     NE1_2_5 = S2m7*NE1_3_5 - C2m7*NE2_3_5
     NE2_2_5 = C2m7*NE1_3_5 + S2m7*NE2_3_5 - D3*E3_3_5
-    NE3_1_5 = D2*E3_3_5 - S2*NE1_2_5 - C2*NE2_2_5
+    A[0, 3] = A[3, 0] = D2*E3_3_5 - S2*NE1_2_5 - C2*NE2_2_5
     # Unit acceleration of joint 6
     E1_4_6 = C5*AS3_6
     E3_4_6 = S5*AS3_6
     NE1_4_6 = C5*NE1_5_6 - ZZ6*S5
-    NE3_4_6 = S5*NE1_5_6 + ZZ6*C5
+    NE3_4_6 = A[2, 4] = A[4, 2] = S5*NE1_5_6 + ZZ6*C5
     E1_3_6 = C4*E1_4_6 - S4*AS1_6
     E3_3_6 = -S4*E1_4_6 - C4*AS1_6
     NE1_3_6 = C4*NE1_4_6 + S4*NE3_5_6 + RL4*E3_3_6
     NE2_3_6 = NE3_4_6 - D4*E3_3_6
-    NE3_3_6 = C4*NE3_5_6 + D4*E3_4_6 - S4*NE1_4_6 - RL4*E1_3_6
+    A[4, 5] = A[5, 4] = C4*NE3_5_6 + D4*E3_4_6 - S4*NE1_4_6 - RL4*E1_3_6
     E2_2_6 = C2m7*E1_3_6 + S2m7*E3_4_6
     NE1_2_6 = S2m7*NE1_3_6 - C2m7*NE2_3_6
     NE2_2_6 = C2m7*NE1_3_6 + S2m7*NE2_3_6 - D3*E3_3_6
-    NE3_1_6 = D2*E3_3_6 - S2*NE1_2_6 - C2*NE2_2_6
+    A[0, 4] = A[4, 0] = D2*E3_3_6 - S2*NE1_2_6 - C2*NE2_2_6
     # Inertia matrix
-    A[0, 0] = JP3_3_1
     A[0, 1] = A[1, 0] = NE3_1_2 - NE3_1_3
     A[1, 1] = ZZ2R
-    A[0, 2] = A[2, 0] = NE3_1_4
     A[1, 2] = A[2, 1] = D3*E2_2_4
     A[2, 2] = Ia4 + JP3_3_4
-    A[0, 3] = A[3, 0] = NE3_1_5
     A[1, 3] = A[3, 1] = D3*E2_2_5
-    A[2, 3] = A[3, 2] = NE3_4_5
     A[3, 3] = Ia5 + JP3_3_5
-    A[0, 4] = A[4, 0] = NE3_1_6
     A[1, 4] = A[4, 1] = D3*E2_2_6
-    A[2, 4] = A[4, 2] = NE3_4_6
-    A[3, 4] = A[4, 3] = NE3_5_6
     A[4, 4] = ZZ6 + Ia6
-    A[0, 5] = A[5, 0] = NE3_1_3
     A[1, 5] = A[5, 1] = NE3_7_8 + D3AS1_3
-    A[2, 5] = A[5, 2] = NE3_3_4
-    A[3, 5] = A[5, 3] = NE3_3_5
-    A[4, 5] = A[5, 4] = NE3_3_6
-    A[5, 5] = JP3_3_3
 
 
 def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (6, N), from q (6, N)."""
     # Inputs
     q2, q4, q5, q6, q7 = q[1:]
-    OFFSET1 = X[3]
-    MX2R = X[9]
-    MY2 = X[10]
-    OFFSET2 = X[13]
-    MX3R = X[19]
-    MY3R = X[20]
-    MX4 = X[26]
-    MY4R = X[27]
-    OFFSET4 = X[31]
-    MX5 = X[37]
-    MY5R = X[38]
-    OFFSET5 = X[42]
-    MX6 = X[48]
-    MY6 = X[49]
-    OFFSET6 = X[53]
-    MX7R = X[54]
-    MY7 = X[55]
-    OFFSET7 = X[58]
-    MY8 = X[59]
+    (
+        _, _, _, OFFSET1, _, _, _, _, _, MX2R, MY2, _, _, OFFSET2, _, _, _, _, _, MX3R, MY3R, _,
+        _, _, _, _, MX4, MY4R, _, _, _, OFFSET4, _, _, _, _, _, MX5, MY5R, _, _, _, OFFSET5, _,
+        _, _, _, _, MX6, MY6, _, _, _, OFFSET6, MX7R, MY7, _, _, OFFSET7, MY8
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1493,12 +1457,13 @@ def _frame_poses_block(xp, q, T, D2, D3, D4, RL4, D8):
     # Inputs
     q1, q2, q4, q5, q6, q7 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = T[6, 1, 2] = T[7, 1, 2] = T[8, 1,
+        2] = T[9, 1, 2] = (xp.cos(q1))
+    S1 = T[0, 1, 0] = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
-    C7 = xp.cos(q7)
-    S7 = xp.sin(q7)
+    C7 = T[8, 2, 1] = T[9, 2, 1] = xp.cos(q7)
+    S7 = T[2, 2, 1] = T[3, 2, 2] = T[8, 2, 0] = T[9, 2, 0] = xp.sin(q7)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
     C5 = xp.cos(q5)
@@ -1506,162 +1471,70 @@ def _frame_poses_block(xp, q, T, D2, D3, D4, RL4, D8):
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
-    Z1_4_1 = -C7*C4
-    Z2_4_1 = C7*S4
+    Z1_4_1 = T[3, 2, 0] = -C7*C4
+    Z2_4_1 = T[3, 2, 1] = C7*S4
     # Joint axes Z and velocities V seen from link 5
-    Z1_5_1 = C5*Z1_4_1 + S7*S5
-    Z2_5_1 = S7*C5 - S5*Z1_4_1
+    Z1_5_1 = T[4, 2, 0] = C5*Z1_4_1 + S7*S5
+    T[4, 2, 1] = T[5, 2, 2] = S7*C5 - S5*Z1_4_1
     # Joint axes Z and velocities V seen from link 6
-    Z1_6_1 = C6*Z1_5_1 + S6*Z2_4_1
-    Z2_6_1 = C6*Z2_4_1 - S6*Z1_5_1
+    T[5, 2, 0] = C6*Z1_5_1 + S6*Z2_4_1
+    T[5, 2, 1] = C6*Z2_4_1 - S6*Z1_5_1
     # Frame 2
-    R1_1_2 = C1*C2
-    R1_2_2 = -C1*S2
-    R2_1_2 = S1*C2
-    R2_2_2 = -S1*S2
-    P1_2 = D2*C1
-    P2_2 = D2*S1
+    R1_1_2 = T[1, 0, 0] = T[7, 0, 0] = C1*C2
+    T[1, 0, 1] = T[7, 0, 1] = -C1*S2
+    R2_1_2 = T[1, 1, 0] = T[7, 1, 0] = S1*C2
+    T[1, 1, 1] = T[7, 1, 1] = -S1*S2
+    P1_2 = T[1, 0, 3] = T[6, 0, 3] = D2*C1
+    P2_2 = T[1, 1, 3] = T[6, 1, 3] = D2*S1
     # Frame 3
-    R1_1_3 = -C1*S7
-    R1_2_3 = -C1*C7
-    R2_1_3 = -S1*S7
-    R2_2_3 = -S1*C7
+    R1_1_3 = T[2, 0, 0] = T[6, 0, 1] = -C1*S7
+    R1_2_3 = T[2, 0, 1] = T[3, 0, 2] = T[8, 0, 0] = T[9, 0, 0] = -C1*C7
+    R2_1_3 = T[2, 1, 0] = T[6, 1, 1] = -S1*S7
+    R2_2_3 = T[2, 1, 1] = T[3, 1, 2] = T[8, 1, 0] = T[9, 1, 0] = -S1*C7
     D3R1_1_2 = D3*R1_1_2
-    P1_3 = P1_2 + D3R1_1_2
+    P1_3 = T[2, 0, 3] = P1_2 + D3R1_1_2
     D3R2_1_2 = D3*R2_1_2
-    P2_3 = P2_2 + D3R2_1_2
-    P3_3 = -D3*S2
+    P2_3 = T[2, 1, 3] = P2_2 + D3R2_1_2
+    P3_3 = T[2, 2, 3] = -D3*S2
     # Frame 4
-    R1_1_4 = C4*R1_1_3 + S1*S4
-    R1_2_4 = S1*C4 - S4*R1_1_3
-    R2_1_4 = C4*R2_1_3 - C1*S4
-    R2_2_4 = -C1*C4 - S4*R2_1_3
-    P1_4 = P1_3 + D4*R1_1_3 + RL4*R1_2_3
-    P2_4 = P2_3 + D4*R2_1_3 + RL4*R2_2_3
-    P3_4 = P3_3 + RL4*S7 - D4*C7
+    R1_1_4 = T[3, 0, 0] = C4*R1_1_3 + S1*S4
+    R1_2_4 = T[3, 0, 1] = S1*C4 - S4*R1_1_3
+    R2_1_4 = T[3, 1, 0] = C4*R2_1_3 - C1*S4
+    R2_2_4 = T[3, 1, 1] = -C1*C4 - S4*R2_1_3
+    T[3, 0, 3] = T[4, 0, 3] = T[5, 0, 3] = P1_3 + D4*R1_1_3 + RL4*R1_2_3
+    T[3, 1, 3] = T[4, 1, 3] = T[5, 1, 3] = P2_3 + D4*R2_1_3 + RL4*R2_2_3
+    T[3, 2, 3] = T[4, 2, 3] = T[5, 2, 3] = P3_3 + RL4*S7 - D4*C7
     # Frame 5
-    R1_1_5 = C5*R1_1_4 + S5*R1_2_3
-    R1_2_5 = C5*R1_2_3 - S5*R1_1_4
-    R2_1_5 = C5*R2_1_4 + S5*R2_2_3
-    R2_2_5 = C5*R2_2_3 - S5*R2_1_4
+    R1_1_5 = T[4, 0, 0] = C5*R1_1_4 + S5*R1_2_3
+    T[4, 0, 1] = T[5, 0, 2] = C5*R1_2_3 - S5*R1_1_4
+    R2_1_5 = T[4, 1, 0] = C5*R2_1_4 + S5*R2_2_3
+    T[4, 1, 1] = T[5, 1, 2] = C5*R2_2_3 - S5*R2_1_4
     # Frame 6
-    R1_1_6 = C6*R1_1_5 + S6*R1_2_4
-    R1_2_6 = C6*R1_2_4 - S6*R1_1_5
-    R2_1_6 = C6*R2_1_5 + S6*R2_2_4
-    R2_2_6 = C6*R2_2_4 - S6*R2_1_5
+    T[5, 0, 0] = C6*R1_1_5 + S6*R1_2_4
+    T[5, 0, 1] = C6*R1_2_4 - S6*R1_1_5
+    T[5, 1, 0] = C6*R2_1_5 + S6*R2_2_4
+    T[5, 1, 1] = C6*R2_2_4 - S6*R2_1_5
     # Frame 8
-    P1_8 = P1_2 - D8*R1_2_3
-    P2_8 = P2_2 - D8*R2_2_3
-    P3_8 = -D8*S7
+    P1_8 = T[7, 0, 3] = P1_2 - D8*R1_2_3
+    P2_8 = T[7, 1, 3] = P2_2 - D8*R2_2_3
+    P3_8 = T[7, 2, 3] = -D8*S7
     # Frame 9
-    P1_9 = D3R1_1_2 + P1_8
-    P2_9 = D3R2_1_2 + P2_8
-    P3_9 = P3_3 + P3_8
+    T[8, 0, 3] = T[9, 0, 3] = D3R1_1_2 + P1_8
+    T[8, 1, 3] = T[9, 1, 3] = D3R2_1_2 + P2_8
+    T[8, 2, 3] = T[9, 2, 3] = P3_3 + P3_8
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = R1_1_2
-    T[1, 0, 1] = R1_2_2
-    T[1, 0, 2] = -S1
-    T[1, 0, 3] = P1_2
-    T[1, 1, 0] = R2_1_2
-    T[1, 1, 1] = R2_2_2
-    T[1, 1, 2] = C1
-    T[1, 1, 3] = P2_2
-    T[1, 2, 0] = -S2
-    T[1, 2, 1] = -C2
-    T[2, 0, 0] = R1_1_3
-    T[2, 0, 1] = R1_2_3
-    T[2, 0, 2] = -S1
-    T[2, 0, 3] = P1_3
-    T[2, 1, 0] = R2_1_3
-    T[2, 1, 1] = R2_2_3
-    T[2, 1, 2] = C1
-    T[2, 1, 3] = P2_3
-    T[2, 2, 0] = -C7
-    T[2, 2, 1] = S7
-    T[2, 2, 3] = P3_3
-    T[3, 0, 0] = R1_1_4
-    T[3, 0, 1] = R1_2_4
-    T[3, 0, 2] = R1_2_3
-    T[3, 0, 3] = P1_4
-    T[3, 1, 0] = R2_1_4
-    T[3, 1, 1] = R2_2_4
-    T[3, 1, 2] = R2_2_3
-    T[3, 1, 3] = P2_4
-    T[3, 2, 0] = Z1_4_1
-    T[3, 2, 1] = Z2_4_1
-    T[3, 2, 2] = S7
-    T[3, 2, 3] = P3_4
-    T[4, 0, 0] = R1_1_5
-    T[4, 0, 1] = R1_2_5
+    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = T[6, 0, 2] = T[7, 0, 2] = T[8, 0, 2] = T[9, 0, 2] = -S1
+    T[1, 2, 0] = T[7, 2, 0] = -S2
+    T[1, 2, 1] = T[7, 2, 1] = -C2
+    T[2, 2, 0] = T[6, 2, 1] = -C7
     T[4, 0, 2] = -R1_2_4
-    T[4, 0, 3] = P1_4
-    T[4, 1, 0] = R2_1_5
-    T[4, 1, 1] = R2_2_5
     T[4, 1, 2] = -R2_2_4
-    T[4, 1, 3] = P2_4
-    T[4, 2, 0] = Z1_5_1
-    T[4, 2, 1] = Z2_5_1
     T[4, 2, 2] = -Z2_4_1
-    T[4, 2, 3] = P3_4
-    T[5, 0, 0] = R1_1_6
-    T[5, 0, 1] = R1_2_6
-    T[5, 0, 2] = R1_2_5
-    T[5, 0, 3] = P1_4
-    T[5, 1, 0] = R2_1_6
-    T[5, 1, 1] = R2_2_6
-    T[5, 1, 2] = R2_2_5
-    T[5, 1, 3] = P2_4
-    T[5, 2, 0] = Z1_6_1
-    T[5, 2, 1] = Z2_6_1
-    T[5, 2, 2] = Z2_5_1
-    T[5, 2, 3] = P3_4
     T[6, 0, 0] = -R1_2_3
-    T[6, 0, 1] = R1_1_3
-    T[6, 0, 2] = -S1
-    T[6, 0, 3] = P1_2
     T[6, 1, 0] = -R2_2_3
-    T[6, 1, 1] = R2_1_3
-    T[6, 1, 2] = C1
-    T[6, 1, 3] = P2_2
     T[6, 2, 0] = -S7
-    T[6, 2, 1] = -C7
-    T[7, 0, 0] = R1_1_2
-    T[7, 0, 1] = R1_2_2
-    T[7, 0, 2] = -S1
-    T[7, 0, 3] = P1_8
-    T[7, 1, 0] = R2_1_2
-    T[7, 1, 1] = R2_2_2
-    T[7, 1, 2] = C1
-    T[7, 1, 3] = P2_8
-    T[7, 2, 0] = -S2
-    T[7, 2, 1] = -C2
-    T[7, 2, 3] = P3_8
-    T[8, 0, 0] = R1_2_3
-    T[8, 0, 1] = -R1_1_3
-    T[8, 0, 2] = -S1
-    T[8, 0, 3] = P1_9
-    T[8, 1, 0] = R2_2_3
-    T[8, 1, 1] = -R2_1_3
-    T[8, 1, 2] = C1
-    T[8, 1, 3] = P2_9
-    T[8, 2, 0] = S7
-    T[8, 2, 1] = C7
-    T[8, 2, 3] = P3_9
-    T[9, 0, 0] = R1_2_3
-    T[9, 0, 1] = -R1_1_3
-    T[9, 0, 2] = -S1
-    T[9, 0, 3] = P1_9
-    T[9, 1, 0] = R2_2_3
-    T[9, 1, 1] = -R2_1_3
-    T[9, 1, 2] = C1
-    T[9, 1, 3] = P2_9
-    T[9, 2, 0] = S7
-    T[9, 2, 1] = C7
-    T[9, 2, 3] = P3_9
+    T[8, 0, 1] = T[9, 0, 1] = -R1_1_3
+    T[8, 1, 1] = T[9, 1, 1] = -R2_1_3
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = T[8, 3, 3] = T[9, 3, 3] = 1.0

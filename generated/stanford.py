@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: bc515c98c2c73a6be366469af5bb0d00a3be8bc24fc280b65651a808f5719ca3
+sha256 of all but these lines: ec3e784b85948236e20c951f1d48dd17917258fb95a20b906064862aeb92b6fc
 """
 
 import numpy as np
@@ -183,10 +183,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -215,8 +219,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -552,7 +559,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, RL1=RL1, RL2=RL2, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, RL1=RL1, RL2=RL2, g=g)
     inertia = inertia_matrix(q, X, RL1=RL1, RL2=RL2, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -1054,43 +1061,11 @@ def _inertia_matrix_block(xp, q, A, X, RL2):
     """Fill A, shape (6, 6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[4]
-    XY2R = X[5]
-    XZ2R = X[6]
-    YZ2R = X[7]
-    ZZ2R = X[8]
-    MX2 = X[9]
-    MY2 = X[10]
-    MX3 = X[14]
-    MY3 = X[15]
-    MZ3R = X[16]
-    M3R = X[17]
-    Ia3 = X[18]
-    XX4R = X[22]
-    XY4 = X[23]
-    XZ4 = X[24]
-    YZ4 = X[25]
-    ZZ4R = X[26]
-    MX4 = X[27]
-    MY4R = X[28]
-    Ia4 = X[29]
-    XX5R = X[33]
-    XY5 = X[34]
-    XZ5 = X[35]
-    YZ5 = X[36]
-    ZZ5R = X[37]
-    MX5 = X[38]
-    MY5R = X[39]
-    Ia5 = X[40]
-    XX6R = X[44]
-    XY6 = X[45]
-    XZ6 = X[46]
-    YZ6 = X[47]
-    ZZ6 = X[48]
-    MX6 = X[49]
-    MY6 = X[50]
-    Ia6 = X[51]
+    (
+        ZZ1R, _, _, _, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, _, _, _, MX3, MY3, MZ3R, M3R,
+        Ia3, _, _, _, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, _, _, _, XX5R, XY5, XZ5, YZ5,
+        ZZ5R, MX5, MY5R, Ia5, _, _, _, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, _, _, _
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1107,7 +1082,7 @@ def _inertia_matrix_block(xp, q, A, X, RL2):
     C6S6 = C6*S6
     AJA116 = XX6R*C6C6 - XY6*2*C6S6
     NE156 = XZ6*C6 - YZ6*S6
-    NE356 = XZ6*S6 + YZ6*C6
+    NE356 = A[4, 5] = A[5, 4] = XZ6*S6 + YZ6*C6
     JP115 = XX5R + AJA116
     JP125 = XY5 - NE156
     JP135 = XZ5 + XX6R*C6S6 + XY6*2*C6C6 - XY6
@@ -1122,7 +1097,7 @@ def _inertia_matrix_block(xp, q, A, X, RL2):
     JP114a = ZZ6 - JP115
     JP114b = C5C5*JP114a + JP125*2*C5S5
     NE145 = C5*JP135 - S5*JP235
-    NE345 = -S5*JP135 - C5*JP235
+    NE345 = A[3, 4] = A[4, 3] = -S5*JP135 - C5*JP235
     JP114 = XX4R + ZZ6 - JP114b
     JP124 = XY4 + NE145
     JP134 = XZ4 + C5S5*JP114a + JP125 - JP125*2*C5C5
@@ -1152,63 +1127,50 @@ def _inertia_matrix_block(xp, q, A, X, RL2):
     JP122 = XY2R + q3*MSP13 - NE134
     JP132 = XZ2R + JP123
     JP232 = YZ2R + q3*MSP23 - NE234
-    JP332 = ZZ2R + JP223 + JP112b
+    A[1, 1] = ZZ2R + JP223 + JP112b
     MSP12 = MX2 + MSP13
     MSP22 = MY2 - JP112a
     # Composite link 2
     AS32 = -S2*MSP12 - C2*MSP22
-    NE312 = -S2*JP132 - C2*JP232 - RL2*AS32
-    JP331 = ZZ1R + JP112 + C2**2*(JP334 - JP112) + JP122*2*C2*S2 + RL2*MSP23 + RL2*(MSP23 + RL2*M3R)
+    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232 - RL2*AS32
+    A[0, 0] = (ZZ1R + JP112 + C2**2*(JP334 - JP112) + JP122*2*C2*S2 + RL2*MSP23 + RL2*(MSP23 +
+        RL2*M3R))
     # Unit acceleration of joint 3
     E113 = M3R*S2
-    NE313 = -S2*MSP23 - RL2*E113
+    A[0, 2] = A[2, 0] = -S2*MSP23 - RL2*E113
     # Unit acceleration of joint 4
     NE124 = NE134 - q3*AS14
-    NE324 = NE234 - q3*AS24
+    A[1, 3] = A[3, 1] = NE234 - q3*AS24
     E114 = -C2*AS24
-    NE314 = C2*JP334 - S2*NE124 - RL2*E114
+    A[0, 3] = A[3, 0] = C2*JP334 - S2*NE124 - RL2*E114
     # Unit acceleration of joint 5
     E135 = C4*AS35
     E235 = S4*AS35
     NE135 = C4*NE145 - S4*JP335
     NE235 = S4*NE145 + C4*JP335
     NE125 = NE135 - q3*E235
-    NE325 = NE235 + q3*E135
+    A[1, 4] = A[4, 1] = NE235 + q3*E135
     E115 = C2*E135 - S2*AS15
-    NE315 = C2*NE345 - S2*NE125 - RL2*E115
+    A[0, 4] = A[4, 0] = C2*NE345 - S2*NE125 - RL2*E115
     # Unit acceleration of joint 6
     E146 = -C5*AS36
-    E346 = S5*AS36
+    E346 = A[2, 5] = A[5, 2] = S5*AS36
     NE146 = C5*NE156 + ZZ6*S5
-    NE346 = ZZ6*C5 - S5*NE156
+    NE346 = A[3, 5] = A[5, 3] = ZZ6*C5 - S5*NE156
     E136 = C4*E146 - S4*AS16
     E236 = S4*E146 + C4*AS16
     NE136 = C4*NE146 - S4*NE356
     NE236 = S4*NE146 + C4*NE356
     NE126 = NE136 - q3*E236
-    NE326 = NE236 + q3*E136
+    A[1, 5] = A[5, 1] = NE236 + q3*E136
     E116 = C2*E136 + S2*E346
-    NE316 = C2*NE346 - S2*NE126 - RL2*E116
+    A[0, 5] = A[5, 0] = C2*NE346 - S2*NE126 - RL2*E116
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
-    A[1, 1] = JP332
-    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = -MSP13
     A[2, 2] = M3R + Ia3
-    A[0, 3] = A[3, 0] = NE314
-    A[1, 3] = A[3, 1] = NE324
     A[3, 3] = Ia4 + JP334
-    A[0, 4] = A[4, 0] = NE315
-    A[1, 4] = A[4, 1] = NE325
     A[2, 4] = A[4, 2] = -AS15
-    A[3, 4] = A[4, 3] = NE345
     A[4, 4] = Ia5 + JP335
-    A[0, 5] = A[5, 0] = NE316
-    A[1, 5] = A[5, 1] = NE326
-    A[2, 5] = A[5, 2] = E346
-    A[3, 5] = A[5, 3] = NE346
-    A[4, 5] = A[5, 4] = NE356
     A[5, 5] = ZZ6 + Ia6
 
 
@@ -1216,23 +1178,11 @@ def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
-    OFFSET1 = X[3]
-    MX2 = X[9]
-    MY2 = X[10]
-    OFFSET2 = X[13]
-    MX3 = X[14]
-    MZ3R = X[16]
-    M3R = X[17]
-    OFFSET3 = X[21]
-    MX4 = X[27]
-    MY4R = X[28]
-    OFFSET4 = X[32]
-    MX5 = X[38]
-    MY5R = X[39]
-    OFFSET5 = X[43]
-    MX6 = X[49]
-    MY6 = X[50]
-    OFFSET6 = X[54]
+    (
+        _, _, _, OFFSET1, _, _, _, _, _, MX2, MY2, _, _, OFFSET2, MX3, _, MZ3R, M3R, _, _, _,
+        OFFSET3, _, _, _, _, _, MX4, MY4R, _, _, _, OFFSET4, _, _, _, _, _, MX5, MY5R, _, _, _,
+        OFFSET5, _, _, _, _, _, MX6, MY6, _, _, _, OFFSET6
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1294,9 +1244,9 @@ def _frame_poses_block(xp, q, T, RL1, RL2):
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
-    C2 = xp.cos(q2)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 1] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
+    C2 = T[2, 2, 2] = T[3, 2, 2] = xp.cos(q2)
     S2 = xp.sin(q2)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
@@ -1305,104 +1255,50 @@ def _frame_poses_block(xp, q, T, RL1, RL2):
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
-    Z141 = -S2*C4
-    Z241 = S2*S4
+    Z141 = T[3, 2, 0] = -S2*C4
+    Z241 = T[3, 2, 1] = T[4, 2, 2] = S2*S4
     # Joint axes Z and velocities V seen from link 5
-    Z151 = C5*Z141 - C2*S5
-    Z251 = -C2*C5 - S5*Z141
+    Z151 = T[4, 2, 0] = C5*Z141 - C2*S5
+    Z251 = T[4, 2, 1] = -C2*C5 - S5*Z141
     # Joint axes Z and velocities V seen from link 6
-    Z161 = C6*Z151 + S6*Z241
-    Z261 = C6*Z241 - S6*Z151
+    T[5, 2, 0] = C6*Z151 + S6*Z241
+    T[5, 2, 1] = C6*Z241 - S6*Z151
     # Frame 2
-    R112 = C1*C2
-    R122 = -C1*S2
-    R212 = S1*C2
-    R222 = -S1*S2
-    P12 = -RL2*S1
-    P22 = RL2*C1
+    R112 = T[1, 0, 0] = T[2, 0, 0] = C1*C2
+    R122 = T[1, 0, 1] = -C1*S2
+    R212 = T[1, 1, 0] = T[2, 1, 0] = S1*C2
+    R222 = T[1, 1, 1] = -S1*S2
+    P12 = T[1, 0, 3] = -RL2*S1
+    P22 = T[1, 1, 3] = RL2*C1
     # Frame 3
-    P13 = P12 - q3*R122
-    P23 = P22 - q3*R222
-    P33 = RL1 + C2*q3
+    T[2, 0, 3] = T[3, 0, 3] = T[4, 0, 3] = T[5, 0, 3] = P12 - q3*R122
+    T[2, 1, 3] = T[3, 1, 3] = T[4, 1, 3] = T[5, 1, 3] = P22 - q3*R222
+    T[2, 2, 3] = T[3, 2, 3] = T[4, 2, 3] = T[5, 2, 3] = RL1 + C2*q3
     # Frame 4
-    R114 = C4*R112 - S1*S4
-    R124 = -S1*C4 - S4*R112
-    R214 = C4*R212 + C1*S4
-    R224 = C1*C4 - S4*R212
+    R114 = T[3, 0, 0] = C4*R112 - S1*S4
+    R124 = T[3, 0, 1] = T[4, 0, 2] = -S1*C4 - S4*R112
+    R214 = T[3, 1, 0] = C4*R212 + C1*S4
+    R224 = T[3, 1, 1] = T[4, 1, 2] = C1*C4 - S4*R212
     # Frame 5
-    R115 = C5*R114 + S5*R122
-    R125 = C5*R122 - S5*R114
-    R215 = C5*R214 + S5*R222
-    R225 = C5*R222 - S5*R214
+    R115 = T[4, 0, 0] = C5*R114 + S5*R122
+    R125 = T[4, 0, 1] = C5*R122 - S5*R114
+    R215 = T[4, 1, 0] = C5*R214 + S5*R222
+    R225 = T[4, 1, 1] = C5*R222 - S5*R214
     # Frame 6
-    R116 = C6*R115 + S6*R124
-    R126 = C6*R124 - S6*R115
-    R216 = C6*R215 + S6*R224
-    R226 = C6*R224 - S6*R215
+    T[5, 0, 0] = C6*R115 + S6*R124
+    T[5, 0, 1] = C6*R124 - S6*R115
+    T[5, 1, 0] = C6*R215 + S6*R224
+    T[5, 1, 1] = C6*R224 - S6*R215
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[0, 2, 3] = RL1
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
-    T[1, 1, 3] = P22
-    T[1, 2, 0] = -S2
+    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 1] = -S1
+    T[0, 2, 3] = T[1, 2, 3] = RL1
+    T[1, 2, 0] = T[2, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[1, 2, 3] = RL1
-    T[2, 0, 0] = R112
-    T[2, 0, 1] = -S1
-    T[2, 0, 2] = -R122
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = R212
-    T[2, 1, 1] = C1
-    T[2, 1, 2] = -R222
-    T[2, 1, 3] = P23
-    T[2, 2, 0] = -S2
-    T[2, 2, 2] = C2
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
-    T[3, 0, 2] = -R122
-    T[3, 0, 3] = P13
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
-    T[3, 1, 2] = -R222
-    T[3, 1, 3] = P23
-    T[3, 2, 0] = Z141
-    T[3, 2, 1] = Z241
-    T[3, 2, 2] = C2
-    T[3, 2, 3] = P33
-    T[4, 0, 0] = R115
-    T[4, 0, 1] = R125
-    T[4, 0, 2] = R124
-    T[4, 0, 3] = P13
-    T[4, 1, 0] = R215
-    T[4, 1, 1] = R225
-    T[4, 1, 2] = R224
-    T[4, 1, 3] = P23
-    T[4, 2, 0] = Z151
-    T[4, 2, 1] = Z251
-    T[4, 2, 2] = Z241
-    T[4, 2, 3] = P33
-    T[5, 0, 0] = R116
-    T[5, 0, 1] = R126
+    T[2, 0, 2] = T[3, 0, 2] = -R122
+    T[2, 1, 2] = T[3, 1, 2] = -R222
     T[5, 0, 2] = -R125
-    T[5, 0, 3] = P13
-    T[5, 1, 0] = R216
-    T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
-    T[5, 1, 3] = P23
-    T[5, 2, 0] = Z161
-    T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
-    T[5, 2, 3] = P33
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
 

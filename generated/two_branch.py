@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 8013a2427dacaded5d5c26cfafb0b847b3dbf7212fa0444ad48f7f49d3eb843d
+sha256 of all but these lines: 84df5337befdb2b140d188b1ef2b8b7261b6a6b307a233fe8bc43d511fd69b99
 """
 
 import numpy as np
@@ -211,10 +211,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -243,8 +247,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -621,8 +628,8 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8,
-        GX=GX, GZ=GZ)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, RL2=RL2, D4=D4, D5=D5,
+        RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
     inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7,
         RL8=RL8, GX=GX, GZ=GZ)
     if xp is np:
@@ -1182,50 +1189,12 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     """Fill A, shape (7, 7, N), from q (7, N)."""
     # Inputs
     q2, q3, q4, q6, q7, q8 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[6]
-    XY2R = X[7]
-    XZ2R = X[8]
-    YZ2R = X[9]
-    ZZ2R = X[10]
-    MX2 = X[11]
-    MY2 = X[12]
-    MX3R = X[16]
-    MY3R = X[17]
-    MZ3 = X[18]
-    M3R = X[19]
-    Ia3 = X[20]
-    XX4R = X[24]
-    XY4R = X[25]
-    XZ4R = X[26]
-    YZ4R = X[27]
-    ZZ4R = X[28]
-    MX4R = X[29]
-    MY4R = X[30]
-    Ia4 = X[31]
-    XX6R = X[35]
-    XY6 = X[36]
-    XZ6R = X[37]
-    YZ6 = X[38]
-    ZZ6R = X[39]
-    MX6R = X[40]
-    MY6 = X[41]
-    XX7R = X[45]
-    XY7 = X[46]
-    XZ7 = X[47]
-    YZ7 = X[48]
-    ZZ7R = X[49]
-    MX7 = X[50]
-    MY7R = X[51]
-    Ia7 = X[52]
-    XX8R = X[56]
-    XY8 = X[57]
-    XZ8 = X[58]
-    YZ8 = X[59]
-    ZZ8 = X[60]
-    MX8 = X[61]
-    MY8 = X[62]
-    Ia8 = X[63]
+    (
+        ZZ1R, _, _, _, _, _, XX2R, XY2R, XZ2R, YZ2R, ZZ2R, MX2, MY2, _, _, _, MX3R, MY3R, MZ3,
+        M3R, Ia3, _, _, _, XX4R, XY4R, XZ4R, YZ4R, ZZ4R, MX4R, MY4R, Ia4, _, _, _, XX6R, XY6,
+        XZ6R, YZ6, ZZ6R, MX6R, MY6, _, _, _, XX7R, XY7, XZ7, YZ7, ZZ7R, MX7, MY7R, Ia7, _, _, _,
+        XX8R, XY8, XZ8, YZ8, ZZ8, MX8, MY8, Ia8, _, _, _
+    ) = X
     # Constants
     MSP12 = MX2 - MY3R
     # Trigonometry
@@ -1251,7 +1220,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     NE178 = XZ8*C8 - YZ8*S8 - RL8*AS18
     JP127 = XY7 - NE178
     JP137 = XZ7 + XX8R*C8S8 + XY8*2*C8C8 - XY8
-    NE378 = XZ8*S8 + YZ8*C8 - RL8*AS38
+    NE378 = A[5, 6] = A[6, 5] = XZ8*S8 + YZ8*C8 - RL8*AS38
     JP237 = YZ7 - NE378
     JP337 = ZZ7R + XX8R - AJA118
     MSP17 = MX7 + AS18
@@ -1271,13 +1240,13 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     JP136 = XZ6R + NE167 - D7*AS38
     JP226 = JP117 + JP116b + JP226a
     JP236 = YZ6 + NE267
-    JP336 = ZZ6R + JP337 + JP226a
+    A[4, 4] = ZZ6R + JP337 + JP226a
     MSP16 = MX6R + AS17
     MSP26 = MY6 + AS27
     # Composite link 6
     AS26 = C6*MSP16 - S6*MSP26
     AS36 = -S6*MSP16 - C6*MSP26
-    NE316 = -S6*JP136 - C6*JP236
+    A[0, 4] = A[4, 0] = -S6*JP136 - C6*JP236
     B6AS36 = B6*AS36
     # Composite link 4
     AS14 = MX4R*S4 + MY4R*C4
@@ -1285,7 +1254,7 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     S4S4 = S4**2
     C4S4 = C4*S4
     JP113 = XX4R*S4S4 + XY4R*2*C4S4
-    NE134 = XZ4R*S4 + YZ4R*C4
+    NE134 = A[1, 3] = A[3, 1] = XZ4R*S4 + YZ4R*C4
     NE334 = XZ4R*C4 - YZ4R*S4
     D4AS14 = D4*AS14
     JP223a = 2*D4AS14
@@ -1301,51 +1270,38 @@ def _inertia_matrix_block(xp, q, A, X, D2, RL2, D4, B6, D6, D7, RL8):
     JP122 = XY2R + NE334 - MY3R*r3
     JP132 = XZ2R - NE134
     JP232 = YZ2R + r3*MSP13 - JP133
-    JP332 = ZZ2R + JP113 + JP112b
+    A[1, 1] = ZZ2R + JP113 + JP112b
     MSP22 = MY2 - JP112a
     # Composite link 2
     AS12 = MSP12*C2 - S2*MSP22
     AS32 = -MSP12*S2 - C2*MSP22
-    NE312 = -S2*JP132 - C2*JP232 - RL2*AS32
-    JP331 = (ZZ1R + JP116 + JP126*2*C6*S6 + 2*(D6*AS26 + B6AS36) + JP112 + C2**2*(JP333 - JP112) +
+    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232 - RL2*AS32
+    A[0, 0] = (ZZ1R + JP116 + JP126*2*C6*S6 + 2*(D6*AS26 + B6AS36) + JP112 + C2**2*(JP333 - JP112) +
         JP122*2*C2*S2 + D2*AS12 + RL2*MSP13 + D2*(AS12 + D2*M3R) + RL2*(MSP13 +
             RL2*M3R) - C6**2*(JP116 - JP226) - 2*B6AS36)
     # Unit acceleration of joint 3
     E113 = M3R*S2
-    NE313 = -S2*MSP13 - RL2*E113
+    A[0, 2] = A[2, 0] = -S2*MSP13 - RL2*E113
     # Unit acceleration of joint 4
     NE234 = ZZ4R + D4AS14
     NE124 = -NE234 - r3*AS34
     E114 = -S2*AS14
-    NE314 = C2*NE334 + D2*AS34 - S2*NE124 - RL2*E114
+    A[0, 3] = A[3, 0] = C2*NE334 + D2*AS34 - S2*NE124 - RL2*E114
     # Unit acceleration of joint 7
-    NE367 = JP337 + D7AS17
-    NE317 = -S6*NE167 - C6*NE267
+    A[4, 5] = A[5, 4] = JP337 + D7AS17
+    A[0, 5] = A[5, 0] = -S6*NE167 - C6*NE267
     # Unit acceleration of joint 8
     E268 = -S7*AS38
     NE168 = C7*NE178 + ZZ8*S7
     NE268 = S7*NE178 - ZZ8*C7 - D7*AS18
-    NE368 = NE378 + D7*E268
-    NE318 = D6*AS18 - S6*NE168 - C6*NE268
+    A[4, 6] = A[6, 4] = NE378 + D7*E268
+    A[0, 6] = A[6, 0] = D6*AS18 - S6*NE168 - C6*NE268
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
-    A[1, 1] = JP332
-    A[0, 2] = A[2, 0] = NE313
     A[1, 2] = A[2, 1] = MY3R
     A[2, 2] = M3R + Ia3
-    A[0, 3] = A[3, 0] = NE314
-    A[1, 3] = A[3, 1] = NE134
     A[2, 3] = A[3, 2] = -AS14
     A[3, 3] = ZZ4R + Ia4
-    A[0, 4] = A[4, 0] = NE316
-    A[4, 4] = JP336
-    A[0, 5] = A[5, 0] = NE317
-    A[4, 5] = A[5, 4] = NE367
     A[5, 5] = Ia7 + JP337
-    A[0, 6] = A[6, 0] = NE318
-    A[4, 6] = A[6, 4] = NE368
-    A[5, 6] = A[6, 5] = NE378
     A[6, 6] = ZZ8 + Ia8
 
 
@@ -1353,29 +1309,12 @@ def _gravity_block(xp, q, GAM, X, D2, RL2, GX, GZ):
     """Fill GAM, shape (7, N), from q (7, N)."""
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
-    MX1R = X[1]
-    MY1R = X[2]
-    OFFSET1 = X[5]
-    MX2 = X[11]
-    MY2 = X[12]
-    OFFSET2 = X[15]
-    MX3R = X[16]
-    MY3R = X[17]
-    MZ3 = X[18]
-    M3R = X[19]
-    OFFSET3 = X[23]
-    MX4R = X[29]
-    MY4R = X[30]
-    OFFSET4 = X[34]
-    MX6R = X[40]
-    MY6 = X[41]
-    OFFSET6 = X[44]
-    MX7 = X[50]
-    MY7R = X[51]
-    OFFSET7 = X[55]
-    MX8 = X[61]
-    MY8 = X[62]
-    OFFSET8 = X[66]
+    (
+        _, MX1R, MY1R, _, _, OFFSET1, _, _, _, _, _, MX2, MY2, _, _, OFFSET2, MX3R, MY3R, MZ3,
+        M3R, _, _, _, OFFSET3, _, _, _, _, _, MX4R, MY4R, _, _, _, OFFSET4, _, _, _, _, _, MX6R,
+        MY6, _, _, OFFSET6, _, _, _, _, _, MX7, MY7R, _, _, _, OFFSET7, _, _, _, _, _, MX8, MY8,
+        _, _, _, OFFSET8
+    ) = X
     # Trigonometry
     C1 = xp.cos(q1)
     S1 = xp.sin(q1)
@@ -1467,156 +1406,91 @@ def _frame_poses_block(xp, q, T, D2, RL2, D4, D5, RL5, B6, D6, D7, RL8):
     # Inputs
     q1, q2, q3, q4, q6, q7, q8 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
-    C2 = xp.cos(q2)
-    S2 = xp.sin(q2)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 0] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
+    C2 = T[2, 2, 2] = xp.cos(q2)
+    S2 = T[2, 2, 1] = T[3, 2, 2] = T[4, 2, 1] = xp.sin(q2)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     th67 = q6 + q7
-    C67 = xp.cos(th67)
+    C67 = T[7, 2, 2] = xp.cos(th67)
     S67 = xp.sin(th67)
     C8 = xp.cos(q8)
     S8 = xp.sin(q8)
     # Inputs
     r3 = 0.1 + q3
     # Joint axes Z and velocities V seen from link 4
-    Z141 = C2*C4
-    Z241 = -C2*S4
+    Z141 = T[3, 2, 0] = T[4, 2, 0] = C2*C4
+    Z241 = T[3, 2, 1] = -C2*S4
     # Joint axes Z and velocities V seen from link 8
-    Z181 = -S67*C8
-    Z281 = S67*S8
+    T[7, 2, 0] = -S67*C8
+    T[7, 2, 1] = S67*S8
     # Frame 2
-    R112 = C1*C2
-    R122 = -C1*S2
-    R212 = S1*C2
-    R222 = -S1*S2
-    P12 = D2*C1 - RL2*S1
-    P22 = D2*S1 + RL2*C1
+    R112 = T[1, 0, 0] = C1*C2
+    R122 = T[1, 0, 1] = -C1*S2
+    R212 = T[1, 1, 0] = S1*C2
+    R222 = T[1, 1, 1] = -S1*S2
+    P12 = T[1, 0, 3] = D2*C1 - RL2*S1
+    P22 = T[1, 1, 3] = D2*S1 + RL2*C1
     # Frame 3
-    P13 = P12 - r3*R122
-    P23 = P22 - r3*R222
-    P33 = C2*r3
+    P13 = T[2, 0, 3] = P12 - r3*R122
+    P23 = T[2, 1, 3] = P22 - r3*R222
+    P33 = T[2, 2, 3] = T[3, 2, 3] = C2*r3
     # Frame 4
-    R114 = -S1*S4 - C4*R122
-    R124 = S4*R122 - S1*C4
-    R214 = C1*S4 - C4*R222
-    R224 = S4*R222 + C1*C4
-    P14 = P13 - D4*S1
-    P24 = P23 + D4*C1
+    R114 = T[3, 0, 0] = T[4, 0, 0] = -S1*S4 - C4*R122
+    R124 = T[3, 0, 1] = S4*R122 - S1*C4
+    R214 = T[3, 1, 0] = T[4, 1, 0] = C1*S4 - C4*R222
+    R224 = T[3, 1, 1] = S4*R222 + C1*C4
+    P14 = T[3, 0, 3] = P13 - D4*S1
+    P24 = T[3, 1, 3] = P23 + D4*C1
     # Frame 5
-    P15 = P14 + D5*R114 - RL5*R124
-    P25 = P24 + D5*R214 - RL5*R224
-    P35 = P33 + D5*Z141 - RL5*Z241
+    T[4, 0, 3] = P14 + D5*R114 - RL5*R124
+    T[4, 1, 3] = P24 + D5*R214 - RL5*R224
+    T[4, 2, 3] = P33 + D5*Z141 - RL5*Z241
     # Frame 6
-    R116 = -S1*C6
-    R126 = S1*S6
-    R216 = C1*C6
-    R226 = -C1*S6
-    P16 = -D6*S1
-    P26 = D6*C1
+    R116 = T[5, 0, 0] = -S1*C6
+    T[5, 0, 1] = S1*S6
+    R216 = T[5, 1, 0] = C1*C6
+    T[5, 1, 1] = -C1*S6
+    P16 = T[5, 0, 3] = -D6*S1
+    P26 = T[5, 1, 3] = D6*C1
     # Frame 7
-    R117 = -S1*C67
-    R127 = S1*S67
-    R217 = C1*C67
-    R227 = -C1*S67
-    P17 = P16 + D7*R116
-    P27 = P26 + D7*R216
-    P37 = B6 - D7*S6
+    R117 = T[6, 0, 0] = -S1*C67
+    R127 = T[6, 0, 1] = S1*S67
+    R217 = T[6, 1, 0] = C1*C67
+    R227 = T[6, 1, 1] = -C1*S67
+    P17 = T[6, 0, 3] = P16 + D7*R116
+    P27 = T[6, 1, 3] = P26 + D7*R216
+    P37 = T[6, 2, 3] = B6 - D7*S6
     # Frame 8
-    R118 = C8*R117 - C1*S8
-    R128 = -C1*C8 - S8*R117
-    R218 = C8*R217 - S1*S8
-    R228 = -S1*C8 - S8*R217
-    P18 = P17 - RL8*R127
-    P28 = P27 - RL8*R227
-    P38 = P37 + RL8*C67
+    T[7, 0, 0] = C8*R117 - C1*S8
+    T[7, 0, 1] = -C1*C8 - S8*R117
+    T[7, 1, 0] = C8*R217 - S1*S8
+    T[7, 1, 1] = -S1*C8 - S8*R217
+    T[7, 0, 3] = P17 - RL8*R127
+    T[7, 1, 3] = P27 - RL8*R227
+    T[7, 2, 3] = P37 + RL8*C67
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 0, 3] = P12
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
-    T[1, 1, 3] = P22
+    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 0] = T[5, 1, 2] = T[6, 1, 2] = -S1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[2, 0, 0] = -S1
-    T[2, 0, 1] = -R112
+    T[2, 0, 1] = T[3, 0, 2] = T[4, 0, 1] = -R112
     T[2, 0, 2] = -R122
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = C1
-    T[2, 1, 1] = -R212
+    T[2, 1, 1] = T[3, 1, 2] = T[4, 1, 1] = -R212
     T[2, 1, 2] = -R222
-    T[2, 1, 3] = P23
-    T[2, 2, 1] = S2
-    T[2, 2, 2] = C2
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
-    T[3, 0, 2] = -R112
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
-    T[3, 1, 2] = -R212
-    T[3, 1, 3] = P24
-    T[3, 2, 0] = Z141
-    T[3, 2, 1] = Z241
-    T[3, 2, 2] = S2
-    T[3, 2, 3] = P33
-    T[4, 0, 0] = R114
-    T[4, 0, 1] = -R112
     T[4, 0, 2] = -R124
-    T[4, 0, 3] = P15
-    T[4, 1, 0] = R214
-    T[4, 1, 1] = -R212
     T[4, 1, 2] = -R224
-    T[4, 1, 3] = P25
-    T[4, 2, 0] = Z141
-    T[4, 2, 1] = S2
     T[4, 2, 2] = -Z241
-    T[4, 2, 3] = P35
-    T[5, 0, 0] = R116
-    T[5, 0, 1] = R126
-    T[5, 0, 2] = -C1
-    T[5, 0, 3] = P16
-    T[5, 1, 0] = R216
-    T[5, 1, 1] = R226
-    T[5, 1, 2] = -S1
-    T[5, 1, 3] = P26
+    T[5, 0, 2] = T[6, 0, 2] = -C1
     T[5, 2, 0] = -S6
     T[5, 2, 1] = -C6
     T[5, 2, 3] = B6
-    T[6, 0, 0] = R117
-    T[6, 0, 1] = R127
-    T[6, 0, 2] = -C1
-    T[6, 0, 3] = P17
-    T[6, 1, 0] = R217
-    T[6, 1, 1] = R227
-    T[6, 1, 2] = -S1
-    T[6, 1, 3] = P27
     T[6, 2, 0] = -S67
     T[6, 2, 1] = -C67
-    T[6, 2, 3] = P37
-    T[7, 0, 0] = R118
-    T[7, 0, 1] = R128
     T[7, 0, 2] = -R127
-    T[7, 0, 3] = P18
-    T[7, 1, 0] = R218
-    T[7, 1, 1] = R228
     T[7, 1, 2] = -R227
-    T[7, 1, 3] = P28
-    T[7, 2, 0] = Z181
-    T[7, 2, 1] = Z281
-    T[7, 2, 2] = C67
-    T[7, 2, 3] = P38
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
     T[6, 3, 3] = T[7, 3, 3] = 1.0

@@ -82,7 +82,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 551b767825307d97eac833ae39617303e40fa4016c9fef7fa6299914a16fae2a
+sha256 of all but these lines: 248e8575e8ab1de9b9840218970564742ee162f72f505a6e8124586b9b4f9799
 """
 
 import numpy as np
@@ -188,10 +188,14 @@ def _filled(block, result, states, arguments):
     (..., B), result ends in samples.
     """
     N = result.shape[-1]
-    B = max(N, 1) if N <= 8192 else 4096
-    for t in range(0, N, B):
-        rows = [np.ascontiguousarray(x[t:t + B].T) for x in states]
-        block(np, *rows, result[..., t:t + B], *arguments)
+    if N <= 8192:
+        rows = [np.ascontiguousarray(x.T) for x in states]
+        block(np, *rows, result, *arguments)
+        return result
+    for t in range(0, N, 4096):
+        part = slice(t, t + 4096)
+        rows = [np.ascontiguousarray(x[part].T) for x in states]
+        block(np, *rows, result[..., part], *arguments)
     return result
 
 
@@ -220,8 +224,11 @@ _IN_PLACE = True  # NumPy's arrays are written to; False treats them as those of
 
 def _package(*arrays):
     """NumPy for its arrays and for lists; else the functions of the package of all arrays."""
-    if _IN_PLACE and all(type(x) is np.ndarray for x in arrays):
-        return np
+    for x in arrays:
+        if type(x) is not np.ndarray:
+            break
+    else:
+        return np if _IN_PLACE else _Arrays(np, arrays)
     if any(type(x).__module__.startswith("casadi") for x in arrays):
         return _Symbols()
     others = [x for x in arrays if hasattr(x, "__dlpack__") or hasattr(x, "__array_namespace__")]
@@ -559,7 +566,7 @@ def forward_dynamics(
         tau = np.asarray(tau, dtype=float)
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
-    rest = tau - bias(q, qd, X, D3=D3, RL4=RL4, g=g)
+    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, RL4=RL4, g=g)
     inertia = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g)
     if xp is np:
         return np.linalg.solve(inertia, rest[..., None])[..., 0]
@@ -1136,44 +1143,12 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     """Fill A, shape (6, 6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
-    ZZ1R = X[0]
-    XX2R = X[4]
-    XY2 = X[5]
-    XZ2R = X[6]
-    YZ2 = X[7]
-    ZZ2R = X[8]
-    XX3R = X[14]
-    XY3 = X[15]
-    XZ3 = X[16]
-    YZ3 = X[17]
-    ZZ3R = X[18]
-    MX3 = X[19]
-    MY3R = X[20]
-    Ia3 = X[21]
-    XX4R = X[25]
-    XY4 = X[26]
-    XZ4 = X[27]
-    YZ4 = X[28]
-    ZZ4R = X[29]
-    MX4 = X[30]
-    MY4R = X[31]
-    Ia4 = X[32]
-    XX5R = X[36]
-    XY5 = X[37]
-    XZ5 = X[38]
-    YZ5 = X[39]
-    ZZ5R = X[40]
-    MX5 = X[41]
-    MY5R = X[42]
-    Ia5 = X[43]
-    XX6R = X[47]
-    XY6 = X[48]
-    XZ6 = X[49]
-    YZ6 = X[50]
-    ZZ6 = X[51]
-    MX6 = X[52]
-    MY6 = X[53]
-    Ia6 = X[54]
+    (
+        ZZ1R, _, _, _, XX2R, XY2, XZ2R, YZ2, ZZ2R, _, _, _, _, _, XX3R, XY3, XZ3, YZ3, ZZ3R,
+        MX3, MY3R, Ia3, _, _, _, XX4R, XY4, XZ4, YZ4, ZZ4R, MX4, MY4R, Ia4, _, _, _, XX5R, XY5,
+        XZ5, YZ5, ZZ5R, MX5, MY5R, Ia5, _, _, _, XX6R, XY6, XZ6, YZ6, ZZ6, MX6, MY6, Ia6, _, _,
+        _, _, _
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1207,7 +1182,7 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     JP114a = ZZ6 - JP115
     JP114b = C5C5*JP114a + JP125*2*C5S5
     NE145 = C5*JP135 - S5*JP235
-    NE345 = -S5*JP135 - C5*JP235
+    NE345 = A[3, 4] = A[4, 3] = -S5*JP135 - C5*JP235
     JP114 = XX4R + ZZ6 - JP114b
     JP124 = XY4 + NE145
     JP134 = XZ4 + C5S5*JP114a + JP125 - JP125*2*C5C5
@@ -1227,7 +1202,7 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     NE134 = C4*JP134 - S4*JP234 - RL4*AS14
     JP123 = XY3 - NE134
     JP133 = XZ3 + JP124*2*C4C4 - C4S4*JP113a - JP124
-    NE334 = S4*JP134 + C4*JP234 - RL4*AS34
+    NE334 = A[2, 3] = A[3, 2] = S4*JP134 + C4*JP234 - RL4*AS34
     JP233 = YZ3 - NE334
     JP333 = ZZ3R + JP114 + JP113b - JP113c
     MSP13 = MX3 + AS14
@@ -1248,63 +1223,47 @@ def _inertia_matrix_block(xp, q, A, X, D3, RL4):
     JP132 = XZ2R + NE123 - D3*AS34
     JP222 = JP113 + JP112b + JP222a
     JP232 = YZ2 + NE223
-    JP332 = ZZ2R + JP333 + JP222a
+    A[1, 1] = ZZ2R + JP333 + JP222a
     # Composite link 2
-    NE312 = -S2*JP132 - C2*JP232
-    JP331 = ZZ1R + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
+    A[0, 1] = A[1, 0] = -S2*JP132 - C2*JP232
+    A[0, 0] = ZZ1R + JP112 + JP122*2*C2*S2 - C2**2*(JP112 - JP222)
     # Unit acceleration of joint 3
-    NE323 = JP333 + D3AS13
-    NE313 = -S2*NE123 - C2*NE223
+    A[1, 2] = A[2, 1] = JP333 + D3AS13
+    A[0, 2] = A[2, 0] = -S2*NE123 - C2*NE223
     # Unit acceleration of joint 4
     E224 = -S3*AS34
     NE124 = C3*NE134 + S3*JP334
     NE224 = S3*NE134 - C3*JP334 - D3*AS14
-    NE324 = NE334 + D3*E224
-    NE314 = -S2*NE124 - C2*NE224
+    A[1, 3] = A[3, 1] = NE334 + D3*E224
+    A[0, 3] = A[3, 0] = -S2*NE124 - C2*NE224
     # Unit acceleration of joint 5
     E135 = C4*AS35
     E335 = S4*AS35
     NE135 = C4*NE145 - S4*JP335 - RL4*E335
-    NE335 = S4*NE145 + C4*JP335 + RL4*E135
+    NE335 = A[2, 4] = A[4, 2] = S4*NE145 + C4*JP335 + RL4*E135
     E225 = S3*E135 + C3*AS15
     NE125 = C3*NE135 + S3*NE345
     NE225 = S3*NE135 - C3*NE345 - D3*E335
-    NE325 = NE335 + D3*E225
-    NE315 = -S2*NE125 - C2*NE225
+    A[1, 4] = A[4, 1] = NE335 + D3*E225
+    A[0, 4] = A[4, 0] = -S2*NE125 - C2*NE225
     # Unit acceleration of joint 6
     E146 = -C5*AS36
     E346 = S5*AS36
     NE146 = C5*NE156 + ZZ6*S5
-    NE346 = ZZ6*C5 - S5*NE156
+    NE346 = A[3, 5] = A[5, 3] = ZZ6*C5 - S5*NE156
     E136 = C4*E146 - S4*AS16
     E336 = S4*E146 + C4*AS16
     NE136 = C4*NE146 - S4*NE356 - RL4*E336
-    NE336 = S4*NE146 + C4*NE356 + RL4*E136
+    NE336 = A[2, 5] = A[5, 2] = S4*NE146 + C4*NE356 + RL4*E136
     E226 = S3*E136 - C3*E346
     NE126 = C3*NE136 + S3*NE346
     NE226 = S3*NE136 - C3*NE346 - D3*E336
-    NE326 = NE336 + D3*E226
-    NE316 = -S2*NE126 - C2*NE226
+    A[1, 5] = A[5, 1] = NE336 + D3*E226
+    A[0, 5] = A[5, 0] = -S2*NE126 - C2*NE226
     # Inertia matrix
-    A[0, 0] = JP331
-    A[0, 1] = A[1, 0] = NE312
-    A[1, 1] = JP332
-    A[0, 2] = A[2, 0] = NE313
-    A[1, 2] = A[2, 1] = NE323
     A[2, 2] = Ia3 + JP333
-    A[0, 3] = A[3, 0] = NE314
-    A[1, 3] = A[3, 1] = NE324
-    A[2, 3] = A[3, 2] = NE334
     A[3, 3] = Ia4 + JP334
-    A[0, 4] = A[4, 0] = NE315
-    A[1, 4] = A[4, 1] = NE325
-    A[2, 4] = A[4, 2] = NE335
-    A[3, 4] = A[4, 3] = NE345
     A[4, 4] = Ia5 + JP335
-    A[0, 5] = A[5, 0] = NE316
-    A[1, 5] = A[5, 1] = NE326
-    A[2, 5] = A[5, 2] = NE336
-    A[3, 5] = A[5, 3] = NE346
     A[4, 5] = A[5, 4] = Ia6 + NE356
     A[5, 5] = ZZ6 + Ia6
 
@@ -1313,22 +1272,11 @@ def _gravity_block(xp, q, GAM, X, g):
     """Fill GAM, shape (6, N), from q (6, N)."""
     # Inputs
     q2, q3, q4, q5, q6 = q[1:]
-    OFFSET1 = X[3]
-    MX2R = X[9]
-    MY2 = X[10]
-    OFFSET2 = X[13]
-    MX3 = X[19]
-    MY3R = X[20]
-    OFFSET3 = X[24]
-    MX4 = X[30]
-    MY4R = X[31]
-    OFFSET4 = X[35]
-    MX5 = X[41]
-    MY5R = X[42]
-    OFFSET5 = X[46]
-    MX6 = X[52]
-    MY6 = X[53]
-    OFFSET6 = X[57]
+    (
+        _, _, _, OFFSET1, _, _, _, _, _, MX2R, MY2, _, _, OFFSET2, _, _, _, _, _, MX3, MY3R, _,
+        _, _, OFFSET3, _, _, _, _, _, MX4, MY4R, _, _, _, OFFSET4, _, _, _, _, _, MX5, MY5R, _,
+        _, _, OFFSET5, _, _, _, _, _, MX6, MY6, _, _, _, OFFSET6, _, _
+    ) = X
     # Trigonometry
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
@@ -1393,12 +1341,12 @@ def _frame_poses_block(xp, q, T, D3, RL4):
     # Inputs
     q1, q2, q3, q4, q5, q6 = q
     # Trigonometry
-    C1 = xp.cos(q1)
-    S1 = xp.sin(q1)
+    C1 = T[0, 0, 0] = T[0, 1, 1] = T[1, 1, 2] = T[2, 1, 2] = xp.cos(q1)
+    S1 = T[0, 1, 0] = xp.sin(q1)
     C2 = xp.cos(q2)
     S2 = xp.sin(q2)
     th23 = q2 + q3
-    C23 = xp.cos(th23)
+    C23 = T[3, 2, 2] = xp.cos(th23)
     S23 = xp.sin(th23)
     C4 = xp.cos(q4)
     S4 = xp.sin(q4)
@@ -1407,105 +1355,56 @@ def _frame_poses_block(xp, q, T, D3, RL4):
     C6 = xp.cos(q6)
     S6 = xp.sin(q6)
     # Joint axes Z and velocities V seen from link 4
-    Z141 = -S23*C4
-    Z241 = S23*S4
+    Z141 = T[3, 2, 0] = -S23*C4
+    Z241 = T[3, 2, 1] = T[4, 2, 2] = S23*S4
     # Joint axes Z and velocities V seen from link 5
-    Z151 = C5*Z141 - C23*S5
-    Z251 = -C23*C5 - S5*Z141
+    Z151 = T[4, 2, 0] = C5*Z141 - C23*S5
+    Z251 = T[4, 2, 1] = -C23*C5 - S5*Z141
     # Joint axes Z and velocities V seen from link 6
-    Z161 = C6*Z151 + S6*Z241
-    Z261 = C6*Z241 - S6*Z151
+    T[5, 2, 0] = C6*Z151 + S6*Z241
+    T[5, 2, 1] = C6*Z241 - S6*Z151
     # Frame 2
-    R112 = C1*C2
-    R122 = -C1*S2
-    R212 = S1*C2
-    R222 = -S1*S2
+    R112 = T[1, 0, 0] = C1*C2
+    T[1, 0, 1] = -C1*S2
+    R212 = T[1, 1, 0] = S1*C2
+    T[1, 1, 1] = -S1*S2
     # Frame 3
-    R113 = C1*C23
-    R123 = -C1*S23
-    R213 = S1*C23
-    R223 = -S1*S23
-    P13 = D3*R112
-    P23 = D3*R212
-    P33 = -D3*S2
+    R113 = T[2, 0, 0] = C1*C23
+    R123 = T[2, 0, 1] = -C1*S23
+    R213 = T[2, 1, 0] = S1*C23
+    R223 = T[2, 1, 1] = -S1*S23
+    P13 = T[2, 0, 3] = D3*R112
+    P23 = T[2, 1, 3] = D3*R212
+    P33 = T[2, 2, 3] = -D3*S2
     # Frame 4
-    R114 = C4*R113 - S1*S4
-    R124 = -S1*C4 - S4*R113
-    R214 = C4*R213 + C1*S4
-    R224 = C1*C4 - S4*R213
-    P14 = P13 - RL4*R123
-    P24 = P23 - RL4*R223
-    P34 = P33 + RL4*C23
+    R114 = T[3, 0, 0] = C4*R113 - S1*S4
+    R124 = T[3, 0, 1] = T[4, 0, 2] = -S1*C4 - S4*R113
+    R214 = T[3, 1, 0] = C4*R213 + C1*S4
+    R224 = T[3, 1, 1] = T[4, 1, 2] = C1*C4 - S4*R213
+    T[3, 0, 3] = T[4, 0, 3] = T[5, 0, 3] = P13 - RL4*R123
+    T[3, 1, 3] = T[4, 1, 3] = T[5, 1, 3] = P23 - RL4*R223
+    T[3, 2, 3] = T[4, 2, 3] = T[5, 2, 3] = P33 + RL4*C23
     # Frame 5
-    R115 = C5*R114 + S5*R123
-    R125 = C5*R123 - S5*R114
-    R215 = C5*R214 + S5*R223
-    R225 = C5*R223 - S5*R214
+    R115 = T[4, 0, 0] = C5*R114 + S5*R123
+    R125 = T[4, 0, 1] = C5*R123 - S5*R114
+    R215 = T[4, 1, 0] = C5*R214 + S5*R223
+    R225 = T[4, 1, 1] = C5*R223 - S5*R214
     # Frame 6
-    R116 = C6*R115 + S6*R124
-    R126 = C6*R124 - S6*R115
-    R216 = C6*R215 + S6*R224
-    R226 = C6*R224 - S6*R215
+    T[5, 0, 0] = C6*R115 + S6*R124
+    T[5, 0, 1] = C6*R124 - S6*R115
+    T[5, 1, 0] = C6*R215 + S6*R224
+    T[5, 1, 1] = C6*R224 - S6*R215
     # Poses
-    T[0, 0, 0] = C1
-    T[0, 0, 1] = -S1
-    T[0, 1, 0] = S1
-    T[0, 1, 1] = C1
-    T[1, 0, 0] = R112
-    T[1, 0, 1] = R122
-    T[1, 0, 2] = -S1
-    T[1, 1, 0] = R212
-    T[1, 1, 1] = R222
-    T[1, 1, 2] = C1
+    T[0, 0, 1] = T[1, 0, 2] = T[2, 0, 2] = -S1
     T[1, 2, 0] = -S2
     T[1, 2, 1] = -C2
-    T[2, 0, 0] = R113
-    T[2, 0, 1] = R123
-    T[2, 0, 2] = -S1
-    T[2, 0, 3] = P13
-    T[2, 1, 0] = R213
-    T[2, 1, 1] = R223
-    T[2, 1, 2] = C1
-    T[2, 1, 3] = P23
     T[2, 2, 0] = -S23
     T[2, 2, 1] = -C23
-    T[2, 2, 3] = P33
-    T[3, 0, 0] = R114
-    T[3, 0, 1] = R124
     T[3, 0, 2] = -R123
-    T[3, 0, 3] = P14
-    T[3, 1, 0] = R214
-    T[3, 1, 1] = R224
     T[3, 1, 2] = -R223
-    T[3, 1, 3] = P24
-    T[3, 2, 0] = Z141
-    T[3, 2, 1] = Z241
-    T[3, 2, 2] = C23
-    T[3, 2, 3] = P34
-    T[4, 0, 0] = R115
-    T[4, 0, 1] = R125
-    T[4, 0, 2] = R124
-    T[4, 0, 3] = P14
-    T[4, 1, 0] = R215
-    T[4, 1, 1] = R225
-    T[4, 1, 2] = R224
-    T[4, 1, 3] = P24
-    T[4, 2, 0] = Z151
-    T[4, 2, 1] = Z251
-    T[4, 2, 2] = Z241
-    T[4, 2, 3] = P34
-    T[5, 0, 0] = R116
-    T[5, 0, 1] = R126
     T[5, 0, 2] = -R125
-    T[5, 0, 3] = P14
-    T[5, 1, 0] = R216
-    T[5, 1, 1] = R226
     T[5, 1, 2] = -R225
-    T[5, 1, 3] = P24
-    T[5, 2, 0] = Z161
-    T[5, 2, 1] = Z261
     T[5, 2, 2] = -Z251
-    T[5, 2, 3] = P34
     # Constants
     T[0, 2, 2] = T[0, 3, 3] = T[1, 3, 3] = T[2, 3, 3] = T[3, 3, 3] = T[4, 3, 3] = T[5, 3, 3] = 1.0
 

@@ -7,6 +7,7 @@ matrices of CasADi. What functions share of the motion of the links is a block o
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import Any
@@ -16,7 +17,7 @@ from symgen.derive.loop_equations import loop_system
 from symgen.derive.model import Model
 from symgen.derive.models import EMITTED, ON_REQUEST
 from symgen.derive.regressor import acting, element_names
-from symgen.description.expression import Expression
+from symgen.description.expression import ZERO, Expression
 from symgen.description.robot import FIXED, PRISMATIC, Robot
 from symgen.emit.blocks import Block, FunctionPrinter
 from symgen.emit.header import data, header, literal, packed, plain, tables, wrapped
@@ -27,6 +28,7 @@ from symgen.regroup.regrouping import Regrouping, sign_conditions
 from symgen.version import VERSION
 
 BLOCK = 4096  # samples
+MANY = 8  # values of a source that are named in one assignment, others beside them
 FEWEST_SHARED = 8  # values of the motion of the links that are worth a function of their own
 IN_METRES = 0.01  # m: mechanisms in which no length is above are closed to 1e-16 m
 
@@ -53,8 +55,6 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         "passive_joints": _symbols(passive),
     }
     constants = {name: [c for c in free if c in used] for name, used in taken.items()}
-    scope = spec.names(PYTHON.is_word)
-    passive_names = [scope.own(name) for name in ("x", "P", "one")]
     slides = any(robot.frame(j).sigma == PRISMATIC for j in closure.independent)
     return laid_out(
         "module.py",
@@ -106,8 +106,7 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
             ],
             "packed": packed(list(regrouping.names)),
             "moving": _moving(robot, closure),
-            "passive_names": passive_names,
-            "passive_rows": _passive_rows(robot, closure, passive_names),
+            "passive_rows": _passive_rows(robot, closure),
             "motion": motion,
             "blocks": [_laid_out(spec, b) for b in blocks.values()],
             "functions": spec.functions,
@@ -153,7 +152,8 @@ def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
         return f"{block.result}[{', '.join(map(str, place))}]"
 
     constant = [] if f.model.by_columns else _constant_entries(f, block.result)
-    sections = [*block.sections, *block.results(target), Section("Constants", tuple(constant))]
+    steps, results = _filled_at_once(block.sections, block.results(target))
+    sections = [*steps, *results, Section("Constants", tuple(constant))]
     count = len(block.arguments) - len(block.constants) - f.model.reads_X
     states, rest = block.arguments[:count], block.arguments[count:]
     rows = [
@@ -168,6 +168,46 @@ def _laid_out(spec: ModuleSpec, block: Block) -> dict[str, object]:
         + f", from {'; '.join(rows)}.",
         "sections": [Section(s.title, tuple(broken(s.lines))) for s in sections if s.lines],
     }
+
+
+def _filled_at_once(
+    steps: Sequence[Section], results: Sequence[Section]
+) -> tuple[list[Section], list[Section]]:
+    """Steps and results, an entry without a remark that is a step filled in the line of the step,
+    equal ones in one line.
+    """
+    named = {line.partition(" = ")[0] for section in steps for line in section.lines}
+    targets: dict[str, list[str]] = {}
+    left = []
+    for section in results:
+        lines: dict[str, str] = {}
+        for line in section.lines:
+            places, _, value = line.rpartition(" = ")
+            if "#" in line or not value.lstrip("-").isidentifier():
+                lines[line] = line
+            elif value in named:
+                targets.setdefault(value, []).append(places)
+            elif value in lines:
+                lines[value] = f"{lines[value].removesuffix(value)}{places} = {value}"
+            else:
+                lines[value] = line
+        left.append(Section(section.title, tuple(lines.values())))
+    read = {
+        word
+        for section in (*steps, *left)
+        for line in section.lines
+        for word in re.findall(r"\w+", line.rpartition(" = ")[2])
+    }
+    at_once = []
+    for section in steps:
+        joined = []
+        for line in section.lines:
+            name, _, value = line.partition(" = ")
+            if name in targets:
+                line = " = ".join([name] * (name in read) + [*targets[name], value])
+            joined.append(line)
+        at_once.append(Section(section.title, tuple(joined)))
+    return at_once, left
 
 
 def _passed(robot: Robot, names: Sequence[str]) -> str:
@@ -267,7 +307,12 @@ def signature(start: str, parameters: Sequence[str], end: str = "") -> str:
 
 
 def _unpack(source: str, used: Sequence[tuple[int, str]], count: int) -> list[str]:
-    """`q1, q2 = q`, or a slice of it where those needed stand side by side; else one by one."""
+    """`q1, q2 = q`, or a slice of it where those needed stand side by side; else one by one, or all
+    of them where many are.
+    """
+    if len(used) > MANY and used[-1][0] - used[0][0] >= len(used):
+        called = dict(used)
+        return unpacked([called.get(k, "_") for k in range(count)], source)
     if len(used) < 2 or used[-1][0] - used[0][0] >= len(used):
         return [f"{name} = {source}[{k}]" for k, name in used]
     start, stop = used[0][0] or "", used[-1][0] + 1
@@ -325,22 +370,13 @@ def _moving(robot: Robot, closure: Closure) -> list[str]:
     return packed(entries)
 
 
-def _passive_rows(robot: Robot, closure: Closure, names: Sequence[str]) -> list[str]:
-    """Each passive joint over the independent ones; `names` of states, result, and what is 1 for
-    positions.
-    """
-    x, P, one = names
+def _passive_rows(robot: Robot, closure: Closure) -> list[str]:
+    """(origin, rates) of each passive joint over the independent ones, as source."""
     rows = []
-    for k, j in enumerate(robot.passive):
-        terms = [f"{_factor(closure.offset[j])}*{one}"] if closure.offset[j] else []
-        for i, g in closure.row[j].items():
-            terms.append(f"{_factor(g)}*{x}[{closure.independent.index(i)}]")
-        rows.append(f"{P}[{k}] = " + " + ".join(terms).replace(" + -", " - "))
+    for j in robot.passive:
+        rates = [source(closure.row[j].get(i, ZERO)) for i in closure.independent]
+        rows.append(f"({source(closure.offset[j])}, {tuple_of(rates)}),")
     return rows
-
-
-def _factor(e: Expression) -> str:
-    return source(e) if e.constant is not None else f"({source(e)})"
 
 
 def _element_lines(robot: Robot) -> list[str]:
