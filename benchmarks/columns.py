@@ -304,10 +304,10 @@ def counterbalance():
         )
         phi = (
             ""
-            if result.laws is None
+            if result.part("laws") is None
             else ", ".join(
                 s.doubt or f"{np.degrees(s.value):.2f} ± {1.96 * np.degrees(s.sigma):.2f}"
-                for s in result.laws.scalars
+                for s in result.part("laws").scalars
             )
         )
         unseen = {key: round(x, 2) for key, x in B.errors().items()}

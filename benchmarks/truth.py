@@ -207,7 +207,9 @@ def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
         move = world.MOTIONS[motion](robot, seed + 250_000 * i)
         tau = own.torque(move)
         records.append(record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed + i)))
-    agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).homogeneity
+    agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).part(
+        "homogeneity"
+    )
     assert agree is not None
     tested = len(agree.records) > 1
     return [{"noise": kind, "robot": robot.name, "motion": motion, "different": different, "tested": tested,
@@ -581,11 +583,12 @@ def physics(k: int, seed: int, seeds: str) -> list[Row]:
     except (runtime.InputError, ValueError) as e:
         return [row | {"said": str(e)}]
     row["said"] = "; ".join(result.missing) if label == "one joint at rest" else ""
-    if result.feasibility is not None:
+    judged = result.part("feasibility").judged
+    if judged is not None:
         row |= {
-            "feasible": bool(result.feasibility.feasible),
-            "margin": float(result.feasibility.margin),
-            "blocking": [c for c, _ in result.feasibility.blocking],
+            "feasible": bool(judged.feasible),
+            "margin": float(judged.margin),
+            "blocking": [c for c, _ in judged.blocking],
         }
     own = study(robot, "fourier", estimate={"method": "feasible"})
     try:

@@ -40,6 +40,7 @@ import numpy as np
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
+from runtime.core.check import Answer, Check, Question
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
 from runtime.core.least_squares.block_covariance import block_covariance
@@ -47,6 +48,9 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_companion, linear_estimate
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
+from runtime.core.part import Part
+from runtime.core.provenance import record_names
+from runtime.core.result import Identification
 from runtime.core.rows.observation import SHORTEST, Observation, split_rows
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
@@ -81,7 +85,7 @@ class Disagreement:
 
 
 @dataclass(frozen=True)
-class Homogeneity(Result, keys="records parameters p agree disagreements untested"):
+class Homogeneity(Result, Part, keys="records parameters p agree disagreements untested"):
     """Whether records agree.
 
     Attributes
@@ -103,6 +107,10 @@ class Homogeneity(Result, keys="records parameters p agree disagreements unteste
     disagreements: tuple[Disagreement, ...]
     untested: tuple[str, ...] = ()
 
+    name = "homogeneity"
+    title = "Agreement of the records"
+    about = "prediction"
+
     @property
     def agree(self) -> bool:
         """Whether neither test rejects."""
@@ -120,6 +128,14 @@ class Homogeneity(Result, keys="records parameters p agree disagreements unteste
         return max(differences, default=0.0 if self.agree else float("inf"))
 
     @property
+    def records_differ(self) -> bool:
+        """Whether a value differs by more than LIMIT.RELEVANT_DIFFERENCE."""
+        return bool(self.largest > LIMIT.RELEVANT_DIFFERENCE)
+
+    def checks(self) -> tuple[Check, ...]:
+        """Whether the records agree."""
+        return (agreeing(self),)
+
     def text(self) -> str:
         """One or two sentences."""
         left_out = "".join(f" Not compared: {reason}." for reason in self.untested)
@@ -144,8 +160,10 @@ class Homogeneity(Result, keys="records parameters p agree disagreements unteste
             f"{where or 'No single parameter stands out'}.{left_out}"
         )
 
-    def table(self) -> Table:
+    def tables(self) -> list[Table]:
         """Parameters that differ."""
+        if not self.disagreements:
+            return []
         rows = [
             (
                 d.record,
@@ -158,11 +176,48 @@ class Homogeneity(Result, keys="records parameters p agree disagreements unteste
             )
             for d in self.disagreements
         ]
-        return Table(
-            "Parameters in which records differ",
-            ("record", "parameter", "value", "deviation", "other records", "z", "p"),
-            rows,
-        )
+        header = ("record", "parameter", "value", "deviation", "other records", "z", "p")
+        return [Table("Parameters in which records differ", header, rows)]
+
+
+@Question(
+    "Do the records agree?",
+    f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}",
+    "look at the record that differs: load, temperature, time since the last one; or its "
+    "motion shows what the model leaves out",
+)
+def agreeing(found: Homogeneity) -> Answer:
+    """Whether several records tell the same parameters."""
+    text = found.text().rstrip(".")
+    if len(found.records) < 2:
+        return Answer("open", text, "")
+    if found.agree or found.largest > LIMIT.RELEVANT_DIFFERENCE:
+        return Answer("good" if found.agree else "doubtful", text)
+    return Answer(
+        "good",
+        "They differ by more than their stated deviations, but by at most "
+        f"{found.largest:.0f} % of a value",
+        limit=f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}, or by "
+        f"at most {LIMIT.RELEVANT_DIFFERENCE:g} % of any value",
+    )
+
+
+def agreement(result: Identification) -> Homogeneity | None:
+    """Whether several records agree, those that are predicted too: in all parameters, or in the essential ones where one of the records does not determine all. None for one record."""
+    records = [*result.records, *result.problem.unseen]
+    if len(records) < 2:
+        return None
+    settings = result.study.estimate
+    parts = {
+        name: result.observation.of_record(k)
+        for k, name in enumerate(record_names(records)[: len(result.records)])
+    }
+    parts |= result.unseen_rows
+    names = result.essential.all_parameters.names
+    in_all = homogeneity(parts, names, settings, model=result.model)
+    if not in_all.untested:
+        return in_all
+    return homogeneity(parts, result.essential.names, settings, model=result.model)
 
 
 def homogeneity(

@@ -16,23 +16,33 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from runtime import robust as irls
-from runtime.controller.fitted import law_of_controller
+from runtime.advisor.advice import no_advice
+from runtime.advisor.advisor import advice_of
+from runtime.agreement import agreement
+from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import estimation
+from runtime.core import identify as identification
 from runtime.core.automatic import automatic_cutoff
+from runtime.core.cestac.cestac import resolution as resolution_of
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
+from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import ordinary
 from runtime.core.least_squares.method import LINEAR, Method
 from runtime.core.least_squares.wls import by_weights, weighted
 from runtime.core.model import GeneratedModel
-from runtime.core.problem import Problem, Step, prepared
+from runtime.core.problem import Note, Problem, Step, prepared
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.states import Reader, lowpassed
 from runtime.core.study import EstimateSettings, Study
+from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.reader import counted
-from runtime.laws.scalars import fitted_scalars
+from runtime.elastic import elastic_gears
+from runtime.expected import ExpectedError
+from runtime.friction.curves import friction as friction_of_joints
+from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
 from runtime.link_side import torques_of_links
 from runtime.loop import didim, iv
@@ -40,7 +50,11 @@ from runtime.loop.closed_loop import observed_loop
 from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.simulated_motion import beside_record
 from runtime.median import torque_median
+from runtime.payload.study import LOADED, load_of_study, payload_study
 from runtime.physical import feasible
+from runtime.physical.consistency import as_fitted, consistency
+from runtime.plausible.known import torque_unit
+from runtime.plausible.plausibility import plausibility_of
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
@@ -93,6 +107,22 @@ METHODS: dict[str, Method] = {
         any_rank=True,
     ),
 }
+
+EXTRAS: list[Extra] = [
+    torque_unit,
+    doubt_of_gains,
+    OnRequest("plausible", "plausibility of the record", plausibility_of),
+    scalars_of_laws,
+    load_of_study,
+    elastic_gears,
+    EncoderSteps,
+    agreement,
+    ExpectedError,
+    OnRequest("friction", "friction", friction_of_joints),
+    OnRequest("physical", "physical consistency", consistency, as_fitted),
+    OnRequest("advice", "resolution advice", advice_of, no_advice),
+    OnRequest("resolution", "resolution study", resolution_of),
+]
 
 Records = Record | Sequence[Record]
 
@@ -290,18 +320,15 @@ def identify(
     InputError
         A record, setting or extra that does not suit what is asked for.
     """
-    from runtime.core import identify as identification
-
-    whole, with_load = _with_loaded(model, records, study, further, loaded, simulator)
-    return identification.identify(
-        whole,
-        loaded=with_load,
-        physical=physical,
-        friction=friction,
-        variants=variants,
-        plausible=variants is not None if plausible is None else plausible,
-        provenance=provenance,
-    )
+    asked: dict[str, Mapping[str, Any]] = {}
+    if physical:
+        asked["physical"] = {}
+    if friction:
+        asked["friction"] = {}
+    if plausible or (plausible is None and variants is not None):
+        asked["plausible"] = {"variants": variants}
+    whole = _with_loaded(model, records, study, further, loaded, simulator)
+    return identification.identify(whole, extras(asked), provenance=provenance)
 
 
 @single_threaded
@@ -315,21 +342,20 @@ def assess(
     provenance: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] = lambda part: None,
 ) -> Identification:
-    """The identification with friction, physical consistency and encoder resolution, as far as records, study and installed extras allow (`symgen report`).
+    """The identification with everything that EXTRAS hold, as far as records, study and installed packages allow (`symgen report`).
 
     encoder : steps of the encoders in use, rad or m.
     progress : called with the name of each part before it is computed.
     """
-    from runtime.core import identify as identification
-
-    whole, with_load = _with_loaded(model, records, study, None, None, None)
-    return identification.assess(
-        whole,
-        loaded=with_load,
-        encoder=encoder,
-        variants=variants,
-        provenance=provenance,
-        progress=progress,
+    asked: dict[str, Mapping[str, Any]] = {
+        extra.keyword: {} for extra in EXTRAS if isinstance(extra, OnRequest)
+    }
+    asked["plausible"] = {"variants": variants}
+    asked["advice"] = {"encoder": encoder}
+    whole = _with_loaded(model, records, study, None, None, None)
+    progress("identification")
+    return identification.identify(
+        whole, extras(asked, attempted=True), provenance=provenance, progress=progress
     )
 
 
@@ -366,7 +392,8 @@ def compare(
         }
     else:
         problems = comparing.treatments(_candidate(model, candidates), STEPS)
-    return comparing.compare(problems, variants=variants)
+    judged = [] if variants is None else [partial(plausibility_of, variants=variants)]
+    return comparing.compare(problems, extras({}), judged)
 
 
 @single_threaded
@@ -439,10 +466,9 @@ def payload(
     model: GeneratedModel, records: Records, study: Study, *, loaded: Sequence[Record] | None = None
 ) -> PayloadStudy:
     """The load of study.payload; loaded : records with it, default: those of study.payload.record."""
-    from runtime.payload import study as payload_study
-
-    whole, with_load = _with_loaded(model, records, study, (), loaded, None)
-    return payload_study.payload_study(whole, with_load)
+    whole = _with_loaded(model, records, study, (), loaded, None)
+    note = whole.noted(LOADED)
+    return payload_study(whole, () if note is None else note.result)
 
 
 @single_threaded
@@ -474,6 +500,19 @@ def static_poses(
     return poses.static_poses(problem(model, records, study))
 
 
+def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> list[Extra]:
+    """EXTRAS with those on request that are asked for, by keyword, each with its options; what stands for the others."""
+    chosen: list[Extra] = []
+    for extra in EXTRAS:
+        if not isinstance(extra, OnRequest):
+            chosen.append(extra)
+        elif extra.keyword in asked:
+            chosen.append(replace(extra, options=asked[extra.keyword], attempted=attempted))
+        elif extra.otherwise is not None:
+            chosen.append(extra.otherwise)
+    return chosen
+
+
 def _with_loaded(
     model: GeneratedModel,
     records: Records,
@@ -481,8 +520,8 @@ def _with_loaded(
     unseen: Sequence[Record] | None,
     loaded: Sequence[Record] | None,
     simulator: Simulator | None,
-) -> tuple[Problem, tuple[Record, ...]]:
-    """The prepared problem, and the records with the load of study.payload, prepared by the same steps."""
+) -> Problem:
+    """The prepared problem, with a note of the records with the load of study.payload, prepared by the same steps."""
     study = study or Study()
     if unseen is None:
         unseen = recorded(study.validate.record, model, study)
@@ -490,7 +529,8 @@ def _with_loaded(
         loaded = () if study.payload is None else recorded(study.payload.record, model, study)
     count = len(unseen)
     whole = problem(model, records, study, unseen=(*unseen, *loaded), simulator=simulator)
-    return whole.changed(unseen=whole.unseen[:count]), whole.unseen[count:]
+    note = Note(LOADED, "", result=whole.unseen[count:])
+    return whole.changed(note, unseen=whole.unseen[:count])
 
 
 def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, Records]) -> Problem:
@@ -505,6 +545,7 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
 
 
 __all__ = [
+    "EXTRAS",
     "METHODS",
     "READERS",
     "STEPS",

@@ -22,7 +22,9 @@ import numpy as np
 from runtime.core.documents import Result
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.part import Part
 from runtime.core.problem import Problem
+from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
 
@@ -30,7 +32,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Elasticity(Result):
+class Elasticity(Result, Part):
     """Gears of the joints with two encoders, shape (k,) each.
 
     Attributes
@@ -56,6 +58,17 @@ class Elasticity(Result):
     lag: Array
     resonance: Array
     cutoff: float
+
+    name = "elastic"
+    title = "Gears with two encoders"
+
+    def text(self) -> str:
+        """Each joint in words."""
+        return "\n".join(self.sentences)
+
+    def brief(self) -> str:
+        """The same."""
+        return self.text()
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -83,6 +96,13 @@ class Elasticity(Result):
                 )
             texts.append(text + ".")
         return tuple(texts)
+
+
+def elastic_gears(result: Identification) -> Elasticity | None:
+    """Stiffness of the transmissions whose motor and link are both measured; None where there is none, for poses at rest, or without all parameters."""
+    if not result.determined or result.study.signals.reader == "static":
+        return None
+    return elasticity(result.problem, result.estimate.names, result.estimate.X)
 
 
 def elasticity(problem: Problem, names: Sequence[str], X: Array) -> Elasticity | None:

@@ -30,19 +30,25 @@ Reference: Satterthwaite (1946) for nu.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
 
+from runtime.core.check import Answer, Check, Question
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import assemble
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, channels_of, joint_units
+from runtime.core.part import Part
+from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.study import EstimateSettings
+from runtime.counts.encoder_advice import acceleration_error
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
 
 Array = np.ndarray
@@ -54,6 +60,64 @@ class Expected(NamedTuple):
     error: float
     low: float
     high: float
+
+
+@Question(
+    "How far off are predictions of other motions?",
+    f"{LIMIT.EXPECTED_ERROR:g} % (usable where it may be less)",
+    "record a motion over the range and the speeds that the model is for, longer, or with finer "
+    "positions (symgen excite; signals: {reader: counts})",
+)
+def expected_off(likely: Expected) -> Answer | None:
+    """Expected error of predictions, by its interval; None where it is not known."""
+    if np.isnan(likely.error):
+        return None
+    limit = LIMIT.EXPECTED_ERROR
+    return Answer(
+        "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
+        f"{likely.error:.2g} % of the torques are expected to be off over the range of the robot"
+        + (f", {likely.low:.2g} to {likely.high:.2g} % likely" if likely.low < likely.high else ""),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedError(Part):
+    """How far off predictions by the parameters that stand for the robot are likely to be, computed where it is first asked for."""
+
+    result: Identification
+
+    name = "expected_error"
+    title = "Predictions of other motions"
+    about = "prediction"
+
+    @property
+    def expected_error(self) -> float:
+        """Of all motions over the range of the robot, %."""
+        return self.expected.error
+
+    @cached_property
+    def expected(self) -> Expected:
+        """The error, and the interval in which it is likely, %."""
+        result = self.result
+        if not result.usable:
+            return Expected(*3 * (float("nan"),))
+        by_lowpass = [r for r in result.prepared if r.study.signals.reader == "lowpass"]
+        steps = [
+            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
+        ]
+        return expected_error(
+            result.model,
+            result.observation,
+            result.study.estimate,
+            result.model_estimate,
+            result.prepared,
+            max(steps, default=0.0),
+        )
+
+    def checks(self) -> tuple[Check, ...]:
+        """The error by its interval, where it is known."""
+        check = expected_off(self.expected)
+        return () if check is None else (check,)
 
 
 def expected_error(

@@ -27,9 +27,8 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.estimation import estimated
-from runtime.core.identify import identify
+from runtime.core.identify import Extra, identify, with_parts
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.model import GeneratedModel
 from runtime.core.parameter_sets import ORDER, SetName, best_set
 from runtime.core.problem import Problem, Step, prepared
 from runtime.core.progress import at
@@ -38,7 +37,6 @@ from runtime.core.result import Identification
 from runtime.core.rows.prepared import stacked
 from runtime.core.table import Table
 from runtime.plausible.motion import low_speed_of_rest
-from runtime.plausible.plausibility import plausibility
 from runtime.plausible.samples import samples_of
 
 STATED = "as stated"
@@ -147,10 +145,7 @@ class Ranking:
 
 
 def compare(
-    problems: Mapping[str, Problem],
-    *,
-    loaded: Mapping[str, Sequence[Record]] | None = None,
-    variants: GeneratedModel | None = None,
+    problems: Mapping[str, Problem], extras: Sequence[Extra], of_the_best: Sequence[Extra] = ()
 ) -> Ranking:
     """Identify with each of several treatments, and order them by what they predict.
 
@@ -158,10 +153,10 @@ def compare(
     ----------
     problems : mapping of str to Problem
         Prepared, by name of the treatment; their unseen records are the same instants.
-    loaded : mapping of str to sequence of Record, optional
-        Records with the load of settings.payload, by treatment.
-    variants : GeneratedModel, optional
-        The module of `symgen.variants`: the plausibility of the best treatment is then judged.
+    extras : sequence of Extra
+        What else is asked of every treatment.
+    of_the_best : sequence of Extra
+        What is asked of the best one besides.
 
     Raises
     ------
@@ -176,7 +171,7 @@ def compare(
     for name, problem in problems.items():
         at(f"treatment {name}")
         try:
-            results[name] = identify(problem, loaded=(loaded or {}).get(name, ()))
+            results[name] = identify(problem, extras)
         except InputError as e:
             missing.append(f"{name}: {e}")
     if not results:
@@ -192,10 +187,7 @@ def compare(
     }
     means = Ranking(results, errors, standing).mean_errors
     order = sorted(results, key=lambda name: (not results[name].usable, means[name]))
-    if variants is not None:
-        best = results[order[0]]
-        found = plausibility(best.problem, variants=variants)
-        results[order[0]] = replace(best, plausibility=found)
+    results[order[0]] = with_parts(results[order[0]], of_the_best)
     return Ranking(
         {name: results[name] for name in order},
         {name: errors[name] for name in order},

@@ -40,7 +40,7 @@ from runtime.loop.reference import Reference, point_to_point
 from runtime.loop.settings import Points
 from runtime.reading.datasets import dataset_study
 from runtime.reading.location import located
-from runtime.reporting.files import Files, identification_files, resolution_files
+from runtime.reporting.files import Files, identification_files, part_files
 from runtime.reporting.page import Section
 from runtime.reporting.resolution import resolution_section
 
@@ -209,7 +209,7 @@ def demonstrate(
     progress("encoder of the record")
     asked = (recorded_step(record),)
     advice = runtime.advise(model, record, study, columns=names, asked=asked)
-    result = replace(result, advice=advice)
+    result = result.with_part(advice)
 
     def resolution(**settings: Any) -> Cestac:
         other = changed(study, "cestac", **settings)
@@ -304,7 +304,7 @@ class Demonstration:
             warning="The measured record was not available." if simulated else "",
             sections=sections(self),
         )
-        return {**files, **resolution_files(self.resolution), **self.prepared.files}
+        return {**files, **part_files(self.resolution), **self.prepared.files}
 
 
 def sections(demo: Demonstration) -> list[Section]:

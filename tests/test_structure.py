@@ -37,7 +37,10 @@ CORE = {"numpy", "scipy", "pydantic", "pydantic_core"}
 EDGES = {  # of runtime: a feature imports core and itself; what else it uses, and why
     "advisor": {"counts": "a real encoder may be read as counts"},
     "assumptions": {"physical": "an assumption is about the bodies of the robot"},
-    "expected": {"physical": "predictions are those of bodies that exist"},
+    "expected": {
+        "counts": "the steps of an encoder are an error of predictions",
+        "physical": "predictions are those of bodies that exist",
+    },
     "friction": {"physical": "which base parameters are friction alone follows from the bodies"},
     "payload": {"physical": "a load is a body"},
     "plausible": {

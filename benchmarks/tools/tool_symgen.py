@@ -29,10 +29,11 @@ def fit(job):
     model, records, study = given(job)
     variants = symgen.variants(job.robot) if job.final else None
     result = runtime.identify(model, records, study, variants=variants)
-    if result.plausibility:
-        for trial in result.plausibility.named:
+    plausibility = result.part("plausibility")
+    if plausibility:
+        for trial in plausibility.named:
             print(trial.cause.says)
-        for check in result.plausibility.checks():
+        for check in plausibility.checks():
             if check.state in ("no", "doubtful"):
                 print(check.finding)
     return answer(model, result.model_estimate)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,17 @@ from scipy.special import stdtrit
 
 from runtime.core.cestac.result import deciding_names
 from runtime.core.cestac.runs import Level
+from runtime.core.check import Answer, Check, Question, state_of
 from runtime.core.documents import Result, json_text
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
+from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
+from runtime.core.result import Identification
 from runtime.core.table import Table
 
 Array = np.ndarray
 
+LOWEST, HIGHEST = 0.03, 300.0  # %, of the axes of the figure
 LIMITS = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)  # %e at which a step is sought
 ALL = "all"  # Label of the advice on all encoders alike
 NAMES = {"lowpass": "positions", "counts": "counts"}  # of the readers, in words
@@ -145,7 +150,7 @@ class ReaderAdvice:
 
 
 @dataclass(frozen=True, eq=False)
-class Advice(Result):
+class Advice(Result, Part):
     """Advice on the encoders of one robot, and on its torque sensors.
 
     Attributes
@@ -179,6 +184,29 @@ class Advice(Result):
     real: tuple[ReaderAdvice, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    name = "advice"
+    title = "Resolution advice"
+
+    def text(self) -> str:
+        """The answer, the steps asked for, what was assumed."""
+        return "\n".join([self.verdict, *self.asked_lines(), *self.assumptions])
+
+    def figures(self) -> tuple[Figure, ...]:
+        """%e against Delta of every parameter that matters; none where none does."""
+        return (advice_figure(self),) if self.deciding else ()
+
+    def checks(self) -> tuple[Check, ...]:
+        """Whether the encoder resolves enough."""
+        return (resolved(self),)
+
+    def entries(self) -> dict[str, Any]:
+        """Nothing: it has a file of its own."""
+        return {}
+
+    def files(self) -> dict[str, str]:
+        """advice.json."""
+        return {"advice.json": self.to_json()}
 
     @property
     def deciding(self) -> tuple[str, ...]:
@@ -420,6 +448,107 @@ class Advice(Result):
                 "provenance": self.provenance,
             }
         )
+
+
+def advice_figure(advice: Advice) -> Figure:
+    """%e against Delta for every parameter that matters, all encoders alike: line predicted, points
+    sampled with their Student intervals.
+
+    Real encoders, where they were judged, by both readers; else those of the chapter's law.
+    """
+    curves = [("", advice.encoders[0], BLUE, ORANGE)]
+    if advice.real:
+        curves = [
+            (f"{NAMES[r.reader]}, ", r.encoders[0], color, color)
+            for r, color in zip(advice.real, (ORANGE, BLUE), strict=True)
+        ]
+
+    def draw(name: str, ax: Any) -> None:
+        for curve in curves:
+            _panel(ax, *curve, advice.names.index(name))
+        ax.set_title(name)
+
+    return Figure(
+        "%e against resolution: predicted curve and sampled points of every parameter that matters; dotted: 1 % and 5 %; grey: the steps advised",
+        "Change of every parameter in per cent against encoder resolution, predicted and sampled, logarithmic axes",
+        [partial(draw, name) for name in advice.deciding],
+        name="advice",
+        columns=5,
+        cell=(2.1, 1.5),
+        extra=1.0,
+        least=4.6,
+        legend=4,
+        letters=8,
+        logarithmic=True,
+        x=f"resolution Δ of every encoder, {advice.unit}",
+        y="%e: change of the estimate, %",
+    )
+
+
+def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str, i: int) -> None:
+    e = np.abs(encoder.change[:, i])
+    shown = np.where(e > 0, e, np.nan)
+    ax.plot(encoder.delta, shown, color=line, linewidth=1.3, label=f"{reader}predicted")
+    delta = np.array([point.delta for point in encoder.sampled])
+    change = np.array([abs(point.change[i]) for point in encoder.sampled])
+    half = np.array([point.half_width[i] for point in encoder.sampled])
+    below = np.minimum(half, change - LOWEST / 10).clip(
+        min=0
+    )  # an interval that holds zero ends below the axis
+    style: Any = {"fmt": "o", "markersize": 3.5, "linewidth": 1.0, "capsize": 2}
+    label = f"{reader}sampled, 95 %"
+    ax.errorbar(delta, change, yerr=np.array([below, half]), color=points, label=label, **style)
+    for limit in encoder.limits:
+        ax.axhline(limit.percent, color=BLACK, linewidth=0.8, linestyle=DOTTED)
+        if np.isfinite(limit.delta):
+            ax.axvline(limit.delta, color=GREY, linewidth=0.8)
+    ax.set_ylim(LOWEST, HIGHEST)
+
+
+@Question(
+    "Does the encoder resolve enough?",
+    f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
+)
+def resolved(advice: Advice | None) -> Answer:
+    """The answer of the advisor, and of the step in use where it is given."""
+    if advice is None:
+        return Answer("open", "Not asked", "ask with symgen report, or symgen cestac --advise")
+    steps = ", ".join(
+        f"{one.percent:g} % up to "
+        f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
+        for one in advice.encoders[0].limits
+    )
+    text = f"Least squares stays within {steps} {advice.place}"
+    if not advice.asked:
+        return Answer(
+            "open",
+            text,
+            "say which step your encoder has (symgen report --encoder STEP, --side motor "
+            "where it sits there)",
+        )
+    name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
+    labels = ", ".join(Level(step).label for step in advice.asked)
+    return Answer(
+        state_of(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
+        f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
+        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: iv, didim)",
+    )
+
+
+class NoAdvice(Part):
+    """The question that stays open where no advice was asked for."""
+
+    name = "advice"
+    title = "Resolution advice"
+
+    def checks(self) -> tuple[Check, ...]:
+        """Whether the encoder resolves enough."""
+        return (resolved(None),)
+
+
+def no_advice(result: Identification) -> NoAdvice:
+    """The open question."""
+    return NoAdvice()
 
 
 def _summary(advice: EncoderAdvice) -> dict[str, Any]:

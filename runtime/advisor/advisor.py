@@ -61,6 +61,7 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, is_axis, joint_labels, joint_units
 from runtime.core.problem import Problem
 from runtime.core.record import Record
+from runtime.core.result import Identification
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import common_drives, stacked
 from runtime.core.study import Study, to_mapping
@@ -407,3 +408,13 @@ def _refuse(study: Study) -> None:
             "'covariance'; the prediction knows weights by joint, use joint or iterated",
             path=("estimate", "weights"),
         )
+
+
+def advice_of(result: Identification, encoder: Sequence[float] = ()) -> Advice:
+    """The advice on the essential parameters of an identification.
+
+    encoder : steps of the encoders in use, rad or m.
+    """
+    if not result.determined:
+        raise InputError("the record does not determine the parameters")
+    return advise(result.problem, columns=result.essential.names, asked=tuple(encoder))

@@ -24,8 +24,10 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_estimate
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
+from runtime.core.part import Part
 from runtime.core.problem import Note, Problem
 from runtime.core.record import Record
+from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked, with_torques
 from runtime.core.study import EstimateSettings
@@ -86,6 +88,26 @@ def law_of_controller(problem: Problem) -> Problem:
         records=tuple(map(with_torque, problem.records)),
         unseen=tuple(map(with_torque, problem.unseen)),
     )
+
+
+@dataclass(frozen=True)
+class GainDoubt(Part):
+    """Another kd than the stated one explains the records."""
+
+    sentence: str
+
+    name = "gain_doubt"
+    title = "Law of the controller"
+
+    def warnings(self) -> tuple[str, ...]:
+        """The question to the user."""
+        return (self.sentence,)
+
+
+def doubt_of_gains(result: Identification) -> GainDoubt | None:
+    """Whether the stated kd are doubtful; None where they are not, or there are none."""
+    sentence = gain_doubt(result.problem, result.estimate.relative_error)
+    return GainDoubt(sentence) if sentence else None
 
 
 def gain_doubt(problem: Problem, error: float) -> str:

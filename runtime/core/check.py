@@ -91,3 +91,10 @@ def named(names: Sequence[str]) -> str:
     more = len(names) - LIMIT.PARAMETERS_NAMED
     listed = ", ".join(names[: LIMIT.PARAMETERS_NAMED])
     return f"{listed} and {more} more" if more > 0 else listed
+
+
+def state_of(value: float, good: float, usable: float) -> State:
+    """State of a number that should be small."""
+    if value <= good:
+        return "good"
+    return "doubtful" if value <= usable else "no"

@@ -12,22 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from runtime.advisor.advice import Advice, step_text
-from runtime.agreement import Homogeneity
-from runtime.core.cestac.runs import Level
-from runtime.core.check import WORST, Answer, Check, Question, State, named, worst_of
+from runtime.core.check import WORST, Answer, Check, Question, State, named, state_of, worst_of
 from runtime.core.documents import Result
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
+from runtime.core.part import About, Part
 from runtime.core.table import Table, notebook
-from runtime.expected import Expected
-
-if TYPE_CHECKING:
-    from runtime.physical.feasibility import Feasibility
 
 ANSWERS = {"good": "Yes", "doubtful": "With care", "no": "No"}
 
@@ -136,17 +130,15 @@ def checklist_of(
     *,
     bootstrap: Mapping[str, float],
     prediction_error: float,
+    expected_error: float = float("nan"),
     negative: Sequence[str] = (),
-    feasibility: Feasibility | None = None,
-    advice: Advice | None = None,
-    plausible: Sequence[Check] = (),
-    homogeneity: Homogeneity | None = None,
+    parts: Sequence[Part] = (),
     halves: bool = False,
-    expected: Expected | float = float("nan"),
     single: bool = False,
 ) -> Checklist:
-    """The checklist of an identification; rank alone where the record does not determine the
-    parameters.
+    """The checklist of an identification: what is wrong with the record, then what its predictions are worth, then its values.
+
+    Questions of the record alone are asked where it does not determine the parameters.
 
     Parameters
     ----------
@@ -161,52 +153,50 @@ def checklist_of(
         corrected deviation.
     prediction_error : float, %
         Largest relative error of `fit` on data that did not give it; nan where there are none.
+    expected_error : float, %
+        Expected error of predictions of other motions; nan where it is not known.
     negative : sequence of str
         Frictions and motor inertias certainly below zero.
-    feasibility : Feasibility, optional
-        Whether a physical robot can have the parameters.
-    advice : Advice, optional
-        The coarsest encoders, and the step in use.
+    parts : sequence of Part
+        Their questions stand after those of the same subject.
     halves : bool
         Whether `prediction_error` is that of a part of the record from another one, not of a
         validation record.
-    plausible : sequence of Check
-        Whether record, study and robot file suit each other: what is wrong there is the cause of
-        what follows.
-    homogeneity : Homogeneity, optional
-        Whether several records agree.
-    expected : Expected or float, %
-        Expected error of predictions of other motions, with its interval or as it is; nan where it
-        is not known.
     single : bool
         Whether values are to be used one by one: deviations and correlations are doubts then, and
-        where `expected` is not known; else remarks.
+        where `expected_error` is not known; else remarks.
     """
-    likely = expected if isinstance(expected, Expected) else Expected(*3 * (expected,))
-    rank, expected = determined(estimate, fit), likely.error
-    first, last = (
-        ([], [rank]) if rank.state == "doubtful" else ([rank], [])
-    )  # a bad condition is the least of several doubts
-    checks = [*first, *plausible]
+
+    def of_parts(about: About) -> list[Check]:
+        return [check for part in parts if part.about == about for check in part.checks()]
+
+    rank = determined(estimate, fit)
+    record = of_parts("record")
+    if rank.state != "doubtful":
+        record = [rank, *record]
+    checks = record
     if estimate.status != "rank-deficient":
-        of_values = (certain(fit, bootstrap), separate(fit), *last)
-        differ = homogeneity is not None and homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE
-        checks += [
+        differ = any(part.records_differ for part in parts)
+        of_values = [certain(fit, bootstrap), separate(fit)]
+        if rank.state == "doubtful":  # a bad condition is the least of several doubts
+            of_values.append(rank)
+        counts = single or bool(np.isnan(expected_error))
+        checks = [
+            *record,
             explained(fit),
-            explained_by_joint(estimate, fit, expected),
-            predicted(fit, prediction_error, halves, differ=differ, expected=expected),
-            None if homogeneity is None else agreeing(homogeneity),
-            expected_off(likely),
+            explained_by_joint(estimate, fit, expected_error),
+            predicted(fit, prediction_error, halves, differ=differ, expected=expected_error),
+            *of_parts("prediction"),
             signs(negative),
-            *(remark(check, single or np.isnan(expected)) for check in of_values),
-            physical(fit if "standard" in fit.details else estimate, feasibility),
-            resolved(advice),
+            *(remark(check, counts) for check in of_values),
+            *of_parts("values"),
         ]
-    if any(c.state == "no" for c in plausible) and fit.relative_error <= LIMIT.TOTAL_ERROR[0]:
+    wrong = any(check.state == "no" and check is not rank for check in record)
+    if wrong and fit.relative_error <= LIMIT.TOTAL_ERROR[0]:
         use += (
             " A small error alone says little: wrong units, signs and sides move into the values."
         )
-    return Checklist(tuple(check for check in checks if check is not None), use, expected)
+    return Checklist(tuple(check for check in checks if check is not None), use, expected_error)
 
 
 def remark(check: Check, counts: bool) -> Check:
@@ -215,24 +205,6 @@ def remark(check: Check, counts: bool) -> Check:
         return check
     finding = f"Single values are not asked for. {check.finding}; {check.remedy}"
     return replace(check, state="open", finding=finding, remedy="")
-
-
-@Question(
-    "How far off are predictions of other motions?",
-    f"{LIMIT.EXPECTED_ERROR:g} % (usable where it may be less)",
-    "record a motion over the range and the speeds that the model is for, longer, or with finer "
-    "positions (symgen excite; signals: {reader: counts})",
-)
-def expected_off(likely: Expected) -> Answer | None:
-    """Expected error of predictions, by its interval; None where it is not known."""
-    if np.isnan(likely.error):
-        return None
-    limit = LIMIT.EXPECTED_ERROR
-    return Answer(
-        "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
-        f"{likely.error:.2g} % of the torques are expected to be off over the range of the robot"
-        + (f", {likely.low:.2g} to {likely.high:.2g} % likely" if likely.low < likely.high else ""),
-    )
 
 
 @Question(
@@ -270,7 +242,7 @@ def determined(estimate: Estimate, fit: Estimate) -> Answer:
 def explained(fit: Estimate) -> Answer:
     """Error of the fit in total."""
     text = f"{fit.relative_error:.1f} % of them stay unexplained"
-    return Answer(_state(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
+    return Answer(state_of(fit.relative_error, *LIMIT.TOTAL_ERROR), text)
 
 
 @Question("On every joint?", f"{LIMIT.JOINT_ERROR[0]:g} % (usable to {LIMIT.JOINT_ERROR[1]:g} %)")
@@ -283,7 +255,7 @@ def explained_by_joint(
     worst = fit.worst_joint
     if len(fit.per_joint) < 2 or worst.is_axis:
         return None
-    state = _state(worst.relative_error, *LIMIT.JOINT_ERROR)
+    state = state_of(worst.relative_error, *LIMIT.JOINT_ERROR)
     return Answer(
         "doubtful" if state == "no" and expected <= LIMIT.EXPECTED_ERROR else state,
         f"Worst is joint {worst.joint}, {worst.relative_error:.1f} % unexplained",
@@ -346,7 +318,7 @@ def predicted(
     if halves:
         sure = expected <= LIMIT.EXPECTED_ERROR
         limits = [LIMIT.PREDICTION_MOST[1] if sure else limits[1], np.inf]
-    state: State = "open" if not np.isfinite(error) else _state(error, *limits)
+    state: State = "open" if not np.isfinite(error) else state_of(error, *limits)
     remedy = "a longer or richer record"
     if "standard" not in fit.details:
         remedy = f"fewer parameters (a larger essential.threshold), {remedy}"
@@ -362,28 +334,6 @@ def predicted(
         f"{error:.1f} % stay unexplained there, {fit.relative_error:.1f} % where it was fitted",
         remedy,
         f"{limits[0]:.1f} %" + ("" if halves else f" (usable to {limits[1]:.1f} %)"),
-    )
-
-
-@Question(
-    "Do the records agree?",
-    f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}",
-    "look at the record that differs: load, temperature, time since the last one; or its "
-    "motion shows what the model leaves out",
-)
-def agreeing(homogeneity: Homogeneity) -> Answer:
-    """Whether several records tell the same parameters."""
-    text = homogeneity.text.rstrip(".")
-    if len(homogeneity.records) < 2:
-        return Answer("open", text, "")
-    if homogeneity.agree or homogeneity.largest > LIMIT.RELEVANT_DIFFERENCE:
-        return Answer("good" if homogeneity.agree else "doubtful", text)
-    return Answer(
-        "good",
-        "They differ by more than their stated deviations, but by at most "
-        f"{homogeneity.largest:.0f} % of a value",
-        limit=f"differences within the stated deviations, p above {LIMIT.AGREEMENT_LEVEL:g}, or by "
-        f"at most {LIMIT.RELEVANT_DIFFERENCE:g} % of any value",
     )
 
 
@@ -448,64 +398,6 @@ def separate(fit: Estimate) -> Answer:
     return Answer("doubtful", f"These trade: {', '.join(pairs[:4])}{more}")
 
 
-@Question(
-    "Can a physical robot have them?",
-    "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
-)
-def physical(estimate: Estimate, feasibility: Feasibility | None) -> Answer:
-    """Whether a physical robot can have all parameters."""
-    if "standard" in estimate.details:
-        return Answer("good", "Yes: they were fitted under these conditions")
-    if feasibility is None:
-        return Answer("open", "Not asked", "symgen report, or symgen identify --physical")
-    if feasibility.feasible:
-        return Answer("good", f"Yes, margin {feasibility.margin:.2g}")
-    blocking = ", ".join(name for name, _ in feasibility.blocking)
-    return Answer(
-        "doubtful",
-        f"No: no body has what the fit of all parameters gives {blocking}",
-        "before you simulate or control with them, fit under these conditions (estimate: "
-        "{method: feasible}); torque prediction is not concerned",
-    )
-
-
-@Question(
-    "Does the encoder resolve enough?",
-    f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
-)
-def resolved(advice: Advice | None) -> Answer:
-    """Whether the encoder resolves enough: the answer of the advisor, and of the step in use where
-    it is given.
-    """
-    if advice is None:
-        return Answer("open", "Not asked", "ask with symgen report, or symgen cestac --advise")
-    steps = ", ".join(
-        f"{one.percent:g} % up to "
-        f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
-        for one in advice.encoders[0].limits
-    )
-    text = f"Least squares stays within {steps} {advice.place}"
-    if not advice.asked:
-        return Answer(
-            "open",
-            text,
-            "say which step your encoder has (symgen report --encoder STEP, --side motor "
-            "where it sits there)",
-        )
-    name, error = max((advice.worst(k) for k in range(len(advice.asked))), key=lambda item: item[1])
-    labels = ", ".join(Level(step).label for step in advice.asked)
-    return Answer(
-        _state(error, LIMIT.NEGLIGIBLE, LIMIT.BIASED),
-        f"{text}; at {labels} the largest change is {error:.{0 if error >= 10 else 1}f} % ({name})",
-        "a finer encoder, or an estimator that simulates the closed loop (estimate.method: iv, didim)",
-    )
-
-
 def rounded(cond: float) -> str:
     """A condition number, three digits, without a power of ten where it is short."""
     return f"{float(f'{cond:.3g}'):.0f}" if 100 <= cond < 1e6 else f"{cond:.3g}"
-
-
-def _state(value: float, good: float, usable: float) -> State:
-    """State of a number that should be small."""
-    return "good" if value <= good else "doubtful" if value <= usable else "no"

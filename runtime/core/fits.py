@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from runtime.agreement import Homogeneity, homogeneity
 from runtime.core.errors import InputError
 from runtime.core.essential import Essential, essential_of
 from runtime.core.estimation import estimated
@@ -148,23 +147,3 @@ def _validation(
         )
     missing += [text for part in validation for text in part.missing]
     return tuple(validation), tuple(missing)
-
-
-def agreement(
-    problem: Problem,
-    fits: Fits,
-    observation: Observation,
-    fitted_names: Sequence[str],
-    unseen: Mapping[str, Observation],
-) -> Homogeneity | None:
-    """Whether several records agree: in all parameters, or in the essential ones where one of the
-    records does not determine all. None for one record.
-    """
-    if len(fitted_names) + len(unseen) < 2:
-        return None
-    settings, model = problem.settings.estimate, problem.model
-    parts = {name: observation.of_record(k) for k, name in enumerate(fitted_names)} | dict(unseen)
-    in_all = homogeneity(parts, fits.reduced.all_parameters.names, settings, model=model)
-    if not in_all.untested:
-        return in_all
-    return homogeneity(parts, fits.reduced.names, settings, model=model)

@@ -6,15 +6,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from runtime.advisor.advice import Advice
-from runtime.agreement import Homogeneity
-from runtime.core.cestac.result import Cestac
 from runtime.core.checklist import Checklist, checklist_of, lost_joints
 from runtime.core.documents import json_text
 from runtime.core.errors import InputError
@@ -33,12 +30,14 @@ from runtime.core.parameter_sets import (
     ranking_text,
     whole_set,
 )
+from runtime.core.part import Part, printed
 from runtime.core.problem import Problem
 from runtime.core.provenance import record_names
 from runtime.core.record import UNNAMED, Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import unused_joints
+from runtime.core.signs import negative_elements
 from runtime.core.study import Study
 from runtime.core.table import IN_LINE, Table, in_lines, notebook, with_intervals
 from runtime.core.uncertainty import Uncertainty
@@ -49,17 +48,6 @@ from runtime.core.validation import (
     WeakDirections,
     record_errors,
 )
-from runtime.counts.encoder_advice import acceleration_error, encoder_sentences
-from runtime.expected import Expected, expected_error
-from runtime.friction.curves import FrictionCurve
-from runtime.laws.scalars import FittedLaws
-from runtime.payload.study import PayloadStudy
-from runtime.physical.signs import negative_elements
-from runtime.plausible.known import torque_unit_doubt
-from runtime.plausible.plausibility import Plausibility
-
-if TYPE_CHECKING:
-    from runtime.physical.feasibility import Feasibility
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,27 +74,15 @@ class Identification:
         Parameters that trade against each other.
     uncertainty : Uncertainty
         Deviations without independence, whiteness of the residuals, F-tests, sets by threshold.
-    payload : PayloadStudy or None
-        The load of study.payload.
-    feasibility : Feasibility or None
-        Whether a physical robot can have the parameters of `estimate`.
-    friction : tuple of FrictionCurve
-        Friction against velocity, one curve per joint; empty where it was not asked for.
-    advice : Advice or None
-        The coarsest encoders.
-    resolution : Cestac or None
-        The resolution study at the steps of study.cestac.
-    plausibility : Plausibility or None
-        Whether record, study and robot file suit each other; None where it was not asked for.
     sets : mapping of str to Estimate
         The essential, the feasible and all parameters (`runtime.core.parameter_sets`);
         empty where the method of the study is not linear.
-    homogeneity : Homogeneity or None
-        Whether several records, further ones included, agree; None for one record.
-    laws : FittedLaws or None
-        Scalars of the laws of the model; None where it has none.
+    unseen_rows : mapping of str to Observation
+        Rows of the records that the parameters predict, by name.
+    parts : tuple of Part
+        What else was found, in the order in which it is printed.
     missing : tuple of str
-        Parts that were asked for and could not be done, each with its reason.
+        What was asked for and could not be done, each with its reason.
     """
 
     problem: Problem
@@ -117,16 +93,19 @@ class Identification:
     validation: tuple[CrossValidation, ...]
     correlations: WeakDirections
     uncertainty: Uncertainty
-    payload: PayloadStudy | None = None
-    feasibility: Feasibility | None = None
-    friction: tuple[FrictionCurve, ...] = ()
-    advice: Advice | None = None
-    resolution: Cestac | None = None
-    plausibility: Plausibility | None = None
     sets: Mapping[SetName, Estimate] = field(default_factory=dict)
-    homogeneity: Homogeneity | None = None
-    laws: FittedLaws | None = None
+    unseen_rows: Mapping[str, Observation] = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
     missing: tuple[str, ...] = ()
+
+    def part(self, name: str) -> Any:
+        """The part of that name; None where there is none."""
+        return next((part for part in self.parts if part.name == name), None)
+
+    def with_part(self, part: Part) -> Identification:
+        """The identification with this part in the place of another of its name."""
+        others = [other for other in self.parts if other.name != part.name]
+        return replace(self, parts=(*others, part))
 
     @property
     def model(self) -> GeneratedModel:
@@ -255,27 +234,18 @@ class Identification:
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """What time stamps and encoders of the records were like, those of one file once, and the
-        known torques that were subtracted.
-        """
+        """What time stamps of the records were like, those of one file once, the known torques that were subtracted, and what readers and steps say."""
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
             if record.origin.time
         }
         known = [f"{r.name}: {r.subtracted}." for r in self.records if r.subtracted]
-        encoders = [
-            text
-            for own in self.prepared
-            if own.study.signals.reader == "lowpass"
-            for text in encoder_sentences(own.record, own.states, own.study.signals, own.drives)
-        ]
         return (
             *(f"Time stamps of {name}: {text}." for name, text in texts),
             *known,
             *filter(None, [self.estimate.provenance.get("lowpass")]),
             *self.observation.findings,
-            *encoders,
         )
 
     @property
@@ -299,29 +269,11 @@ class Identification:
 
     @property
     def expected_error(self) -> float:
-        """Expected error of predictions of other motions, %, of `model_estimate`; nan where it is
-        not known (`runtime.expected`), LIMIT.LARGEST_EXPECTED where the
-        records do not determine the parameters.
-        """
-        return self.expected.error
-
-    @cached_property
-    def expected(self) -> Expected:
-        """`expected_error`, and the interval in which it is likely, %."""
-        if not (self.determined and self.usable):
-            return Expected(*3 * (float("nan") if self.determined else LIMIT.LARGEST_EXPECTED,))
-        by_lowpass = [r for r in self.prepared if r.study.signals.reader == "lowpass"]
-        steps = [
-            acceleration_error(r.record, r.states, r.study.signals, r.drives) for r in by_lowpass
-        ]
-        return expected_error(
-            self.model,
-            self.observation,
-            self.study.estimate,
-            self.model_estimate,
-            self.prepared,
-            max(steps, default=0.0),
-        )
+        """Expected error of predictions of other motions, %, as a part tells; nan where none does, LIMIT.LARGEST_EXPECTED where the records do not determine the parameters."""
+        if not self.determined:
+            return float(LIMIT.LARGEST_EXPECTED)
+        told = (part.expected_error for part in self.parts)
+        return next((error for error in told if np.isfinite(error)), float("nan"))
 
     @cached_property
     def checklist(self) -> Checklist:
@@ -335,14 +287,11 @@ class Identification:
             if self.model_columns == "essential"
             else {},
             prediction_error=self.prediction_error,
+            expected_error=self.expected_error,
             halves=bool(self.validation) and not self.by_records,
             negative=self.negative if self.determined else (),
-            feasibility=self.feasibility,
-            homogeneity=self.homogeneity,
-            expected=self.expected,
+            parts=self.parts,
             single=self.study.validate.values,
-            advice=self.advice,
-            plausible=self.plausibility.checks() if self.plausibility is not None else (),
         )
 
     @property
@@ -389,7 +338,7 @@ class Identification:
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Joints without rows, signs that no drive has, doubtful units of torque, lost joints."""
+        """Joints without rows, signs that no drive has, lost joints, then what the parts warn of."""
         by_law = any(one.by_law for one in self.study.record)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
@@ -398,14 +347,13 @@ class Identification:
             "column), or its coupling, unit or frame."
         )
         lost = lost_joints(self.estimate, self.model_estimate)
-        unit = torque_unit_doubt(self.model, self.observation, by_law)
         joints = joint_labels(self.model)
         unused = unused_joints(self.observation.rows, self.observation.dropped, joints)
         sentences = (
             unused,
             signs if self.negative else "",
-            f"{unit}." if unit else "",
             f"{lost}." if lost else "",
+            *(sentence for part in self.parts for sentence in part.warnings()),
         )
         return tuple(sentence for sentence in sentences if sentence)
 
@@ -413,8 +361,7 @@ class Identification:
         return self.brief()
 
     def brief(self, above: int = 0) -> str:
-        """Values with their 95 % intervals, errors by joint, what to look at, what was asked for
-        besides; the verdict with its largest doubt and the next step last.
+        """Values with their 95 % intervals, errors by joint, what to look at, the parts in brief; the verdict with its largest doubt and the next step last.
 
         Values and notes without room in LIMIT.LINES_PRINTED lines are left to `to_text`; above : so
         many lines are printed ahead of these.
@@ -429,10 +376,7 @@ class Identification:
             notes = [*notes[:-more], f"{more} more by --verbose"]
         others = [
             "\n".join(f"note: {note}" for note in notes),
-            self.laws.line if self.laws else "",
-            self.payload.brief() if self.payload else "",
-            *(curve.to_table() for curve in self.friction),
-            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
+            *(part.brief() for part in self.parts),
             self.checklist.to_text(),
         ]
         text = "\n\n".join(part for part in others if part)
@@ -453,9 +397,7 @@ class Identification:
         return notebook([self.verdict, *self.warnings], parameters, joints)
 
     def to_text(self) -> str:
-        """Parameters, trail, validation, parameters that trade, uncertainty, what was
-        asked for besides, then the verdict: all that `brief` leaves out.
-        """
+        """Parameters, trail, validation, parameters that trade, uncertainty, the parts, then the verdict: all that `brief` leaves out."""
         fit = self.model_estimate if self.determined else self.estimate
         trade = [f"warning: {sentence}" for sentence in self.warnings] or [
             f"no two parameters trade: no |correlation| above {self.correlations.threshold:g}"
@@ -471,23 +413,16 @@ class Identification:
         ]
         head = "directions that W sees least (singular value over the largest, unit columns)"
         tables: tuple[Any, ...] = (fit, self.essential, *self.validation)
-        last: tuple[Any, ...] = (self.laws, self.payload, *self.friction)
         parts = [
             *(table.to_table() for table in tables),
             "\n".join([*records, *self.time_stamps]),
             "\n".join(trade),
             "\n".join([head, *weak]),
             self.ranking,
-            self.homogeneity.text if self.homogeneity else "",
             self.motion_table().to_text() if self.motion_table().rows else "",
             self.uncertainty.to_text(),
-            self.eigenvalue_table().to_text() if self.feasible else "",
-            f"The parameters are {self.feasibility.text}." if self.feasibility else "",
-            *(table.to_table() for table in last if table is not None),
-            self.advice.verdict if self.advice else "",
-            self.resolution.to_table() if self.resolution else "",
+            *map(printed, self.parts),
             *self.missing,
-            self.plausibility.line if self.plausibility else "",
             self.checklist.to_text(),
         ]
         return "\n\n".join(part for part in parts if part)
@@ -525,20 +460,6 @@ class Identification:
             "torque, %",
         )
         return Table("Simulated minus measured motion", header, rows)
-
-    def eigenvalue_table(self) -> Table:
-        """Conditions of a physical robot with the smallest eigenvalue of each, of an estimate that
-        was made under them.
-        """
-        details = self.model_estimate.details
-        return Table(
-            "Conditions of a physical robot",
-            ("condition", "smallest eigenvalue", "at its limit"),
-            [
-                (name, number(value, ".3e"), "yes" if name in details["active"] else "")
-                for name, value in details["smallest_eigenvalues"].items()
-            ],
-        )
 
     def to_json(self) -> str:
         """estimate.json: the Estimate of all parameters, and beside it everything else that was
@@ -584,26 +505,9 @@ class Identification:
             ],
             "model_columns": self.model_columns,
         }
-        if self.homogeneity is not None:
-            summary["homogeneity"] = self.homogeneity
-        if self.feasibility is not None:
-            blocking = [
-                {"condition": name, "margin": margin} for name, margin in self.feasibility.blocking
-            ]
-            summary["feasibility"] = {
-                "feasible": self.feasibility.feasible,
-                "margin": self.feasibility.margin,
-                "blocking": blocking,
-            }
-        if self.payload is not None:
-            summary |= self.payload.summary()
-        if self.plausibility is not None:
-            summary["plausibility"] = self.plausibility
-        return {
-            **summary,
-            **({"laws": self.laws.summary()} if self.laws else {}),
-            **({"friction": [curve.summary() for curve in self.friction]} if self.friction else {}),
-        }
+        for part in self.parts:
+            summary |= part.entries()
+        return summary
 
 
 def _percents(errors: tuple[float, ...]) -> str:

@@ -9,13 +9,15 @@ another reader.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from runtime.core.drives import Drives, encoder_root
 from runtime.core.errors import InputError, SettingsError
+from runtime.core.part import Part
 from runtime.core.record import Record
+from runtime.core.result import Identification
 from runtime.core.signals.filters import States
 from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Signals
@@ -28,6 +30,26 @@ HELPS = 0.01
 """Share of the filtered acceleration that may be an error of the steps."""
 LOOKED_AT = 2**16
 """Samples from the start of a record that are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class EncoderSteps(Part):
+    """Records whose positions are taken as they are and would be read better as counts, computed where it is first asked for."""
+
+    result: Identification
+
+    name = "encoder_steps"
+    title = "Steps of the encoders"
+
+    def text(self) -> str:
+        """One sentence a record."""
+        readings = [r for r in self.result.prepared if r.study.signals.reader == "lowpass"]
+        sentences = [
+            sentence
+            for r in readings
+            for sentence in encoder_sentences(r.record, r.states, r.study.signals, r.drives)
+        ]
+        return "\n".join(sentences)
 
 
 def encoder_sentences(

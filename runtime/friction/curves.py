@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -37,8 +38,10 @@ from runtime.core.least_squares.linear import percent
 from runtime.core.limits import LIMIT
 from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels, require
+from runtime.core.part import BLACK, BLUE, GREY, LIGHT, ORANGE, Figure, Part
 from runtime.core.problem import Problem
 from runtime.core.residuals import correlation_time, p_value, residual_correlation
+from runtime.core.result import Identification
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.regressor import in_time
 from runtime.core.signals.filters import decimated
@@ -56,6 +59,8 @@ from runtime.friction.laws import (
 from runtime.physical.inertia import physical_model
 
 Array = np.ndarray
+
+CHOSEN = "What the rest of the model leaves of the torque of each joint, against its velocity. A law with more terms is chosen only if it predicts blocks of time that did not fit it at least 1 % better and passes the F-test, which counts independent samples."
 
 OWN = ("viscous", "coulomb", "offset")  # kinds of elements that make the curve
 
@@ -165,6 +170,86 @@ class FrictionCurve:
             "laws": self.laws,
             "curve": curve,
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Friction(Part):
+    """Friction of the joints.
+
+    Attributes
+    ----------
+    curves : tuple of FrictionCurve
+    unit : str
+        Of the torques.
+    """
+
+    curves: tuple[FrictionCurve, ...]
+    unit: str = "N m"
+
+    name = "friction"
+    title = "Friction curves"
+
+    def text(self) -> str:
+        """How a law is chosen; what the signs of the curves mean."""
+        notes = [f"Joint {curve.joint}: {curve.note}." for curve in self.curves if curve.note]
+        return "\n".join([CHOSEN, *notes])
+
+    def brief(self) -> str:
+        """Laws joint by joint."""
+        return "\n\n".join(curve.to_table() for curve in self.curves)
+
+    def tables(self) -> tuple[Table, Table]:
+        """The laws compared, and the parameters of those that predict."""
+        return law_tables(self.curves)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """Friction against velocity."""
+        return (friction_figure(self.curves, self.unit),)
+
+    def summary(self) -> list[dict[str, Any]]:
+        """Curve by curve."""
+        return [curve.summary() for curve in self.curves]
+
+
+def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
+    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and
+    the one that predicts.
+    """
+    speed = "m/s" if unit == "N" else "rad/s"
+    first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
+    bins: Any = {"fmt": "o", "color": BLACK, "markersize": 3, "linewidth": 1.0}
+
+    def draw(curve: FrictionCurve, ax: Any) -> None:
+        style: Any = {"color": LIGHT, "markersize": 2, "zorder": 1, "rasterized": True}
+        ax.plot(curve.v, curve.f, ".", label="rows", **style)
+        ax.errorbar(curve.centre, curve.mean, curve.half, label="bins, 95 %", **bins)
+        law = curve.laws[0].name
+        torques = curve.law_torques
+        for side in (curve.centre < 0, curve.centre >= 0):
+            x = curve.centre[side]
+            ax.plot(x, torques[law][side], label="Coulomb and viscous", **first)
+            if curve.law_name != law:
+                chosen = torques[curve.law_name][side]
+                ax.plot(x, chosen, color=ORANGE, linewidth=1.4, label="chosen law")
+        ax.set(title=f"joint {curve.joint}: {curve.label}")
+        ax.set(xlabel=f"velocity, {speed}", ylabel=f"friction, {unit}")
+        ax.axhline(0, color=GREY, linewidth=0.6)
+        ax.axvline(0, color=GREY, linewidth=0.6)
+
+    return Figure(
+        "Friction against velocity",
+        "Friction torque against velocity, joint by joint, with laws",
+        [partial(draw, curve) for curve in curves],
+        name="friction",
+        legend=2 * min(2, len(curves)),
+    )
+
+
+def friction(result: Identification) -> Friction:
+    """Friction of the joints by the estimate of all parameters."""
+    if not result.determined:
+        raise InputError("the record does not determine the parameters")
+    return Friction(friction_curves(result.problem, result.estimate), result.torque_unit)
 
 
 def law_tables(curves: Sequence[FrictionCurve]) -> tuple[Table, Table]:

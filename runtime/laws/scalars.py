@@ -19,9 +19,11 @@ from runtime.core.least_squares.block_covariance import block_covariance
 from runtime.core.least_squares.linear import percent
 from runtime.core.markup import number
 from runtime.core.model import GeneratedModel
+from runtime.core.part import Part
 from runtime.core.problem import Note, Problem
 from runtime.core.progress import at
 from runtime.core.residuals import correlation_time, p_value, residual_correlation
+from runtime.core.result import Identification
 from runtime.core.rows.observation import split_rows
 from runtime.core.rows.prepared import Prepared
 from runtime.core.table import Table
@@ -91,11 +93,14 @@ class LawTest:
 
 
 @dataclass(frozen=True)
-class FittedLaws:
+class FittedLaws(Part):
     """The scalars of the laws of a model, fitted to records."""
 
     scalars: tuple[FittedScalar, ...]
     tests: tuple[LawTest, ...]
+
+    name = "laws"
+    title = "Laws of columns"
 
     @property
     def constants(self) -> dict[str, float]:
@@ -134,12 +139,11 @@ class FittedLaws:
             ),
         ]
 
-    def to_table(self) -> str:
-        """Both tables."""
-        return "\n\n".join(table.to_text() for table in self.tables())
+    def text(self) -> str:
+        """How they were found."""
+        return "Scalars inside the laws of columns, by variable projection."
 
-    @property
-    def line(self) -> str:
+    def brief(self) -> str:
         """The scalars in a line."""
         said = [
             f"{s.name} {s.doubt or f'{s.value:.4g} ± {1.96 * s.sigma:.2g}'}" for s in self.scalars
@@ -173,6 +177,12 @@ def fitted_scalars(problem: Problem) -> Problem:
     laws = fit_laws(problem.model, problem.prepared, columns, weights=estimate.weights != "none")
     model = cast(GeneratedModel, BoundModel(problem.model, laws.constants))
     return transmitted_torque(problem.changed(Note(KIND, "", result=laws), model=model))
+
+
+def scalars_of_laws(result: Identification) -> FittedLaws | None:
+    """What the step found; None of a model without scalars."""
+    note = result.problem.noted(KIND)
+    return None if note is None else note.result
 
 
 def fit_laws(

@@ -15,12 +15,14 @@ from runtime.core.documents import Result
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.method import linear_companion
 from runtime.core.model import GeneratedModel, require_no_channels
+from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.record import Record
+from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.states import require_motion
-from runtime.core.table import in_lines, with_intervals
+from runtime.core.table import Table, in_lines, with_intervals
 from runtime.payload.gains import DriveGains, drive_gains, scaled
 from runtime.payload.load import Payload, payload
 
@@ -28,7 +30,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class PayloadStudy(Result, keys="payload drive_gains:gains"):
+class PayloadStudy(Result, Part, keys="payload drive_gains:gains"):
     """A load.
 
     Attributes
@@ -41,6 +43,23 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
 
     payload: Payload
     gains: DriveGains | None
+
+    name = "payload"
+    title = "Load"
+
+    def text(self) -> str:
+        """How it was found; what stays open of the torque constants."""
+        how = "Records with and without the load, fitted together."
+        return how if self.gains is None else f"{how}\nTorque constants: {self.gains.text}."
+
+    def tables(self) -> list[Table]:
+        """Parameters of the load; torque constants motor by motor."""
+        gains = [] if self.gains is None else [self.gains.table()]
+        return [self.payload.table(), *gains]
+
+    def entries(self) -> dict[str, Any]:
+        """The load, and the torque constants beside it."""
+        return self.summary()
 
     def brief(self) -> str:
         """Load and torque constants with their 95 % intervals, four in a line."""
@@ -55,10 +74,18 @@ class PayloadStudy(Result, keys="payload drive_gains:gains"):
             lines += ["Torque constants, SI, +- 95 %", *in_lines(known), gains.text]
         return "\n".join(lines)
 
-    def to_table(self) -> str:
-        """The tables one below the other."""
-        gains = [] if self.gains is None else [self.gains.to_table(), self.gains.text]
-        return "\n\n".join([self.payload.to_table(), *gains])
+
+LOADED = "loaded"
+"""Kind of the note that holds the records with the load, prepared."""
+
+
+def load_of_study(result: Identification) -> PayloadStudy | None:
+    """The load of study.payload; None where the study has none."""
+    study: Any = result.study
+    if study.payload is None:
+        return None
+    loaded = result.problem.noted(LOADED)
+    return payload_study(result.problem, () if loaded is None else loaded.result)
 
 
 def payload_study(problem: Problem, loaded: Sequence[Record]) -> PayloadStudy:

@@ -31,16 +31,11 @@ import numpy as np
 
 from runtime.core.errors import InputError, ModelError
 from runtime.core.model import GeneratedModel, elements_of, require
+from runtime.core.signs import SIGNED, is_form
 
 Array = np.ndarray
 
 INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-SIGNED = (
-    "inertia",
-    "viscous",
-    "coulomb",
-    "dissipative",
-)  # kinds of elements whose parameter is not negative
 FORMED = ("inertia", "viscous")  # kinds whose forms must be positive semidefinite
 
 
@@ -237,13 +232,6 @@ def _signs(
                     np.ones((len(names), 1, 1)),
                     np.array([least if row[0] == "inertia" else 1.0]),
                 )
-
-
-def is_form(acts: Mapping[Any, float]) -> bool:
-    """Whether an element of ELEMENTS is given as a form q'Bq (its keys are pairs of joints), not
-    along s = G q.
-    """
-    return any(isinstance(key, tuple) for key in acts)
 
 
 def _form(acts: Mapping[Any, float]) -> dict[tuple[int, int], float]:

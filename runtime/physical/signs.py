@@ -1,18 +1,11 @@
-"""The robot itself: how large it is, and estimates that no drive has. The conditions of bodies:
-`runtime.physical.inertia`.
-"""
+"""The robot itself: how large it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
-from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_units
-from runtime.physical.inertia import SIGNED, is_form
 
 Array = np.ndarray
 
@@ -54,19 +47,3 @@ def reach_of(model: GeneratedModel) -> float:
     spread = np.linalg.norm(origins[:, :, None] - origins[:, None], axis=3)
     several = (links.max(axis=0) > 0.1 * links.max()).sum() > 1
     return float(spread.max() + links.max()) if several else float("nan")
-
-
-def negative_elements(model: GeneratedModel, fit: Estimate) -> tuple[str, ...]:
-    """Motor inertias and frictions of their own column that are negative by more than
-    LIMIT.CERTAIN_SIGN corrected deviations: no drive has them.
-    """
-    elements: Mapping[str, Any] = getattr(model, "ELEMENTS", {})
-    signed = {
-        name for name, (kind, _, acts) in elements.items() if kind in SIGNED and not is_form(acts)
-    }
-    sigma = np.fmax(fit.sigma, fit.sigma_corrected)
-    return tuple(
-        name
-        for i, name in enumerate(fit.names)
-        if name in signed and fit.X[i] < -LIMIT.CERTAIN_SIGN * sigma[i]
-    )

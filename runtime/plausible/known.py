@@ -30,6 +30,8 @@ from runtime.core.documents import Result
 from runtime.core.limits import LIMIT
 from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, elements_of, is_axis, joint_labels
+from runtime.core.part import Part
+from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.table import Table
 from runtime.physical.inertia import INERTIAL
@@ -146,6 +148,27 @@ def known_values(baseline: Baseline) -> KnownValues | None:
             ratios[j, shown] = np.linalg.lstsq(left[:, shown], rest, rcond=None)[0]
     joints = joint_labels(baseline.model)
     return KnownValues(joints, ratios[:, 0], ratios[:, 1], errors, all(given))
+
+
+@dataclass(frozen=True)
+class TorqueUnit(Part):
+    """The measured torques may be no torques."""
+
+    sentence: str
+
+    name = "torque_unit"
+    title = "Unit of the torques"
+
+    def warnings(self) -> tuple[str, ...]:
+        """The question to the user."""
+        return (self.sentence,)
+
+
+def torque_unit(result: Identification) -> TorqueUnit | None:
+    """Whether the unit of the torques is doubtful; None where it is not."""
+    by_law = any(record.by_law for record in result.study.record)
+    doubt = torque_unit_doubt(result.model, result.observation, by_law)
+    return TorqueUnit(f"{doubt}.") if doubt else None
 
 
 def torque_unit_doubt(model: GeneratedModel, observation: Observation, by_law: bool) -> str:

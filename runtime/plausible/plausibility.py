@@ -13,14 +13,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 from runtime.core.check import WORST, Check, worst_of
 from runtime.core.documents import Result
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, is_axis, require_no_channels
+from runtime.core.part import Part
 from runtime.core.problem import Problem
 from runtime.core.progress import at
+from runtime.core.result import Identification
 from runtime.core.signals.states import require_motion
 from runtime.core.table import Table
 from runtime.counts.reader import unwrapped
@@ -78,7 +80,9 @@ EXPLAINED: tuple[Callable[[Case, Sequence[Trial]], Check | None], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class Plausibility(
-    Result, keys="checks:answers named:named_causes equivalent delay known_values:robot_values"
+    Result,
+    Part,
+    keys="checks:answers named:named_causes equivalent delay known_values:robot_values",
 ):
     """Checks of a record, a study and a robot file, and the causes that explain it better.
 
@@ -102,7 +106,9 @@ class Plausibility(
     delay: Delay | None = None
     robot_values: KnownValues | None = None
 
-    title: ClassVar[str] = "Record, study and robot file"
+    name = "plausibility"
+    title = "Record, study and robot file"
+    about = "record"
 
     @property
     def worst(self) -> Check | None:
@@ -135,10 +141,6 @@ class Plausibility(
         told = "\n".join(filter(None, [*lines, self.text()]))
         return told or "Record, study and robot file suit each other, as far as judged."
 
-    def figures(self) -> tuple[()]:
-        """None."""
-        return ()
-
     def tables(self) -> list[Table]:
         """Alternatives, delays and values of the robot file, as far as they were judged."""
         judged = (self.delay, self.robot_values)
@@ -160,6 +162,15 @@ class Plausibility(
             rows[:10],
             wide=(0,),
         )
+
+
+def plausibility_of(result: Identification, variants: GeneratedModel | None = None) -> Plausibility:
+    """`plausibility` of the problem of an identification."""
+    if result.study.signals.reader == "static":
+        raise InputError("not judged for poses at rest")
+    if any(is_axis(joint) for joint in result.model.JOINTS):
+        raise InputError("not judged beside force sensors; identify without them too")
+    return plausibility(result.problem, variants=variants)
 
 
 def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) -> Plausibility:

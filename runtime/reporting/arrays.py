@@ -20,11 +20,9 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from runtime.core.cestac.result import Cestac
 from runtime.core.documents import json_text
 from runtime.core.errors import encodable
 from runtime.core.least_squares.estimate import Estimate
-from runtime.core.table import csv_text
 
 Array = np.ndarray
 
@@ -82,33 +80,6 @@ def estimate_arrays(fit: Estimate) -> dict[str, Array]:
     }
 
 
-def cestac_arrays(result: Cestac) -> dict[str, Array]:
-    """Names, levels and figures of a resolution study; shapes (b,), (levels,) and (levels, b)."""
-    reference, levels, b = result.reference, result.levels, len(result.names)
-    by_parameter = ("mean", "sigma", "relative_sigma", "e", "half_width", "half_width_percent")
-    by_level = ("e_rho", "e_rho_own", "increase", "increase_own", "runs_needed")
-    return {
-        "names": _texts(result.names),
-        "units": _texts(reference.units.get(name, "") for name in result.names),
-        "deciding": np.array([name in result.deciding for name in result.names], dtype=bool),
-        "X_LS": reference.X,
-        "relative_sigma_LS": reference.relative_sigma,
-        "labels": _texts(r.level.label for r in levels),
-        "delta": np.array([r.level.delta for r in levels]),
-        "torque": np.array([r.level.torque for r in levels]),
-        **{
-            name: np.array([getattr(r, name) for r in levels]).reshape(len(levels), b)
-            for name in by_parameter
-        },
-        **{name: np.array([getattr(r, name) for r in levels]) for name in by_level},
-        "verdicts": _texts(r.verdict for r in levels),
-        **{
-            name: np.array(json_text(part))
-            for name, part in (("settings", result.settings), ("provenance", result.provenance))
-        },
-    }
-
-
 def array_files(stem: str, arrays: Mapping[str, Array]) -> dict[str, str | bytes]:
     """The arrays as stem.npz and stem.mat."""
     return {f"{stem}.npz": npz(arrays), f"{stem}.mat": mat(arrays)}
@@ -152,23 +123,6 @@ def matlab_names(names: Iterable[str]) -> tuple[str, ...]:
             free = f"{own[: LONGEST_NAME - len(str(k)) - 1]}_{k}"
         allowed.append(free)
     return tuple(allowed)
-
-
-def cestac_csv(result: Cestac) -> str:
-    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho),
-    its increase beside it).
-    """
-    reference, numbers = result.reference, ("mean", "sigma", "relative_sigma", "e", "half_width")
-    rows: list[Sequence[Any]] = []
-    for r in result.levels:
-        place = (r.level.label, float(r.level.delta), float(r.level.torque))
-        for i, name in enumerate(result.names):
-            values = (float(x[i]) for x in (reference.X, *(getattr(r, own) for own in numbers)))
-            unit, decides = reference.units.get(name, ""), int(name in result.deciding)
-            rows.append((*place, name, unit, *values, decides, ""))
-        rows.append((*place, "rho", *[""] * 5, float(r.e_rho), "", 1, float(r.increase)))
-    header = ("level", "delta", "torque", "name", "unit", "X_LS", *numbers, "decides", "increase")
-    return csv_text(header, rows)
 
 
 def _texts(texts: Iterable[str]) -> Array:

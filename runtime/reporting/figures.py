@@ -18,25 +18,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from runtime.core.cestac.result import Cestac
-from runtime.core.limits import LIMIT
+from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, SKY
+from runtime.core.part import Figure as PartFigure
 from runtime.core.residuals import Whiteness
 from runtime.core.validation import JointComparison
-from runtime.friction.curves import FrictionCurve
 from runtime.reporting.page import Image
 from runtime.reporting.series import Series, series
 
 T = TypeVar("T")
-BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = (
-    "#000000",
-    "#0072B2",
-    "#D55E00",
-    "#007A5A",
-    "#AA4499",
-    "#56B4E9",
-    "#9A9A9A",
-)
-MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
 STYLE: Any = {
     "font.size": 9.0,
     "text.parse_math": False,  # names of joints are shown as they are
@@ -52,7 +41,6 @@ STYLE: Any = {
     "path.simplify": True,
 }
 DPI = 150
-DOTTED: Any = (0, (1, 2))
 MEASURED: Any = {"color": BLACK, "linewidth": 1.5}
 PREDICTED: Any = {"color": ORANGE, "linewidth": 1.0, "linestyle": (0, (4, 1))}
 ERROR: Any = {"color": BLUE, "linewidth": 0.7, "label": "error"}
@@ -154,75 +142,6 @@ def spectra_figure(
     return figure
 
 
-def friction_figure(curves: Sequence[FrictionCurve], unit: str = "N m") -> Figure:
-    """Friction against velocity: rows in grey, bins with their 95 % intervals, the first law and
-    the one that predicts.
-    """
-    speed = "m/s" if unit == "N" else "rad/s"
-    first: Any = {"color": BLUE, "linewidth": 1.2, "linestyle": "--"}
-    bins: Any = {"fmt": "o", "color": BLACK, "markersize": 3, "linewidth": 1.0}
-
-    def draw(ax: Axes, curve: FrictionCurve) -> None:
-        style: Any = {"color": "#C8C8C8", "markersize": 2, "zorder": 1, "rasterized": True}
-        ax.plot(curve.v, curve.f, ".", label="rows", **style)
-        ax.errorbar(curve.centre, curve.mean, curve.half, label="bins, 95 %", **bins)
-        law, torques = curve.laws[0].name, curve.law_torques
-        for side in (curve.centre < 0, curve.centre >= 0):
-            x = curve.centre[side]
-            ax.plot(x, torques[law][side], label="Coulomb and viscous", **first)
-            if curve.law_name != law:
-                chosen = torques[curve.law_name][side]
-                ax.plot(x, chosen, color=ORANGE, linewidth=1.4, label="chosen law")
-        ax.set(title=f"joint {curve.joint}: {curve.label}")
-        ax.set(xlabel=f"velocity, {speed}", ylabel=f"friction, {unit}")
-        ax.axhline(0, color=GREY, linewidth=0.6)
-        ax.axvline(0, color=GREY, linewidth=0.6)
-
-    return panels(curves, draw, 2, cell=(4.8, 2.9), legend=2 * min(2, len(curves)))
-
-
-def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
-    """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of
-    the residual.
-
-    names : parameters drawn in colour; default: the six of smallest %sigma (11). The other deciding
-    ones are grey.
-    """
-    levels = [level for level in result.levels if level.level.delta and not level.level.torque]
-    levels.sort(key=lambda level: level.level.delta)
-    lengths = {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
-    delta = np.array([level.level.delta for level in levels])
-    e = np.array([level.e for level in levels]).reshape(len(levels), -1)
-    order = np.argsort(result.reference.relative_sigma, kind="stable")[: len(MARKED)]
-    coloured = [name for name in names if name in result.names] or [result.names[i] for i in order]
-
-    def draw(ax: Axes, limits: tuple[float, ...]) -> None:
-        def line(values: np.ndarray, **style: Any) -> None:
-            ax.plot(delta, np.where(np.isfinite(values) & (values > 0), values, np.nan), **style)
-
-        for name in result.deciding:
-            if name not in coloured:
-                line(e[:, result.names.index(name)], color="#C8C8C8", linewidth=0.8, zorder=1)
-        for (color, marker), name in zip(MARKED, coloured, strict=False):
-            style: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.4}
-            line(e[:, result.names.index(name)], label=name, **style)
-        increase = np.array([abs(level.increase) for level in levels])
-        line(increase, color=BLACK, linestyle="--", linewidth=1.8, label="residual, of |Y|")
-        logarithmic(ax)
-        ax.set_ylim(0.01, 1000)
-        place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
-        for limit in limits:
-            ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=DOTTED)
-            ax.annotate(f"{limit:g} %", (1.0, limit), xytext=(3, 0), va="center", **place)
-        labels = [level.level.label.replace("2*pi/", "2π/") for level in levels]
-        ax.set_xticks(delta, labels, rotation=30, ha="right", fontsize=8)
-        ax.set_xlabel(f"resolution Δ, {'m' if lengths else 'rad'}")
-        ax.set_ylabel("%e: change of the estimate, %")
-
-    limits = (LIMIT.NEGLIGIBLE, LIMIT.BIASED)
-    return panels([limits], draw, 1, cell=(6.4, 4.0), legend=4, letters=8)
-
-
 def _torques(upper: Axes, lower: Axes, joint: JointComparison, source: str) -> None:
     """Lines of as many instants as show, which break where rows were left out or another record
     starts.
@@ -278,6 +197,29 @@ def panels(
             place: Any = "outside upper center"
             figure.legend(handles, list(entries), ncols=legend, loc=place, fontsize=letters)
     return figure
+
+
+def of_part(figure: PartFigure) -> Image:
+    """The figure of a part, for a page."""
+
+    def draw(ax: Axes, fill: Callable[[Axes], None]) -> None:
+        if figure.logarithmic:
+            logarithmic(ax)
+        fill(ax)
+
+    shape: Any = {"cell": figure.cell, "extra": figure.extra, "least": figure.least}
+    legend: Any = {"legend": figure.legend, "letters": figure.letters}
+    image = panels(figure.panels, draw, figure.columns, **shape, **legend)
+    columns = min(figure.columns, len(figure.panels))
+    if figure.x or figure.y:
+        for k, ax in enumerate(image.axes):
+            lowest = k + columns >= len(figure.panels)
+            ax.tick_params(labelsize=7, labelleft=k % columns == 0, labelbottom=lowest)
+    if figure.x:
+        image.supxlabel(figure.x, fontsize=9)
+    if figure.y:
+        image.supylabel(figure.y, fontsize=9)
+    return drawn(figure.caption, image, figure.alt, figure.name)
 
 
 def legend_above(ax: Axes, **style: Any) -> None:

@@ -17,6 +17,7 @@ from runtime.core.cestac.result import Cestac
 from runtime.core.documents import json_text
 from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
+from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.study import RecordSettings, Study
 from runtime.excitation.poses import StaticPoses
@@ -24,11 +25,11 @@ from runtime.excitation.result import Excitation
 from runtime.loop.result import Simulation, csv_text
 from runtime.reading.location import study_text
 from runtime.reporting import figures as plots
-from runtime.reporting.arrays import array_files, cestac_arrays, cestac_csv, estimate_arrays
+from runtime.reporting.arrays import array_files, estimate_arrays
 from runtime.reporting.motions import excitation_page, simulation_figure
 from runtime.reporting.page import Page, Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
-from runtime.reporting.parameters import parameters_csv, standard_csv
+from runtime.reporting.parameters import parameters_csv
 from runtime.reporting.result_files import Results, write_all
 from runtime.treatments import Ranking
 from runtime.yaml_text import yaml_text
@@ -106,11 +107,9 @@ def identification_files(
         "torques.png": plots.png(torques),
         "torques.svg": plots.svg(torques),
     }
-    files |= (
-        {"standard_parameters.csv": standard_csv(result.model_estimate)} if result.feasible else {}
-    )
-    files |= {} if result.advice is None else {"advice.json": result.advice.to_json()}
-    return files | ({} if result.resolution is None else resolution_files(result.resolution))
+    for part in result.parts:
+        files |= part_files(part)
+    return files
 
 
 @files_of.register
@@ -135,7 +134,7 @@ def _(result: Cestac, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
     return page_files(resolution_page(result, text)) | {
         "study.yaml": text,
-        **resolution_files(result),
+        **part_files(result),
     }
 
 
@@ -144,7 +143,7 @@ def _(result: Advice, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
     return page_files(advice_page(result, text)) | {
         "study.yaml": text,
-        "advice.json": result.to_json(),
+        **part_files(result),
     }
 
 
@@ -188,10 +187,9 @@ def page_files(page: Page) -> Files:
     return {"report.html": render(page), **page.files}
 
 
-def resolution_files(result: Cestac) -> Files:
-    """The study in every format."""
-    files: Files = {
-        "cestac.json": result.to_json(),
-        "cestac.csv": cestac_csv(result),
-    }
-    return files | array_files("cestac", cestac_arrays(result))
+def part_files(part: Part) -> Files:
+    """What a part writes beside the page."""
+    files: Files = dict(part.files())
+    for stem, arrays in part.arrays().items():
+        files |= array_files(stem, arrays)
+    return files

@@ -8,7 +8,8 @@ import numpy as np
 
 from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
-from runtime.reporting.figures import BLUE, DOTTED, GREY, ORANGE, drawn, legend_above, panels
+from runtime.core.part import BLUE, DOTTED, GREY, ORANGE
+from runtime.reporting.figures import drawn, legend_above, panels
 from runtime.reporting.page import Page, Section
 from runtime.reporting.series import extremes
 

@@ -12,9 +12,8 @@ from runtime.core.checklist import Checklist, rounded
 from runtime.core.result import Identification
 from runtime.core.table import Table
 from runtime.reporting.page import Number, Page, Section, state_mark
-from runtime.reporting.parameters import payload_section, physical_section
-from runtime.reporting.resolution import advice_section, level_numbers, resolution_section
-from runtime.reporting.sections import friction_section, identification_sections
+from runtime.reporting.resolution import level_numbers, resolution_section
+from runtime.reporting.sections import identification_sections, part_section, part_sections
 
 SIMULATED_WARNING = (
     "Everything here was computed on a SIMULATED record, made from the values of the robot file "
@@ -64,7 +63,8 @@ def identification_page(
             torques,
             *sections,
             *others,
-            *supplementary_sections(result),
+            *part_sections(result),
+            *([Section("Not done", result.missing)] if result.missing else []),
             settings_section(study),
             provenance_section(result),
         ],
@@ -73,29 +73,6 @@ def identification_page(
             "numbers are those of the chapter that the documentation names."
         ),
     )
-
-
-def supplementary_sections(result: Identification) -> list[Section]:
-    """Physical consistency, load, friction, encoders, as far as they were asked for, and the parts
-    that could not be computed.
-    """
-    sections = [physical_section(result)] if result.feasible else []
-    if result.feasibility is not None:
-        sections.append(
-            Section("Physical consistency", (f"The parameters are {result.feasibility.text}.",))
-        )
-    sections += [] if result.payload is None else [payload_section(result.payload)]
-    sections += [friction_section(result.friction, result.torque_unit)] if result.friction else []
-    if result.laws is not None:
-        text = ("Scalars inside the laws of columns, by variable projection.",)
-        sections.append(Section("Laws of columns", text, [], result.laws.tables()))
-    sections += [] if result.advice is None else [advice_section(result.advice)]
-    sections += (
-        []
-        if result.resolution is None
-        else [resolution_section(result.resolution, "Resolution study")]
-    )
-    return [*sections, *([Section("Not done", result.missing)] if result.missing else [])]
 
 
 def resolution_page(result: Cestac, study: str) -> Page:
@@ -114,7 +91,7 @@ def advice_page(advice: Advice, study: str) -> Page:
     return Page(
         title=title,
         verdict=advice.verdict,
-        sections=[advice_section(advice), settings_section(study)],
+        sections=[part_section(advice), settings_section(study)],
     )
 
 

@@ -1,5 +1,5 @@
 """Parameters on a page and in files: base parameters with deviations, CAD, what became of each, and
-what it is made of; those that trade; those of a physical robot; those of a load.
+what it is made of; those that trade.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from runtime.core.markup import element, formula, number, symbol, unit
 from runtime.core.model import GeneratedModel
 from runtime.core.result import Identification
 from runtime.core.table import Table, csv_text
-from runtime.payload.study import PayloadStudy
 from runtime.reporting.page import Matrix, Section
 
 HEADER = (
@@ -185,40 +184,6 @@ def correlation_matrix(fit: Estimate, most: int = LIMIT.CORRELATIONS_SHOWN) -> M
     return Matrix(
         caption, [symbol(fit.names[i]) for i in shown], correlation[np.ix_(shown, shown)].tolist()
     )
-
-
-def physical_section(result: Identification) -> Section:
-    """Conditions with their smallest eigenvalues, then the standard parameters."""
-    details = result.model_estimate.details
-    standard = Table(
-        "Standard parameters of one such robot",
-        ("parameter", "value"),
-        [(name, number(value, ".5g")) for name, value in details["standard"].items()],
-    )
-    text = (
-        result.model_estimate.message,
-        "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, "
-        "inertia and friction not negative; all base parameters "
-        "are fitted together. The standard parameters give exactly the torques of the base "
-        "parameters; what the torques leave open is nearest to "
-        "the values of the robot file. No single one of them is a value to use by itself: "
-        "standard_parameters.csv holds one complete set, to be used as a whole.",
-    )
-    return Section("Physical consistency", text, tables=[result.eigenvalue_table(), standard])
-
-
-def payload_section(study: PayloadStudy) -> Section:
-    """Parameters of the load; gains motor by motor."""
-    text, tables = ["Records with and without the load, fitted together."], [study.payload.table()]
-    if study.gains is not None:
-        tables.append(study.gains.table())
-        text.append(f"Torque constants: {study.gains.text}.")
-    return Section("Load", text, tables=tables)
-
-
-def standard_csv(fit: Estimate) -> str:
-    """standard_parameters.csv: name, value."""
-    return csv_text(("name", "value"), list(fit.details["standard"].items()))
 
 
 def parameters_csv(result: Identification) -> str:

@@ -4,14 +4,11 @@ here.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from runtime.core.markup import number
+from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.signals.decimation import CUTOFF
 from runtime.core.table import Table
-from runtime.friction.curves import FrictionCurve, law_tables
-from runtime.plausible.plausibility import Plausibility
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Section
 from runtime.reporting.parameters import correlation_section, parameter_section
@@ -23,14 +20,9 @@ def identification_sections(result: Identification) -> list[Section]:
     unit = result.torque_unit
     return [
         parameter_section(result),
-        *([] if result.plausibility is None else [plausibility_section(result.plausibility)]),
         torque_section(result),
         joint_section(result),
-        *(
-            [record_section(result)]
-            if result.record_errors or result.time_stamps or result.homogeneity
-            else []
-        ),
+        *([record_section(result)] if result.record_errors or result.time_stamps else []),
         *([motion_section(result)] if result.motion_table().rows else []),
         residual_section(result, unit),
         correlation_section(result),
@@ -140,11 +132,7 @@ def record_section(result: Identification) -> Section:
         for one in result.record_errors
     ]
     tables = [Table("Relative error by record and joint, %", header, rows)] if rows else []
-    text = list(result.time_stamps)
-    if result.homogeneity is not None:
-        text.append(result.homogeneity.text)
-        tables += [result.homogeneity.table()] if result.homogeneity.disagreements else []
-    return Section("Records", text, tables=tables)
+    return Section("Records", result.time_stamps, tables=tables)
 
 
 def motion_section(result: Identification) -> Section:
@@ -244,26 +232,14 @@ def decimation_cutoff(result: Identification) -> float | None:
     return CUTOFF * result.observation.rate / 2
 
 
-def plausibility_section(found: Plausibility) -> Section:
-    """Whether record, study and robot file suit each other. The checks stand with the others at the
-    top; here is what they rest on.
-    """
-    return Section(found.title, tuple(found.text().splitlines()), tables=found.tables())
+def part_sections(result: Identification) -> list[Section]:
+    """Of every part that has something to show, one after the other."""
+    sections = map(part_section, result.parts)
+    return [one for one in sections if one.text or one.images or one.tables]
 
 
-def friction_section(curves: Sequence[FrictionCurve], unit: str = "N m") -> Section:
-    """The figure, the laws compared joint by joint, the parameters of those that predict."""
-    text = (
-        "What the rest of the model leaves of the torque of each joint, against its velocity. A "
-        "law with more terms is chosen only if it predicts "
-        "blocks of time that did not fit it at least 1 % better and passes the F-test, which "
-        "counts independent samples.",
-        *(f"Joint {curve.joint}: {curve.note}." for curve in curves if curve.note),
-    )
-    image = plots.drawn(
-        "Friction against velocity",
-        plots.friction_figure(curves, unit),
-        "Friction torque against velocity, joint by joint, with laws",
-        "friction",
-    )
-    return Section("Friction curves", text, [image], law_tables(curves))
+def part_section(part: Part) -> Section:
+    """Warnings, text, figures and tables of a part."""
+    text = [*part.warnings(), *filter(None, part.text().splitlines())]
+    images = [plots.of_part(figure) for figure in part.figures()]
+    return Section(part.title, text, images, part.tables())

@@ -414,7 +414,7 @@ def test_identify_prints_what_the_reader_says_of_the_encoders(planar, record):
     result = runtime.identify(
         planar, half, replace(STUDY, signals=replace(STUDY.signals, step=2.5e-3)), friction=True
     )
-    assert tuple(len(curve.v) for curve in result.friction) == tuple(
+    assert tuple(len(curve.v) for curve in result.part("friction").curves) == tuple(
         joint.rows for joint in result.estimate.per_joint
     )
     assert (

@@ -109,6 +109,6 @@ def test_identify_tells_it_from_a_file(tmp_path):
         }
     )
     result = identify(planar, read_records(study.record), study, plausible=False)
-    stated = result.estimate.provenance["elastic"]
-    assert stated["joints"] == ("2",) and stated["K"][0] == pytest.approx(K[1], rel=0.03)
+    gears = result.part("elastic")
+    assert gears.joints == ("2",) and gears.K[0] == pytest.approx(K[1], rel=0.03)
     assert "Gear of joint 2: stiffness 1.5e+03" in result.brief()

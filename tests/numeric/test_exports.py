@@ -20,14 +20,12 @@ from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
 from runtime.compose import estimate_of
-from runtime.core.cestac.result import Cestac, level_result
+from runtime.core.cestac.result import Cestac, cestac_arrays, cestac_csv, level_result
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.least_squares.estimate import Estimate, load_estimate
 from runtime.estimate_files import json_schema
 from runtime.reporting.arrays import (
     array_files,
-    cestac_arrays,
-    cestac_csv,
     estimate_arrays,
     mat,
     matlab_names,

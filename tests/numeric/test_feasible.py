@@ -21,6 +21,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.model import load_model
 from runtime.core.rows.observation import Observation
+from runtime.core.signs import negative_elements
 from runtime.core.study import EstimateSettings, study_from_mapping
 from runtime.core.validation import split_validation
 from runtime.physical.feasibility import (
@@ -41,7 +42,7 @@ from runtime.physical.feasible import (
 )
 from runtime.physical.inertia import INERTIAL, physical_model, pseudo_inertia
 from runtime.physical.semidefinite import closest, everything
-from runtime.physical.signs import negative_elements, reach_of
+from runtime.physical.signs import reach_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from symgen.description import load_robot

@@ -15,12 +15,12 @@ from runtime.compose import estimate_of, problem
 from runtime.core.model import load_model
 from runtime.core.residuals import correlation_time, residual_correlation
 from runtime.core.study import study_from_mapping
-from runtime.friction.curves import friction_curves, own_friction
+from runtime.friction.curves import Friction, friction_curves, friction_figure, own_friction
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Page, render
-from runtime.reporting.sections import friction_section
+from runtime.reporting.sections import part_section
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0
@@ -171,9 +171,9 @@ def test_tx40_record(tx40_data) -> None:
         and "(no peak)" in curve.label
         for curve in curves
     )
-    png = plots.png(plots.friction_figure(curves))
+    png = plots.of_part(friction_figure(curves)).files["friction.png"]
     assert png[:4] == b"\x89PNG"
-    page = render(Page("friction", "", [friction_section(curves)]))
+    page = render(Page("friction", "", [part_section(Friction(curves))]))
     assert "Friction curves" in page and "stribeck+load (no peak)" in page
 
 

@@ -92,7 +92,7 @@ def test_names_the_record_of_three(arm):
         found.disagreements[0].record,
         found.disagreements[0].parameter,
     ) == ("tuesday", "MX1R")
-    assert "tuesday: MX1R" in found.text and "do NOT agree" in found.text
+    assert "tuesday: MX1R" in found.text() and "do NOT agree" in found.text()
 
 
 def test_a_record_at_rest_is_left_out_and_told(arm):
@@ -111,7 +111,7 @@ def test_a_record_at_rest_is_left_out_and_told(arm):
         "still, which alone does not determine"
     )
     alone = homogeneity({"a": parts["a"], "still": parts["still"]}, arm.BASE_PARAMETERS, model=arm)
-    assert "cannot be told" in alone.text and np.isnan(alone.p)
+    assert "cannot be told" in alone.text() and np.isnan(alone.p)
 
 
 def test_holm():

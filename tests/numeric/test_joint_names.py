@@ -74,7 +74,7 @@ def test_names_of_a_urdf_reach_every_result(tmp_path):
         "q1": NAMES[0],
         "q2": NAMES[1],
     }
-    assert [curve.joint for curve in result.friction] == [said, told]
+    assert [curve.joint for curve in result.part("friction").curves] == [said, told]
 
 
 @campaign

@@ -182,7 +182,8 @@ def test_one_call_finds_the_best_treatment(robot):
         and best.ranking.startswith("Predicts B best: feasible (58)")
     )
     assert "known torques subtracted: up to" in "".join(best.time_stamps)
-    assert not best.homogeneity.agree and best.homogeneity.disagreements[0].record == "B"
+    agreement = best.part("homogeneity")
+    assert not agreement.agree and agreement.disagreements[0].record == "B"
     with pytest.raises(InputError, match="no validation record"):
         runtime.compare(model, {"a": (careful, A, ()), "b": (careful, A, B)})
     with pytest.raises(InputError, match=r"expected the same"):

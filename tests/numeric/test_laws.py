@@ -158,8 +158,8 @@ def test_methods_that_simulate_refuse_scalars(model) -> None:
 
 def test_identify_takes_the_scalars_and_tells_them(model) -> None:
     result = runtime.identify(model, record_of(model, 0.1), STUDY)
-    assert result.laws is not None
-    assert result.model.CONSTANTS["vs2"] == result.laws.constants["vs2"]
+    assert result.part("laws") is not None
+    assert result.model.CONSTANTS["vs2"] == result.part("laws").constants["vs2"]
     assert abs(result.estimate["STR2"] - 1.5) < 0.3
     assert "vs2 0.1" in result.brief() and "unseen with %" in result.to_text()
     assert json.loads(result.to_json())["laws"]["scalars"][0]["name"] == "vs1"

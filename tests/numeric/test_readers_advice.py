@@ -15,7 +15,7 @@ from runtime.compose import advise, cestac, problem
 from runtime.core.limits import LIMIT
 from runtime.core.signals.filters import filtered_states
 from runtime.core.study import CestacSettings, Rows, Study
-from runtime.reporting.resolution import advice_section
+from runtime.reporting.sections import part_section
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
 STUDY = Study(
@@ -84,7 +84,7 @@ def test_side_by_side_in_words():
         "positions, 1 %" in text and "counts, 5 %" in text and "quadrature over the phase" in text
     )
     assert "Real encoders read as counts: With every encoder alike" in advice.verdict
-    assert set(advice_section(advice).tables[0].header) >= {
+    assert set(part_section(advice).tables[0].header) >= {
         "encoder",
         "positions, 5 %",
         "counts, 1 %",
@@ -108,7 +108,7 @@ def test_no_step_is_advised_where_no_parameter_is_determined():
         "read as counts: no parameter has a %sigma of at most 10 %" in advice.verdict
         and "no step makes" not in advice.verdict
     )
-    assert "not judged on this record" in str(advice) and not advice_section(advice).images
+    assert "not judged on this record" in str(advice) and not part_section(advice).images
 
 
 def test_steps_of_constant_speeds_that_lock_are_tried(monkeypatch):

@@ -29,7 +29,7 @@ from runtime.core.signals.noise_gain import bandwidth
 from runtime.core.study import Decimate, Lowpass, Signals, study_from_mapping
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
-from runtime.reporting.resolution import advice_section
+from runtime.reporting.sections import part_section
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 
@@ -231,7 +231,7 @@ def test_advice_in_words_and_json(emps_advice):
         for word in ("two-point", "joint side", "1000 Hz", "100 Hz", "decimation by 10", "FS1")
     )
     assert "M1R" in emps_advice.to_table()
-    section = advice_section(emps_advice)
+    section = part_section(emps_advice)
     assert section.images[0].svg.startswith(b"<?xml") and [
         len(table.rows) for table in section.tables
     ] == [1, 4]

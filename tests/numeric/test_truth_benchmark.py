@@ -170,10 +170,10 @@ def test_a_rotor_inertia_of_zero_is_physical_and_a_certain_negative_one_is_not()
     model, _ = emitted(robot.name)
     asked = study(robot, "fourier")
     right = runtime.identify(model, record_of(move, tau), asked, physical=True)
-    assert right.feasibility is not None and right.feasibility.feasible
+    assert right.part("feasibility").judged.feasible
     tau[:, 2] -= 0.05 * move.qdd[:, 2]  # another rotor inertia, kg m^2
     wrong = runtime.identify(model, record_of(move, tau), asked, physical=True)
-    assert wrong.feasibility is not None and not wrong.feasibility.feasible
+    assert not wrong.part("feasibility").judged.feasible
 
 
 def test_physical_parameters_predict_the_other_half_with_the_weight_of_the_whole() -> None:

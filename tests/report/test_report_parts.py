@@ -11,13 +11,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime.core.checklist import _state, checklist_of, lost_joints, separate
+from runtime.advisor.advice import NoAdvice, resolved
+from runtime.core.check import state_of
+from runtime.core.checklist import checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.markup import split, symbol, unit
 from runtime.core.model import load_model
+from runtime.core.part import Part
 from runtime.core.study import Decimate, Signals
 from runtime.core.validation import JointComparison
-from runtime.expected import Expected
+from runtime.expected import Expected, expected_off
+from runtime.physical.consistency import Consistency
 from runtime.reporting.parameters import cad_values, correlation_matrix, roles_of
 from runtime.reporting.sections import decimation_cutoff
 from runtime.reporting.series import extremes, gaps, series
@@ -130,7 +134,20 @@ def fit(X=(1.0, 2.0), sigma=(0.01, 0.02), correlation=0.0, error=4.0, joints=(3.
     return replace(made, **changed)
 
 
+class Asking(Part):
+    """A part of some questions."""
+
+    name = title = "asking"
+
+    def __init__(self, about, *checks):
+        self.about, self.asked = about, checks
+
+    def checks(self):
+        return self.asked
+
+
 def checked(estimate, unseen=5.0, *, every=None, **asked):
+    asked = {"parts": [Consistency(estimate, estimate), NoAdvice()], **asked}
     deviations = dict(zip(estimate.names, 2.5 * estimate.sigma, strict=True))
     return checklist_of(
         every or estimate,
@@ -180,10 +197,10 @@ def test_verdict_is_the_worst_answer(estimate, unseen, state, question):
 def test_single_values_are_remarks_where_the_expected_error_is_known():
     """Deviations, correlations and condition count where values are asked for one by one."""
     for estimate in (fit(sigma=(0.2, 0.3)), fit(correlation=-0.95), fit(cond_unit=300.0)):
-        checklist = checked(estimate, expected=2.0)
+        checklist = checked(estimate, expected_error=2.0)
         assert checklist.state == "good" and checklist.grade == 2.0
         assert "Single values are not asked for" in str([c.finding for c in checklist.checks])
-        assert checked(estimate, expected=2.0, single=True).state != "good"
+        assert checked(estimate, expected_error=2.0, single=True).state != "good"
 
 
 @pytest.mark.parametrize(
@@ -196,7 +213,8 @@ def test_single_values_are_remarks_where_the_expected_error_is_known():
     ],
 )
 def test_expected_error_grades_by_its_interval(expected, state):
-    checklist = checked(fit(), expected=expected)
+    parts = [Asking("prediction", expected_off(expected))]
+    checklist = checked(fit(), expected_error=expected.error, parts=parts)
     assert checklist.state == state
     assert state == "good" or "other motions" in checklist.worst.question
 
@@ -220,17 +238,16 @@ def test_negative_friction_is_not_for_use():
 
 def test_physical_consistency_counts():
     bad = SimpleNamespace(feasible=False, blocking=(("link 3", -0.01),), margin=-0.01)
-    checklist = checked(fit(), feasibility=bad)
+    checklist = checked(fit(), parts=[Consistency(fit(), fit(), bad)])
     assert (
         checklist.state == "doubtful"
         and "link 3" in checklist.doubt
         and "feasible" in checklist.next
     )
-    assert (
-        checked(fit(), feasibility=SimpleNamespace(feasible=True, blocking=(), margin=0.1)).state
-        == "good"
-    )
-    assert checked(fit(details={"standard": {}})).state == "good"
+    good = SimpleNamespace(feasible=True, blocking=(), margin=0.1)
+    assert checked(fit(), parts=[Consistency(fit(), fit(), good)]).state == "good"
+    under = fit(details={"standard": {}})
+    assert checked(under, parts=[Consistency(under, under)]).state == "good"
 
 
 @pytest.mark.parametrize(("error", "state"), [(0.5, "good"), (3.0, "doubtful"), (8.0, "no")])
@@ -243,14 +260,14 @@ def test_encoder_in_use_counts(error, state):
         asked=(1e-3,),
         worst=lambda k: ("A1", error),
     )
-    asked = checked(fit(details={"standard": {}}), advice=advice)
+    asked = checked(fit(), parts=[Asking("values", resolved(advice))])
     assert "5 % up to 0.0002 rad (2*pi/31416) at the motors" in asked.checks[-1].finding
     assert (
         asked.state == state
         and asked.answer == {"good": "Yes", "doubtful": "With care", "no": "No"}[state]
     )
     advice.asked = ()
-    checklist = checked(fit(), advice=advice)
+    checklist = checked(fit(), parts=[Asking("values", resolved(advice))])
     assert (
         checklist.state == "good"
         and checklist.checks[-1].state == "open"
@@ -259,7 +276,7 @@ def test_encoder_in_use_counts(error, state):
 
 
 def test_limits_are_inclusive():
-    assert [_state(x, 1.0, 5.0) for x in (1.0, 1.1, 5.0, 5.1)] == [
+    assert [state_of(x, 1.0, 5.0) for x in (1.0, 1.1, 5.0, 5.1)] == [
         "good",
         "doubtful",
         "doubtful",

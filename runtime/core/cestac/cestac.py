@@ -46,6 +46,7 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
 from runtime.core.problem import Problem
 from runtime.core.provenance import processor
+from runtime.core.result import Identification
 from runtime.core.rows.prepared import common_drives
 from runtime.core.study import CestacSettings, Study, to_mapping
 from runtime.loop.cestac import Loop, loop_of, without_loop_options
@@ -309,3 +310,11 @@ def _identity(
         "records": [sha256(b"".join(map(bytes, _measured(r)))).hexdigest() for r in task.records],
         "versions": provenance["versions"],
     }
+
+
+def resolution(result: Identification) -> Cestac:
+    """The study of an identification at the steps of settings.cestac, of the columns that these name."""
+    if not result.determined:
+        raise InputError("the record does not determine the parameters")
+    essential = result.study.cestac.columns == "essential"
+    return cestac(result.problem, columns=result.essential.names if essential else None)

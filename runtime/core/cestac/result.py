@@ -27,7 +27,7 @@ single indicator, as it sees the whole model:
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -36,17 +36,32 @@ import numpy as np
 from scipy.special import stdtrit
 
 from runtime.core.cestac.runs import Level, Runs
-from runtime.core.documents import Result
+from runtime.core.documents import Result, json_text
 from runtime.core.errors import InputError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
 from runtime.core.markup import number
+from runtime.core.part import (
+    BLACK,
+    BLUE,
+    DOTTED,
+    GREEN,
+    LIGHT,
+    ORANGE,
+    PURPLE,
+    SKY,
+    Figure,
+    Part,
+)
 from runtime.core.rows.observation import Observation
-from runtime.core.table import Table, notebook
+from runtime.core.table import Table, csv_text, notebook
 from runtime.json_files import Vector
 
 Array = np.ndarray
+
+MARKED = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"), (SKY, "v"), ("#8C6D00", "P"))
+VERDICTS = "Two verdicts stand below. The printed rule asks every parameter that decides, and %e(rho), to stay below 1 % (practically unbiased) and calls 5 % biased. The chapter's section 4.1.4 calls the residual the best single indicator, as it sees the whole model: the last verdict applies the same limits to the increase of its norm alone."
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
@@ -115,7 +130,7 @@ class LevelResult:
 
 
 @dataclass(frozen=True, eq=False)
-class Cestac(Result):
+class Cestac(Result, Part):
     """A resolution study.
 
     Attributes
@@ -139,6 +154,9 @@ class Cestac(Result):
     settings: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    name = "resolution"
+    title = "Resolution study"
 
     @cached_property
     def deciding(self) -> tuple[str, ...]:
@@ -220,6 +238,32 @@ class Cestac(Result):
         notes = "\n".join([*(f"{r.level.label}: {r.message}" for r in self.levels), *self.notes])
         below = f"{errors.caption}\n{errors.to_text()}"
         return f"{means.to_text()}\n\n{residual.to_text()}\n\n{notes}\n\n{below}"
+
+    def text(self) -> str:
+        """How the verdicts are to be read, then every verdict in words."""
+        verdicts = [f"{r.level.label}: {r.message}" for r in self.levels]
+        return "\n".join([VERDICTS, *verdicts, *self.notes])
+
+    def tables(self) -> list[Table]:
+        """Means, errors, residual and verdict."""
+        return [self.mean_table(), self.error_table(), self.residual_table()]
+
+    def figures(self) -> tuple[Figure, ...]:
+        """%e against Delta; none without a step of the encoders."""
+        steps = [r for r in self.levels if r.level.delta and not r.level.torque]
+        return (error_against_resolution(self),) if steps else ()
+
+    def entries(self) -> dict[str, Any]:
+        """Nothing: it has a file of its own."""
+        return {}
+
+    def files(self) -> dict[str, str]:
+        """cestac.json, and cestac.csv."""
+        return {"cestac.json": self.to_json(), "cestac.csv": cestac_csv(self)}
+
+    def arrays(self) -> dict[str, dict[str, Array]]:
+        """Names, levels and figures."""
+        return {"cestac": cestac_arrays(self)}
 
     def mean_table(self) -> Table:
         """Mean of the runs of every parameter and level."""
@@ -307,6 +351,104 @@ class Cestac(Result):
         shown = {f.name: getattr(level, f.name) for f in fields(level)}
         runs = list(level.runs) if self.lists_runs else None
         return {**shown, "runs": runs, "run_count": len(level.runs)}
+
+
+def error_against_resolution(result: Cestac, names: Sequence[str] = ()) -> Figure:
+    """%e (21) against Delta on logarithmic axes, with the limits of the verdict and the increase of
+    the residual.
+
+    names : parameters drawn in colour; default: the six of smallest %sigma (11). The other deciding
+    ones are grey.
+    """
+    levels = [level for level in result.levels if level.level.delta and not level.level.torque]
+    levels.sort(key=lambda level: level.level.delta)
+    lengths = {result.reference.units.get(name, "") for name in result.names} & {"N*s/m", "kg"}
+    delta = np.array([level.level.delta for level in levels])
+    e = np.array([level.e for level in levels]).reshape(len(levels), -1)
+    order = np.argsort(result.reference.relative_sigma, kind="stable")[: len(MARKED)]
+    coloured = [name for name in names if name in result.names] or [result.names[i] for i in order]
+
+    def draw(ax: Any) -> None:
+        def line(values: np.ndarray, **style: Any) -> None:
+            ax.plot(delta, np.where(np.isfinite(values) & (values > 0), values, np.nan), **style)
+
+        for name in result.deciding:
+            if name not in coloured:
+                line(e[:, result.names.index(name)], color=LIGHT, linewidth=0.8, zorder=1)
+        for (color, marker), name in zip(MARKED, coloured, strict=False):
+            style: Any = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.4}
+            line(e[:, result.names.index(name)], label=name, **style)
+        increase = np.array([abs(level.increase) for level in levels])
+        line(increase, color=BLACK, linestyle="--", linewidth=1.8, label="residual, of |Y|")
+        ax.set_ylim(0.01, 1000)
+        place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+        for limit in (LIMIT.NEGLIGIBLE, LIMIT.BIASED):
+            ax.axhline(limit, color=BLACK, linewidth=0.9, linestyle=DOTTED)
+            ax.annotate(f"{limit:g} %", (1.0, limit), xytext=(3, 0), va="center", **place)
+        labels = [level.level.label.replace("2*pi/", "2π/") for level in levels]
+        ax.set_xticks(delta, labels, rotation=30, ha="right", fontsize=8)
+        ax.set_xlabel(f"resolution Δ, {'m' if lengths else 'rad'}")
+        ax.set_ylabel("%e: change of the estimate, %")
+
+    return Figure(
+        f"%e against resolution; dotted: the limits of the verdict, {LIMIT.NEGLIGIBLE:g} % and {LIMIT.BIASED:g} %; dashed: increase of the residual norm in % of |Y|; grey: the other parameters that decide",
+        "Change of the estimates in per cent against encoder resolution, logarithmic axes",
+        [draw],
+        name="resolution",
+        cell=(6.4, 4.0),
+        legend=4,
+        letters=8,
+        logarithmic=True,
+    )
+
+
+def cestac_arrays(result: Cestac) -> dict[str, Array]:
+    """Names, levels and figures of a resolution study; shapes (b,), (levels,) and (levels, b)."""
+    reference, levels, b = result.reference, result.levels, len(result.names)
+    by_parameter = ("mean", "sigma", "relative_sigma", "e", "half_width", "half_width_percent")
+    by_level = ("e_rho", "e_rho_own", "increase", "increase_own", "runs_needed")
+    return {
+        "names": texts(result.names),
+        "units": texts(reference.units.get(name, "") for name in result.names),
+        "deciding": np.array([name in result.deciding for name in result.names], dtype=bool),
+        "X_LS": reference.X,
+        "relative_sigma_LS": reference.relative_sigma,
+        "labels": texts(r.level.label for r in levels),
+        "delta": np.array([r.level.delta for r in levels]),
+        "torque": np.array([r.level.torque for r in levels]),
+        **{
+            name: np.array([getattr(r, name) for r in levels]).reshape(len(levels), b)
+            for name in by_parameter
+        },
+        **{name: np.array([getattr(r, name) for r in levels]) for name in by_level},
+        "verdicts": texts(r.verdict for r in levels),
+        **{
+            name: np.array(json_text(part))
+            for name, part in (("settings", result.settings), ("provenance", result.provenance))
+        },
+    }
+
+
+def cestac_csv(result: Cestac) -> str:
+    """cestac.csv: one line per level and parameter, then one for the residual ("rho": e is %e(rho),
+    its increase beside it).
+    """
+    reference, numbers = result.reference, ("mean", "sigma", "relative_sigma", "e", "half_width")
+    rows: list[Sequence[Any]] = []
+    for r in result.levels:
+        place = (r.level.label, float(r.level.delta), float(r.level.torque))
+        for i, name in enumerate(result.names):
+            values = (float(x[i]) for x in (reference.X, *(getattr(r, own) for own in numbers)))
+            unit, decides = reference.units.get(name, ""), int(name in result.deciding)
+            rows.append((*place, name, unit, *values, decides, ""))
+        rows.append((*place, "rho", *[""] * 5, float(r.e_rho), "", 1, float(r.increase)))
+    header = ("level", "delta", "torque", "name", "unit", "X_LS", *numbers, "decides", "increase")
+    return csv_text(header, rows)
+
+
+def texts(words: Iterable[str]) -> Array:
+    """Words as an array."""
+    return np.array(list(words), dtype=np.str_)
 
 
 def deciding_names(reference: Estimate) -> tuple[str, ...]:

@@ -1,0 +1,142 @@
+"""What is found in an identification besides its parameters: a Part carries its own words, tables, figures, questions and JSON.
+
+Whoever prints, judges, exports or reports an identification goes through its parts and knows none by name. An Extra makes a Part of an Identification (`runtime.core.identify`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from runtime.core.check import Check
+from runtime.core.table import Table
+
+About = Literal["record", "prediction", "values"]
+
+BLACK = "#000000"
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
+GREEN = "#007A5A"
+PURPLE = "#AA4499"
+SKY = "#56B4E9"
+GREY = "#9A9A9A"
+LIGHT = "#C8C8C8"
+DOTTED: Any = (0, (1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A figure of one panel or several, which a report draws.
+
+    Attributes
+    ----------
+    caption : str
+    alt : str
+        What the figure shows, for those who do not see it.
+    panels : sequence of functions of Matplotlib Axes
+        Each fills one panel.
+    name : str
+        Of its files beside the page, PNG and SVG; "": the page alone has it.
+    columns : int
+        Largest number of panels beside each other.
+    cell : (float, float), inch
+        Width and height of a panel; `extra` is added to the height of all, and the whole is at least `least` wide.
+    legend : int
+        Columns of the one legend above the panels, in letters of `letters` points; 0: none.
+    logarithmic : bool
+        Both axes of every panel.
+    x, y : str
+        Labels of all panels together; numbers then stand at the outer panels only.
+    """
+
+    caption: str
+    alt: str
+    panels: Sequence[Callable[[Any], None]]
+    name: str = ""
+    columns: int = 2
+    cell: tuple[float, float] = (4.8, 2.9)
+    extra: float = 0.4
+    least: float = 0.0
+    legend: int = 0
+    letters: float = 9.0
+    logarithmic: bool = False
+    x: str = ""
+    y: str = ""
+
+
+class Part:
+    """A finding with everything that is shown of it. A part says what it has; the rest stays empty.
+
+    Attributes
+    ----------
+    name : str
+        By which `Identification.part` finds it, and its key in estimate.json.
+    title : str
+        Heading of its section.
+    about : "record", "prediction" or "values"
+        What its questions are about: those of the record stand first in a verdict, since what is wrong there is the cause of what follows.
+    """
+
+    name: str
+    title: str
+    about: About = "values"
+
+    @property
+    def expected_error(self) -> float:
+        """Expected error of predictions of other motions, %, by which a verdict is milder or harder; nan where the part does not tell."""
+        return float("nan")
+
+    @property
+    def records_differ(self) -> bool:
+        """Whether the records are those of different robots."""
+        return False
+
+    def text(self) -> str:
+        """Paragraphs, one a line."""
+        return ""
+
+    def brief(self) -> str:
+        """What is printed where few lines are."""
+        return ""
+
+    def warnings(self) -> Sequence[str]:
+        """What to look at before the values are used, in sentences."""
+        return ()
+
+    def tables(self) -> Sequence[Table]:
+        """Tables, after the text."""
+        return ()
+
+    def figures(self) -> Sequence[Figure]:
+        """Figures of a report."""
+        return ()
+
+    def checks(self) -> Sequence[Check]:
+        """Questions of the verdict."""
+        return ()
+
+    def summary(self) -> Any:
+        """For JSON."""
+        return None
+
+    def entries(self) -> Mapping[str, Any]:
+        """What estimate.json holds of it, by key: its summary, where it has one."""
+        summary = self.summary()
+        return {} if summary is None else {self.name: summary}
+
+    def files(self) -> Mapping[str, str]:
+        """Texts that are written beside the page, by file name."""
+        return {}
+
+    def arrays(self) -> Mapping[str, Mapping[str, np.ndarray]]:
+        """Named arrays that are written as NPZ and MAT, by file name without its ending."""
+        return {}
+
+
+def printed(part: Part) -> str:
+    """Text and tables of a part."""
+    tables = [table.to_text() for table in part.tables()]
+    return "\n\n".join(text for text in (part.text(), *tables) if text)

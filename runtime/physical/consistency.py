@@ -1,0 +1,139 @@
+"""Whether a physical robot can have the parameters of an identification: a Part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from runtime.core.check import Answer, Check, Question
+from runtime.core.errors import InputError
+from runtime.core.least_squares.estimate import Estimate
+from runtime.core.markup import number
+from runtime.core.part import Part
+from runtime.core.result import Identification
+from runtime.core.table import Table, csv_text
+from runtime.physical.feasibility import Feasibility, feasibility, within_noise
+from runtime.physical.inertia import physical_model
+
+CONDITIONS = "Pseudo-inertias of the links and forms of the actuators must be positive semidefinite, inertia and friction not negative; all base parameters are fitted together. The standard parameters give exactly the torques of the base parameters; what the torques leave open is nearest to the values of the robot file. No single one of them is a value to use by itself: standard_parameters.csv holds one complete set, to be used as a whole."
+
+
+@dataclass(frozen=True, eq=False)
+class Consistency(Part):
+    """Whether a physical robot can have the parameters.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        All parameters.
+    fit : Estimate
+        The parameters that stand for the robot.
+    judged : Feasibility or None
+        Of `estimate`; None where it was not asked for.
+    """
+
+    estimate: Estimate
+    fit: Estimate
+    judged: Feasibility | None = None
+
+    name = "feasibility"
+    title = "Physical consistency"
+
+    @property
+    def fitted(self) -> bool:
+        """Whether `fit` was made under the conditions of a physical robot."""
+        return "standard" in self.fit.details
+
+    def text(self) -> str:
+        """What was asked of the parameters, and whether they have it."""
+        fitted = [self.fit.message, CONDITIONS] if self.fitted else []
+        return "\n".join([*fitted, self.brief()]).strip()
+
+    def brief(self) -> str:
+        """One sentence; "" where it was not asked for."""
+        return "" if self.judged is None else f"The parameters are {self.judged.text}."
+
+    def tables(self) -> list[Table]:
+        """Conditions with the smallest eigenvalue of each, and the standard parameters, of an estimate that was made under them."""
+        if not self.fitted:
+            return []
+        details = self.fit.details
+        conditions = [
+            (name, number(value, ".3e"), "yes" if name in details["active"] else "")
+            for name, value in details["smallest_eigenvalues"].items()
+        ]
+        standard = [(name, number(value, ".5g")) for name, value in details["standard"].items()]
+        header = ("condition", "smallest eigenvalue", "at its limit")
+        return [
+            Table("Conditions of a physical robot", header, conditions),
+            Table("Standard parameters of one such robot", ("parameter", "value"), standard),
+        ]
+
+    def checks(self) -> tuple[Check, ...]:
+        """Whether a physical robot can have all parameters."""
+        return (physical(self),)
+
+    def summary(self) -> dict[str, Any] | None:
+        """Of `judged`."""
+        if self.judged is None:
+            return None
+        blocking = [{"condition": name, "margin": margin} for name, margin in self.judged.blocking]
+        return {
+            "feasible": self.judged.feasible,
+            "margin": self.judged.margin,
+            "blocking": blocking,
+        }
+
+    def files(self) -> dict[str, str]:
+        """One complete set of standard parameters."""
+        if not self.fitted:
+            return {}
+        standard = list(self.fit.details["standard"].items())
+        return {"standard_parameters.csv": csv_text(("name", "value"), standard)}
+
+
+@Question(
+    "Can a physical robot have them?",
+    "every pseudo-inertia positive semidefinite, friction and motor inertia not negative",
+)
+def physical(part: Consistency) -> Answer:
+    """Whether a physical robot can have all parameters."""
+    if part.fitted or "standard" in part.estimate.details:
+        return Answer("good", "Yes: they were fitted under these conditions")
+    judged = part.judged
+    if judged is None:
+        return Answer("open", "Not asked", "symgen report, or symgen identify --physical")
+    if judged.feasible:
+        return Answer("good", f"Yes, margin {judged.margin:.2g}")
+    blocking = ", ".join(name for name, _ in judged.blocking)
+    return Answer(
+        "doubtful",
+        f"No: no body has what the fit of all parameters gives {blocking}",
+        "before you simulate or control with them, fit under these conditions (estimate: "
+        "{method: feasible}); torque prediction is not concerned",
+    )
+
+
+def as_fitted(result: Identification) -> Consistency:
+    """The part without the question whether other parameters than fitted ones are physical."""
+    return Consistency(result.estimate, result.model_estimate)
+
+
+def consistency(result: Identification) -> Consistency:
+    """Whether a physical robot can have all parameters, or others that the record does not tell from them."""
+    if not result.determined:
+        groups = "; ".join(", ".join(group) for group in result.estimate.groups)
+        raise InputError(f"the record does not tell apart {groups}")
+    return Consistency(result.estimate, result.model_estimate, _judged(result))
+
+
+def _judged(result: Identification) -> Feasibility:
+    bodies = physical_model(result.model)
+    fit = result.estimate
+    judged = feasibility(bodies, fit.names, fit.X)
+    if judged.feasible or fit.covariance is None or not np.isfinite(fit.covariance).all():
+        return judged
+    wider = max(1.0, float(np.median(fit.sigma_corrected / fit.sigma)))
+    return within_noise(judged, bodies, fit.names, fit.X, wider**2 * fit.covariance)
