@@ -188,8 +188,9 @@ def nearest(
     gain, told = np.zeros((len(found), len(X))), np.zeros(len(found), dtype=bool)
     S = np.where(part.masses, 0.0, part.size * part.ease)
     A = K[:, :count] @ part.slope(u) * S
-    gain[:count] = S[:, None] * np.linalg.pinv(A, rcond=1e-12)
-    told[:count] = np.linalg.norm(np.eye(count) - np.linalg.pinv(A, rcond=1e-12) @ A, axis=1) < NEAR
+    inverse = np.linalg.pinv(A, rcond=1e-12)
+    gain[:count] = S[:, None] * inverse
+    told[:count] = np.linalg.norm(np.eye(count) - inverse @ A, axis=1) < NEAR
     return Nearest(
         found,
         whole.u0,
@@ -325,8 +326,8 @@ def _violated(part: Numbers, u: Array) -> bool:
 
 
 def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> Array | None:
-    """The numbers nearest to `start` without conditions, of which those that are `free` move; None
-    where the steps do not settle.
+    """The numbers with K chi(u) = rest nearest to `start`, of which those that are `free` move; None
+    where Newton's steps do not find them.
     """
     S, u = (part.size * part.ease)[free], start.copy()
     for _ in range(STEPS):
@@ -339,7 +340,9 @@ def _solved(part: Numbers, K: Array, rest: Array, start: Array, free: Array) -> 
         u[free] += step
         if np.all(np.abs(u - before) <= SETTLED * part.size):
             break
-    return u
+    missed = np.abs(rest - K @ part.chi(u))
+    sizes = np.abs(K) @ scales(part.physical) + np.abs(rest)
+    return u if np.all(missed <= NEAR * sizes) else None
 
 
 def _held(part: Numbers, chi: Array) -> Array:
