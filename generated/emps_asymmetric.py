@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: ba79c853daccad19f26f93ae73abc47accb9f214415b9fdd0508a86bd2f4fece
+sha256 of all but these lines: 53ecffc7f329612bff9e82b4ee9775dd358fa29a9c1e0e337d39f5744dec5506
 """
 
 import numpy as np
@@ -390,7 +390,6 @@ def _stored(q, qd, qdd, out, constants):
     if xp is not np:
         if out is not None:
             raise ValueError("out: a store holds NumPy's arrays alone")
-        constants = constants
         D = _gathered(xp, _constant({}), _regressor_block, (5, 1), states, (), constants)
         return xp, xp.matrix_transpose(D)
     states = _states(*states)
@@ -480,8 +479,8 @@ def _jacobian_block(xp, q, J, frame, posing, moving):
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]
-        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
-        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        P = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*P[2] - z[2]*P[1], z[2]*P[0] - z[0]*P[2], z[0]*P[1] - z[1]*P[0], *z]
         if sigma:
             twist = [*z, 0.0, 0.0, 0.0]
         for column, rate in rates:

@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 4a1db771e4d591f4dd0026feb1e58680f78b7322c5026ee0eb18841af2bde089
+sha256 of all but these lines: b230028f3abbf1685dd999f25bb42f25114f96c4742e031f29fd729a93c30c0e
 """
 
 import numpy as np
@@ -378,8 +378,8 @@ def _jacobian_block(xp, q, qd, qdd, G, J, frame, posing, moving):
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]
-        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
-        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        P = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*P[2] - z[2]*P[1], z[2]*P[0] - z[0]*P[2], z[0]*P[1] - z[1]*P[0], *z]
         if sigma:
             twist = [*z, 0.0, 0.0, 0.0]
         for column, rate in rates:

@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: 57bb53697da2a337c1c449b98830394b36cc168ce1d16e1e24f541396d1f4256
+sha256 of all but these lines: da78d0519462a0039508696046d60561c227a0bbe52f09cca0ff1af985bc5b95
 """
 
 import numpy as np
@@ -361,8 +361,8 @@ def _jacobian_block(xp, q, qd, qdd, G, J, frame, posing, moving):
     while j:
         antecedent, sigma, rates = joints[j]
         z = [T[j - 1, k, 2] for k in range(3)]
-        x, y, w = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
-        twist = [z[1]*w - z[2]*y, z[2]*x - z[0]*w, z[0]*y - z[1]*x, *z]
+        P = [T[frame - 1, k, 3] - T[j - 1, k, 3] for k in range(3)]
+        twist = [z[1]*P[2] - z[2]*P[1], z[2]*P[0] - z[0]*P[2], z[0]*P[1] - z[1]*P[0], *z]
         if sigma:
             twist = [*z, 0.0, 0.0, 0.0]
         for column, rate in rates:

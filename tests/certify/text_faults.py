@@ -46,7 +46,7 @@ SAME = (  # changed lines that change no value, and why
     (r"for \(size_t t = 1; t < 8", "at most seven samples wait for their line of the cache"),
     (r"ready = -True", "what is not zero is true"),
     (r"= -(np\.zeros|ca\.SX\()", "minus zero, where every entry is written"),
-    (r"^    B = |every = int", "samples at a time"),
+    (r"^    if N <= |every = int", "samples at a time"),
     (r"start && start \+ N >= TILE", "writes the same numbers again"),
     (r"VP242 = C5b", "cancels: N342 enters NE332 and NE322, whose difference A holds"),
 )
