@@ -108,6 +108,7 @@ def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
         re.compile(rf"^(?:.*\b)?({NAME})\([^;]*$" if c else rf"^def ({NAME})\("),
     )
     for number, line in enumerate(text.splitlines()):
+        ends = c and quoted  # the last line of a comment is none of code
         if c:
             quoted = ("/*" in line or quoted) and "*/" not in line
             if (re.match(r"^[a-zK]", line) and (found := re.search(rf"({NAME})\(", line))) or (
@@ -122,7 +123,7 @@ def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
                 inside = ""
         stripped = line.strip()
         idle = r'(#|"""|/\*|def |raise|class |import|from|\) ->|\):|extern)|.*(raise |expected|""")'
-        if inside and not quoted and stripped and not re.match(idle, stripped):
+        if inside and not (quoted or ends) and stripped and not re.match(idle, stripped):
             yield inside, number, line
 
 
