@@ -137,6 +137,7 @@ class Part:
 
 
 def printed(part: Part) -> str:
-    """Text and tables of a part."""
+    """Title, text and tables of a part; "" where there is neither text nor table."""
     tables = [table.to_text() for table in part.tables()]
-    return "\n\n".join(text for text in (part.text(), *tables) if text)
+    shown = "\n\n".join(text for text in (part.text(), *tables) if text)
+    return f"{part.title}\n{shown}" if shown else ""
