@@ -261,13 +261,6 @@ class Identification:
         return negative_elements(self.model, self.model_estimate)
 
     @property
-    def feasible(self) -> bool:
-        """Whether the parameters that stand for the robot were fitted under the conditions of a
-        physical one.
-        """
-        return "standard" in self.model_estimate.details
-
-    @property
     def expected_error(self) -> float:
         """Expected error of predictions of other motions, %, as a part tells; nan where none does, LIMIT.LARGEST_EXPECTED where the records do not determine the parameters."""
         if not self.determined:
