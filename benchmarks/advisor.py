@@ -37,9 +37,9 @@ from runtime.advisor.coarse_encoders import CoarseEncoders  # noqa: E402
 from runtime.compose import advise, cestac, observe, problem  # noqa: E402
 from runtime.core.essential import essential_of  # noqa: E402
 from runtime.core.model import drives_of  # noqa: E402
-from runtime.core.study import study_from_mapping  # noqa: E402
 from runtime.reading.datasets import dataset_study  # noqa: E402
 from runtime.reading.records import read_records  # noqa: E402
+from runtime.study import study_from_mapping  # noqa: E402
 from symgen.demo import MAIN  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))

@@ -29,9 +29,9 @@ from estimators import AROUND, AWAY, METHODS, STEPS, UNIT, bench, determined
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from runtime.core.study import to_mapping
+from runtime.core.settings import to_mapping
 from runtime.core.table import aligned
-from runtime.yaml_text import yaml_text
+from runtime.documents.yaml_text import yaml_text
 
 Array = np.ndarray
 RECORDED = ("ols", "iv", "didim")  # also with recorded positions alone rounded

@@ -47,10 +47,10 @@ from runtime.core.drives import Drives
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import study_from_mapping
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

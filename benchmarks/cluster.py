@@ -41,11 +41,11 @@ from runtime.compose import cestac
 from runtime.core.cestac.cestac import Cestac
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
-from runtime.core.study import study_from_mapping
 from runtime.parallel.cluster import cluster as mapped
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

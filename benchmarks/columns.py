@@ -28,11 +28,11 @@ import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime.compose import estimate_of, problem
-from runtime.core.study import study_from_mapping
 from runtime.laws.projection import LawProblem
 from runtime.laws.scalars import fit_laws, fitted_laws
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.description.element import LawScalar
 from symgen.description.expression import ONE
 from symgen.description.grammar import LAWS, parse

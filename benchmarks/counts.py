@@ -43,12 +43,12 @@ from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import Study, study_from_mapping
 from runtime.core.table import aligned
 from runtime.counts.lattice import lattice
 from runtime.counts.reading import read_counts
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 from symgen.demo import MAIN
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))

@@ -37,10 +37,11 @@ from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import decimated_torque
 from runtime.core.signals.filters import lowpass_filtered
-from runtime.core.study import EstimateSettings, Lowpass, Study
+from runtime.core.study import EstimateSettings, Lowpass
 from runtime.core.table import aligned
 from runtime.counts.reading import read_counts
 from runtime.loop.closed_loop import ClosedLoop
+from runtime.study import Study
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import loop_of_records

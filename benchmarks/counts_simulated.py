@@ -52,11 +52,11 @@ from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import certain_rows, select_rows
 from runtime.core.rows.switches import switches
 from runtime.core.signals.filters import States, filtered_states
-from runtime.core.study import Study, study_from_mapping
 from runtime.core.table import aligned
 from runtime.counts.reading import read_counts
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
+from runtime.study import Study, study_from_mapping
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import observed_states

@@ -41,7 +41,7 @@ from runtime.compose import estimate_of
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
-from runtime.core.study import EstimateSettings, Study, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.core.table import aligned
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.loop.control_law import parameters_of
@@ -50,6 +50,7 @@ from runtime.loop.simulation import Simulator
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples" / "chapter"))
 

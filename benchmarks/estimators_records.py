@@ -32,12 +32,13 @@ from runtime.compose import estimate_of
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.observation import Observation
-from runtime.core.study import EstimateSettings, Study, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.core.table import aligned
 from runtime.loop.reference import Reference
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
 from problems import loop_of_records

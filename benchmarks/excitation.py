@@ -36,8 +36,8 @@ from runtime.loop.reference import Reference
 from runtime.loop.settings import Controller
 from runtime.loop.simulation import Simulator
 from runtime.parallel.processes import processes
-from runtime.reading.names import study_of
 from runtime.reading.records import read_records
+from runtime.study import study_of
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"
 RATE = 5000.0

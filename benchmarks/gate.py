@@ -43,10 +43,10 @@ from runtime.compose import observe
 from runtime.core.cestac.run import one_run
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
-from runtime.core.study import Study, study_from_mapping
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.files import read_bytes
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 from symgen.derive.derivation import derive
 from symgen.description import load_robot
 from symgen.description.robot import Robot

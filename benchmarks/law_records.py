@@ -24,9 +24,10 @@ from runtime.compose import estimate_of, problem
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import stacked
-from runtime.core.study import EstimateSettings, Study, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.elastic import elasticity
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 DATA = Path(os.environ.get("SYMGEN_DATA", "."))

@@ -28,8 +28,8 @@ from truth_shared import (
 from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
 
 import runtime
-from runtime.core.study import study_from_mapping
 from runtime.counts.reading import read_counts
+from runtime.study import study_from_mapping
 
 GRID = (6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 50.0, 80.0)
 """Cut-offs of the low-pass that the reader of counts is compared with, Hz."""

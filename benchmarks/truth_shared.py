@@ -21,7 +21,7 @@ from truth_simulator import Motion, Robot, Truth
 
 import runtime
 import symgen
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 
 Array = np.ndarray
 Row = dict[str, Any]

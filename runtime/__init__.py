@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         observe,
         plausibility,
         problem,
+        simulate,
         static_poses,
     )
     from runtime.core.cestac.result import Cestac
@@ -41,12 +42,9 @@ if TYPE_CHECKING:
     from runtime.core.record import Record
     from runtime.core.result import Identification
     from runtime.core.rows.observation import Observation
-    from runtime.core.study import Study
-    from runtime.loop.simulation import simulate
-    from runtime.reading.records import read_record
+    from runtime.files import report
     from runtime.reading.resampling import resample
-    from runtime.reporting.files import report
-    from runtime.study_files import load_study
+    from runtime.study import Study, load_study, read_record
 
 __all__ = [
     "Advice",
@@ -91,23 +89,21 @@ _MODULES = {
         "observe",
         "plausibility",
         "problem",
+        "simulate",
         "static_poses",
     ),
     "runtime.core.problem": ("Problem",),
     "runtime.core.errors": ("InputError",),
     "runtime.core.least_squares.estimate": ("Estimate",),
     "runtime.core.result": ("Identification",),
-    "runtime.loop.simulation": ("simulate",),
     "runtime.core.model": ("load_model",),
-    "runtime.reading.records": ("read_record",),
     "runtime.core.record": ("Record",),
     "runtime.reading.resampling": ("resample",),
-    "runtime.reporting.files": ("report",),
+    "runtime.files": ("report",),
     "runtime.advisor.advice": ("Advice",),
     "runtime.core.cestac.result": ("Cestac",),
     "runtime.core.rows.observation": ("Observation",),
-    "runtime.study_files": ("load_study",),
-    "runtime.core.study": ("Study",),
+    "runtime.study": ("Study", "load_study", "read_record"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

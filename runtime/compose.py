@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from runtime import robust as irls
@@ -36,7 +37,7 @@ from runtime.core.problem import Note, Problem, Step, prepared
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.states import Reader, lowpassed
-from runtime.core.study import EstimateSettings, Study
+from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.reader import counted
 from runtime.elastic import elastic_gears
@@ -59,6 +60,7 @@ from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
 from runtime.speeds import recorded_speeds
+from runtime.study import Study
 from runtime.threads import alone_each, single_threaded
 from runtime.wrench import force_sensors
 
@@ -68,6 +70,7 @@ if TYPE_CHECKING:
     from runtime.core.result import Identification
     from runtime.excitation.poses import StaticPoses
     from runtime.excitation.result import Excitation
+    from runtime.loop.result import Simulation
     from runtime.loop.simulation import Simulator
     from runtime.payload.study import PayloadStudy
     from runtime.plausible.delay import Delay
@@ -513,6 +516,52 @@ def extras(asked: Mapping[str, Mapping[str, Any]], attempted: bool = False) -> l
     return chosen
 
 
+def simulate(
+    model: GeneratedModel,
+    study: Study,
+    *,
+    folder: str | Path | None = None,
+    ideal: bool = False,
+    name: str | None = None,
+) -> Simulation:
+    """The closed loop of study.controller along its reference. Many runs of one loop, other
+    parameters: make a `runtime.loop.simulation.Simulator`.
+
+    Parameters
+    ----------
+    model : GeneratedModel
+        With values of its standard parameters, or with all of them in `values` of the controller.
+    study : Study
+        With a section `controller`.
+    folder : str or Path, optional
+        Where file names of the study start; default: the current folder.
+    ideal : bool
+        No noise, no steps of encoder and converter.
+    name : str, optional
+        Of the simulated record; its default says that nothing was measured.
+
+    Raises
+    ------
+    InputError
+        No section `controller`, or a reference outside the limits of the robot.
+    SimulationError
+        An inertia that is not positive definite, or a loop that is not stable.
+    """
+    from runtime.loop import simulation
+
+    if study.controller is None:
+        raise InputError(
+            "the study has no section `controller`; it says law, rate and reference of the closed loop"
+        )
+    records: Sequence[Record] = ()
+    if study.controller.reference.record is not None:
+        missing = study.signals.admits_missing
+        records = read_records(study.record, model, folder=folder, missing=missing)
+    return simulation.simulate(
+        model, study.controller, records=records, folder=folder, ideal=ideal, name=name
+    )
+
+
 def _with_loaded(
     model: GeneratedModel,
     records: Records,
@@ -564,5 +613,6 @@ __all__ = [
     "payload",
     "plausibility",
     "problem",
+    "simulate",
     "static_poses",
 ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from runtime.core.model import elements_of
 from runtime.core.problem import Problem
-from runtime.reading.settings import behind_gears
+from runtime.core.settings import require
 
 OF_DRIVES = ("inertia", "viscous", "coulomb")
 """Kinds of elements in which sensors behind the gears have no part."""
@@ -14,8 +16,8 @@ OF_DRIVES = ("inertia", "viscous", "coulomb")
 
 def torques_of_links(problem: Problem) -> Problem:
     """The step: all columns but those of the drives, where records name sensors behind the gears."""
-    settings = problem.settings
-    if settings.estimate.columns != "all" or not behind_gears(
+    settings: Any = problem.settings
+    if settings.estimate.columns != "all" or not _behind_gears(
         [*settings.record, *settings.validate.record]
     ):
         return problem
@@ -25,3 +27,13 @@ def torques_of_links(problem: Problem) -> Problem:
     )
     estimate = replace(settings.estimate, columns=columns)
     return problem.changed(settings=replace(settings, estimate=estimate))
+
+
+def _behind_gears(records: Sequence[Any]) -> bool:
+    """Whether the torques are those of sensors behind the gears, by the settings of the records; SettingsError where those of one
+    record are and those of another are not.
+    """
+    sides = {record.sides[1] == "link" for record in records}
+    message = "link in one record and not in another; fit them in studies of their own"
+    require(len(sides) < 2, message, "record", 0, "torque_side")
+    return True in sides

@@ -30,10 +30,9 @@ from runtime.core.bound import BoundModel
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, channels_of, elements_of, joint_units
 from runtime.core.problem import Problem
-from runtime.core.record import JOINT_CHANNELS, Record
+from runtime.core.record import JOINT_CHANNELS, WRENCH, Record
 from runtime.core.rows.selection import UNMEASURED, per_joint
 from runtime.physical.inertia import INERTIAL, physical_model
-from runtime.reading.settings import WRENCH
 
 Array = np.ndarray
 

@@ -34,15 +34,16 @@ from runtime.core.cestac.result import LevelResult
 from runtime.core.drives import Drives
 from runtime.core.errors import DataUnavailableError
 from runtime.core.markup import number
-from runtime.core.study import CestacSettings, Columns, RecordSettings, study_from_mapping
+from runtime.core.study import CestacSettings
 from runtime.core.table import Table
+from runtime.files import Files, identification_files, part_files
 from runtime.loop.reference import Reference, point_to_point
 from runtime.loop.settings import Points
 from runtime.reading.datasets import dataset_study
-from runtime.reading.location import located
-from runtime.reporting.files import Files, identification_files, part_files
+from runtime.reading.settings import Columns, RecordSettings
 from runtime.reporting.page import Section
 from runtime.reporting.resolution import resolution_section
+from runtime.study import located, study_from_mapping
 
 # Table 2 with its %sigma; Table 3 at Delta 1 ... 4; Table 4 at Phi 1 ... 4, each five times the one
 # before: their values are not given.
@@ -291,10 +292,11 @@ class Demonstration:
     def files(self, folder: Path) -> Files:
         """Contents of the output folder, by file name."""
         simulated = bool(self.prepared.note)
+        settings: Any = self.result.study
         kind = "SIMULATED record, nothing measured" if simulated else "public measured record"
         result = replace(
             self.result,
-            problem=self.result.problem.changed(settings=located(self.result.study, folder)),
+            problem=self.result.problem.changed(settings=located(settings, folder)),
         )
         files = identification_files(
             result,

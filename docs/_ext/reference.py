@@ -17,7 +17,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import docstrings
 from typer.main import get_command
 
-from runtime.core.study import Study, to_mapping
+from runtime.core.settings import to_mapping
+from runtime.study import Study
 from symgen.cli.main import VERBS, app
 from symgen.description import load_robot, packaged_robots
 from symgen.description.schema import json_schema

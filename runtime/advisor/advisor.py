@@ -64,7 +64,8 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.observation import stack
 from runtime.core.rows.prepared import common_drives, stacked
-from runtime.core.study import Study, to_mapping
+from runtime.core.settings import to_mapping
+from runtime.core.study import Study
 
 Array = np.ndarray
 Progress = Callable[[int, int], None]

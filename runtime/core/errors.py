@@ -52,7 +52,7 @@ class InputError(ValueError):
     row : str, optional
         Place in the file, such as "line 12" or "sample 40".
     remedy : mapping, optional
-        Settings of the record that are likely to cure it (`runtime.reading.suggested`).
+        Settings of the record that are likely to cure it (`runtime.study.suggested`).
     """
 
     def __init__(

@@ -21,6 +21,8 @@ from runtime.core.missing import COUNTS, Missing, bridged
 
 Array = np.ndarray
 
+WRENCH = "wrench"
+"""Beginning of the channels that are wrenches, before the number of the frame."""
 JOINT_CHANNELS = ("q_r", "qd", "qd_ref", "q_link", "tau_ff")
 """Channels with one column per joint."""
 
@@ -55,6 +57,8 @@ class Origin:
         Name of the record that was split at gaps and this is a piece of; "": it is whole.
     simulated : bool
         Whether nothing was measured.
+    by_law : bool
+        Whether the torque is that of a controller's law.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -65,6 +69,7 @@ class Origin:
     joints: tuple[str, ...] = ()
     whole: str = ""
     simulated: bool = False
+    by_law: bool = False
 
 
 @dataclass(frozen=True, eq=False, init=False)

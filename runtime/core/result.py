@@ -332,7 +332,7 @@ class Identification:
     @property
     def own_warnings(self) -> tuple[str, ...]:
         """Joints without rows, signs that no drive has, lost joints, then what the parts warn of."""
-        by_law = any(one.by_law for one in self.study.record)
+        by_law = any(record.origin.by_law for record in self.records)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "
             f"{'kd of the law is larger than that of the drive, or ' * by_law}a "

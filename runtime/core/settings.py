@@ -178,8 +178,14 @@ class Settings(metaclass=SettingsType):
     def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
         """That of pydantic, with what the docstring says of each key."""
         made: dict[str, Any] = _with_limits(handler.resolve_ref_schema(handler(schema)))
-        text, _, attributes = inspect.getdoc(cls).partition("\n\nAttributes\n----------\n")  # type: ignore[union-attr]
-        made["description"] = " ".join(text.split())
+        texts = [
+            inspect.getdoc(base) or ""
+            for base in reversed(cls.__mro__)
+            if issubclass(base, Settings)
+        ]
+        parts = [text.partition("\n\nAttributes\n----------\n") for text in texts]
+        made["description"] = " ".join(parts[-1][0].split())
+        attributes = "\n".join(part[2] for part in parts)
         entries = re.findall(r"^(\w[\w, ]*) : (.*)\n((?: +.*\n?)*)", attributes, re.MULTILINE)
         for keys, form, meaning in entries:
             unit = form.partition(", ")[2]

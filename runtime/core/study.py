@@ -1,7 +1,6 @@
-"""Everything about an experiment that is not the robot: the study file as frozen settings.
+"""What the chapter settles about an experiment, as frozen settings.
 
-    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 100}}})
-    study.signals.lowpass.order        # 4, the default
+    Study(signals=Signals(lowpass=Lowpass(cutoff=100)))
     to_mapping(study)                  # complete, defaults filled: written into every result
 
 Defaults are those of the chapter (sections 2.2.2, 2.2.3 and 4.1.1) but for the cut-off, which
@@ -14,11 +13,11 @@ Units: SI, rad, Hz. Values are checked where they are made, so a Study that exis
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from math import pi
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from runtime.core.settings import (
     Count,
@@ -35,25 +34,9 @@ from runtime.core.settings import (
     Text,
     Whole,
     require,
-    structure,
-    to_mapping,
 )
-from runtime.excitation.settings import ExcitationSettings
-from runtime.loop.settings import Controller
-from runtime.reading.settings import (
-    Columns,
-    Records,
-    RecordSettings,
-    Resample,
-    Scale,
-    Units,
-    with_law,
-)
-from runtime.reading.units import speed
 
 SCHEMA = 1
-LOAD = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-"""Standard parameters of a load."""
 
 
 def version(number: int) -> int:
@@ -195,13 +178,12 @@ class Rows(Settings):
         ahead of the decimation the samples within 3/cutoff of an end of the record, at most a
         tenth of it.
     low_speed : float or tuple of float, rad/s or m/s
-        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
-        have another unit: 2 rpm.
+        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them.
     """
 
     window: Interval = (None, None)
     trim: Annotated[Whole, Field(ge=0)] | Literal["auto"] = "auto"
-    low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
+    low_speed: PerJoint[NotNegative] = 0.0
 
 
 SIMULATING = ("iv", "didim")
@@ -252,15 +234,12 @@ class ValidateSettings(Settings):
     ----------
     split : tuple of pairs of float or None, s
         Windows: the first is fitted, the others are predicted.
-    record : tuple of RecordSettings
-        Further records, predicted with the parameters of the study.
     values : bool
         Whether parameters are to be used one by one: the verdict then asks for small deviations and
         for parameters that can be told apart.
     """
 
     split: tuple[Interval, ...] = ()
-    record: Records = ()
     values: Flag = False
 
     def __post_init__(self) -> None:
@@ -268,52 +247,6 @@ class ValidateSettings(Settings):
             len(self.split) != 1,
             "one window; expected at least two, the first to fit, the others to predict",
             "split",
-        )
-
-
-class PayloadSettings(Settings):
-    """Records with a load fixed to a link; the records of the study are those without it.
-
-    Attributes
-    ----------
-    record : tuple of RecordSettings
-        Records with the load.
-    link : int or None
-        Number of the link with the load; default: the last, or that of the frame.
-    frame : int or None
-        Frame fixed to that link, such as a tool frame (sigma 2), at which the parameters of the
-        load are meant; default: that of the link.
-    known : mapping of float, SI
-        Those of XX XY XZ YY YZ ZZ MX MY MZ M of the load, at that frame, that were weighed or
-        computed.
-    friction : bool
-        The records with the load have friction of their own.
-    gains : bool
-        Also estimate the torque constants of the drives from the load; its M must be known.
-    """
-
-    record: Records = ()
-    link: Whole | None = None
-    frame: Whole | None = None
-    known: Mapping[Text, Real] = field(default_factory=dict)
-    friction: Flag = False
-    gains: Flag = False
-
-    def __post_init__(self) -> None:
-        for family in self.known:
-            require(
-                family in LOAD, f"unknown parameter; a load has {', '.join(LOAD)}", "known", family
-            )
-        require(
-            self.known.get("M", 1.0) > 0,
-            f"{self.known.get('M')} kg; expected a positive mass",
-            "known",
-            "M",
-        )
-        require(
-            not self.gains or "M" in self.known,
-            "torque constants need a weighed load: set known: {M: ...}",
-            "gains",
         )
 
 
@@ -390,14 +323,12 @@ class CestacSettings(Settings):
 
 
 class Study(Settings):
-    """All settings of an experiment.
+    """Settings of what the chapter does; features add sections of their own (`runtime.study`).
 
     Attributes
     ----------
     symgen : int
         Version of the study file.
-    record : tuple of RecordSettings
-        One or several records of one robot.
     signals : Signals
         Filters of the measured signals.
     rows : Rows
@@ -410,64 +341,12 @@ class Study(Settings):
         Validation.
     cestac : CestacSettings
         Encoder-resolution study.
-    payload : PayloadSettings or None
-        Records with a load.
-    controller : Controller or None
-        Closed loop of simulation, IV and DIDIM.
-    excitation : ExcitationSettings or None
-        Search for an exciting motion.
     """
 
     symgen: Version = SCHEMA
-    record: Records = ()
     signals: Signals = field(default_factory=Signals)
     rows: Rows = field(default_factory=Rows)
     estimate: EstimateSettings = field(default_factory=EstimateSettings)
     essential: EssentialSettings = field(default_factory=EssentialSettings)
     validate: ValidateSettings = field(default_factory=ValidateSettings)
     cestac: CestacSettings = field(default_factory=CestacSettings)
-    payload: PayloadSettings | None = None
-    controller: Controller | None = None
-    excitation: ExcitationSettings | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "record", with_law(self.record, self.controller))
-        for section in ("validate", "payload"):
-            given = getattr(self, section)
-            if given is not None and any(record.by_law for record in given.record):
-                own = replace(given, record=with_law(given.record, self.controller))
-                object.__setattr__(self, section, own)
-
-
-def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
-    """The Study of a mapping as read from a study file; raises SettingsError with the path of the
-    offending key.
-
-    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
-    record).
-    """
-    return structure(Study, mapping)
-
-
-__all__ = [
-    "LOAD",
-    "SCHEMA",
-    "CestacSettings",
-    "Columns",
-    "Decimate",
-    "EssentialSettings",
-    "EstimateSettings",
-    "Lowpass",
-    "PayloadSettings",
-    "RecordSettings",
-    "Resample",
-    "Rows",
-    "Scale",
-    "Signals",
-    "Study",
-    "Units",
-    "ValidateSettings",
-    "Version",
-    "study_from_mapping",
-    "to_mapping",
-]

@@ -35,8 +35,8 @@ from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights
 from runtime.excitation.settings import ExcitationSettings
-from runtime.excitation.trajectories import Motion
 from runtime.loop.dry_friction import dry_friction
+from runtime.loop.trajectories import Motion
 
 Array = np.ndarray
 

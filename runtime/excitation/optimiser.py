@@ -26,10 +26,10 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.rows.predicted import Weights
 from runtime.excitation.criteria import MotionLimits
-from runtime.excitation.families import Fourier
 from runtime.excitation.result import Start
 from runtime.excitation.settings import ExcitationSettings
-from runtime.excitation.trajectories import Motion, Part
+from runtime.loop.families import Fourier
+from runtime.loop.trajectories import Motion, Part
 
 Array = np.ndarray
 

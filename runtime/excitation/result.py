@@ -16,12 +16,12 @@ from runtime.core.documents import Result
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.predicted import Weights
-from runtime.core.study import to_mapping
+from runtime.core.settings import to_mapping
 from runtime.core.table import Table
 from runtime.excitation.criteria import MotionLimits, usage
 from runtime.excitation.settings import ExcitationSettings
-from runtime.excitation.trajectories import Motion
 from runtime.loop.result import csv_text
+from runtime.loop.trajectories import Motion
 
 Array = np.ndarray
 

@@ -31,9 +31,9 @@ from runtime.excitation.criteria import criterion_of, excesses, limits_of, plann
 from runtime.excitation.optimiser import Search, improved, one_start
 from runtime.excitation.result import Excitation, Known, Start
 from runtime.excitation.settings import ExcitationSettings
-from runtime.excitation.trajectories import Motion, motion_from_mapping
 from runtime.loop.control_law import parameters_of
 from runtime.loop.dry_friction import dry_friction
+from runtime.loop.trajectories import Motion, motion_from_mapping
 
 Array = np.ndarray
 

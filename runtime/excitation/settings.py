@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from runtime.core.settings import Count, Many, Positive, Real, Settings, Text, Whole, require
-from runtime.excitation.families import AnyFamily, Fourier, PointToPoint
+from runtime.loop.families import AnyFamily, Fourier, PointToPoint
 
 
 class Sphere(Settings):
@@ -36,7 +36,7 @@ class ExcitationSettings(Settings):
     Attributes
     ----------
     parts : tuple of Family
-        Families in the order of the motion (`runtime.excitation.trajectories`).
+        Families in the order of the motion (`runtime.loop.trajectories`).
     poses : int or None
         So many poses at rest are sought in place of a motion, for `signals.reader: static`
         (`runtime.excitation.poses`); null: a motion.

@@ -22,8 +22,8 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.record import Record
 from runtime.core.signals.filters import derivative
-from runtime.excitation.trajectories import motion_from_mapping
 from runtime.loop.settings import Controller, Points
+from runtime.loop.trajectories import motion_from_mapping
 from runtime.reading.formats import read_table
 
 Array = np.ndarray

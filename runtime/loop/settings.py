@@ -33,7 +33,7 @@ from runtime.core.settings import (
     Whole,
     require,
 )
-from runtime.excitation.trajectories import motion_from_mapping
+from runtime.loop.trajectories import motion_from_mapping
 
 
 def _a_motion(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -189,7 +189,7 @@ class ReferenceSettings(Settings):
     record : int or None
         Index, from 0, of a record that holds its reference, columns qr1 ...
     motion : mapping or None
-        Parts with their coefficients, as `runtime.excitation.trajectories.motion_from_mapping` reads
+        Parts with their coefficients, as `runtime.loop.trajectories.motion_from_mapping` reads
         them.
     points : Points or None
         Random points.

@@ -14,7 +14,7 @@ and what to try.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from scipy.signal import butter, lfilter
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, constants_of, require, require_no_channels
-from runtime.core.study import Study
+from runtime.core.record import Record
 from runtime.loop.control_law import (
     ControlLaw,
     continuous_pole,
@@ -39,7 +39,6 @@ from runtime.loop.dry_friction import DryFriction, dry_friction
 from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import Simulation, SimulationError
 from runtime.loop.settings import Controller
-from runtime.reading.records import read_records
 
 Array = np.ndarray
 
@@ -295,48 +294,20 @@ class Simulator:
 
 def simulate(
     model: GeneratedModel,
-    study: Study,
+    controller: Controller,
     *,
+    records: Sequence[Record] = (),
     folder: str | Path | None = None,
     ideal: bool = False,
     name: str | None = None,
 ) -> Simulation:
-    """The closed loop of study.controller along its reference. Many runs of one loop, other
-    parameters: make a `Simulator`.
+    """The closed loop of a controller along its reference.
 
-    Parameters
-    ----------
-    model : GeneratedModel
-        With values of its standard parameters, or with all of them in `values` of the controller.
-    study : Study
-        With a section `controller`.
-    folder : str or Path, optional
-        Where file names of the study start; default: the current folder.
-    ideal : bool
-        No noise, no steps of encoder and converter.
-    name : str, optional
-        Of the simulated record; its default says that nothing was measured.
-
-    Raises
-    ------
-    InputError
-        No section `controller`, or a reference outside the limits of the robot.
-    SimulationError
-        An inertia that is not positive definite, or a loop that is not stable.
+    records : those that the reference may come from.   folder : where a file of it starts.
+    ideal, name : as of `runtime.simulate`.
     """
-    controller = study.controller
-    if controller is None:
-        raise InputError(
-            "the study has no section `controller`; it says law, rate and reference of the closed "
-            "loop"
-        )
-    folder, index = Path(folder or ""), controller.reference.record
-    records = (
-        read_records(study.record, model, folder=folder, missing=study.signals.admits_missing)
-        if index is not None
-        else ()
-    )
     X = parameters_of(model, controller)
+    index = controller.reference.record
     reference = reference_of(controller, model, records=records, folder=folder)
     start = records[index].q[0] if index is not None and controller.start is None else None
     return Simulator(model, controller).run(

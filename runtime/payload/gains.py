@@ -43,9 +43,10 @@ from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import triangularise
 from runtime.core.rows.observation import Observation, split_rows, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque
-from runtime.core.study import EstimateSettings, PayloadSettings
+from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
 from runtime.payload.load import load_columns
+from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import physical_model
 
 Array = np.ndarray

@@ -28,9 +28,10 @@ from runtime.core.least_squares.method import linear_estimate
 from runtime.core.markup import number
 from runtime.core.model import GeneratedModel, elements_of
 from runtime.core.rows.observation import Observation, stack
-from runtime.core.study import EstimateSettings, PayloadSettings
+from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
 from runtime.payload.mount import Mount, load_vector, mount
+from runtime.payload.settings import PayloadSettings
 from runtime.physical.inertia import INERTIAL, PhysicalModel, physical_model
 
 Array = np.ndarray

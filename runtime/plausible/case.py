@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -127,7 +128,8 @@ class Case:
     @cached_property
     def sides(self) -> tuple[str, str]:
         """Sides of positions and torques in the files."""
-        return self.study.record[0].sides if self.study.record else ("joint", "joint")
+        settings: Any = self.study
+        return settings.record[0].sides if settings.record else ("joint", "joint")
 
     @cached_property
     def baseline(self) -> Baseline | None:

@@ -60,7 +60,7 @@ def measured(case: Case) -> Answer | None:
     """Friction in the torque of the joint that has most of it, and noise of the torques at the rate
     of the record, by fifth differences, both relative; None where a law gives the torques.
     """
-    if case.alone is None or any(record.by_law for record in case.study.record):
+    if case.alone is None or any(record.origin.by_law for record in case.records):
         return None
     elements = elements_of(case.model)
     kinds = [elements.get(name, ("",))[0] for name in case.model.BASE_PARAMETERS]

@@ -20,7 +20,8 @@ import numpy as np
 
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
-from runtime.reading.files import require_file, sha256, sha256_of
+from runtime.documents.files import require_file
+from runtime.reading.files import sha256, sha256_of
 from runtime.reading.table import Array, Options, Table, damage_named
 
 MESSAGE = "sensor_msgs/msg/JointState"
@@ -163,7 +164,7 @@ def digest_of(path: Path) -> str:
 
 def stored_files(folder: Path) -> list[Path]:
     """Files of a ROS 2 bag, a folder with metadata.yaml."""
-    from runtime.yaml_text import yaml_values
+    from runtime.documents.yaml_text import yaml_values
 
     where = f"{folder.name}/metadata.yaml"
     require_file(folder / "metadata.yaml")

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from stat import S_ISDIR, S_ISREG
 from typing import BinaryIO, cast
 
 from runtime.core.errors import InputError
+from runtime.documents.files import require_file
 
 WHOLE = 2**31  # bytes of a file that is read into memory as it is
 ALWAYS = 2**28  # bytes, 256 MiB: what any file may unpack to
@@ -27,22 +27,6 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
-
-
-def require_file(path: Path) -> int:
-    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as e:
-        raise InputError(
-            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
-        ) from e
-    if not S_ISREG(status.st_mode):
-        what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
-        raise InputError(
-            f"cannot be read: {what}; expected a file, copy its content into one", file=str(path)
-        )
-    return status.st_size
 
 
 def require_size(unpacked: int, size: int, file: str) -> None:

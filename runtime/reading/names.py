@@ -1,4 +1,4 @@
-"""What a name on a command line means: a dataset, a study file, or a measured file; and what records and their files are called."""
+"""What records and their files are called."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from runtime.core.errors import InputError
-from runtime.core.study import Study, study_from_mapping
-from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.reading.formats import endings, is_measured
+from runtime.reading.formats import endings
 from runtime.reading.settings import RecordSettings
-from runtime.study_files import load_study
 
 
 @dataclass(frozen=True)
@@ -21,26 +17,6 @@ class Label:
 
     name: str
     files: tuple[str, ...]
-
-
-def study_of(record: str | Path) -> tuple[Study, Path]:
-    """The Study that a name means, and the folder its files are relative to.
-
-    Parameters
-    ----------
-    record : str or Path
-        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
-    """
-    path = Path(record)
-    if str(record) in DATASETS:
-        return study_from_mapping(dataset_study(str(record))), Path()
-    if path.suffix.lower() in (".yaml", ".yml"):
-        return load_study(path), path.parent
-    if is_measured(path):
-        return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
-    raise InputError(
-        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
-    )
 
 
 def labels(settings: Sequence[RecordSettings]) -> list[Label]:

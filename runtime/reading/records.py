@@ -1,7 +1,6 @@
 """From the files of a measurement to a Record: columns, scale, units, then the drives, then the clock.
 
-    record = read_record("run.csv")
-    records = read_records(study.record, model, folder="measurements")
+    records = read_records(settings, model, folder="measurements")
 
 Units and side are explicit in the settings, never guessed. A file whose columns are called t, q1 ... qn, tau1 ... taun needs no column names. Bad input raises InputError, which names file, column and line or sample.
 """
@@ -25,7 +24,7 @@ from runtime.core.record import JOINT_CHANNELS, Origin, Record, require_finite
 from runtime.reading.columns import Conversion, column_names, conversion, require_alike
 from runtime.reading.datasets import fetch
 from runtime.reading.formats import read_table
-from runtime.reading.names import Label, labels, study_of
+from runtime.reading.names import Label, labels
 from runtime.reading.resampling import Stretch, resampled
 from runtime.reading.settings import NONE, Columns, RecordSettings, each_record
 from runtime.reading.table import Array, Table
@@ -33,47 +32,6 @@ from runtime.reading.units import time_unit
 
 IRREGULAR = 0.05
 """Between the rate of the settings and the median step of stamps that are resampled."""
-
-
-def read_record(
-    path: str | Path | RecordSettings,
-    model: GeneratedModel | None = None,
-    *,
-    folder: str | Path = ".",
-    missing: bool = False,
-) -> Record:
-    """One measured record, joint side, SI.
-
-    Parameters
-    ----------
-    path : str, Path or RecordSettings
-        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
-    model : module, optional
-        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
-    folder : str or Path
-        Where relative file names start; of a study file, those in it start where it is.
-    missing : bool
-        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be read or hold something else, and several records, or one that `resample` splits.
-    """
-    if isinstance(path, RecordSettings):
-        settings: tuple[RecordSettings, ...] = (path,)
-    else:
-        named = Path(folder) / path
-        study, folder = study_of(named if named.exists() else path)
-        settings = study.record
-        missing = missing or study.signals.admits_missing
-    records = read_records(settings, model, folder=folder, missing=missing)
-    if len(records) != 1:
-        names = ", ".join(record.name for record in records)
-        raise InputError(
-            f"{len(records)} records or pieces between gaps; read_records gives them all: {names}"
-        )
-    return records[0]
 
 
 def read_records(
@@ -145,6 +103,7 @@ def _pieces(
         joints=() if model is None else joint_labels(model),
         whole="" if len(stretches) == 1 else label.name,
         simulated=settings.simulated,
+        by_law=settings.by_law,
     )
     keys = [key for key in samples if key != "t"]
     pieces = len(stretches)

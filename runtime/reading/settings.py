@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from runtime.core.record import WRENCH
 from runtime.core.settings import (
     Flag,
     Many,
@@ -58,7 +59,6 @@ Factor = Annotated[PerJoint[Real] | Text, Field(union_mode="left_to_right")]
 
 
 QUANTITIES = ("t", "q", "tau", "q_r", "qd", "qd_ref", "q_link", "tau_ff", "tau_known", "law_v")
-WRENCH = "wrench"  # beginning of the channels that are wrenches, before the number of the frame
 BY_NAME = ("names",)  # columns found by the names of the joints
 
 
@@ -320,16 +320,6 @@ class RecordSettings(Settings):
     def sides(self) -> tuple[str, str]:
         """Sides of the positions and of the torques: motor, joint or link."""
         return self.side, self.torque_side or self.side
-
-
-def behind_gears(records: Sequence[RecordSettings]) -> bool:
-    """Whether the torques are those of sensors behind the gears; SettingsError where those of one
-    record are and those of another are not.
-    """
-    sides = {record.sides[1] == "link" for record in records}
-    message = "link in one record and not in another; fit them in studies of their own"
-    require(len(sides) < 2, message, "record", 0, "torque_side")
-    return True in sides
 
 
 def with_law(

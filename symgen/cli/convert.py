@@ -92,7 +92,7 @@ def convert(
 
             robot = with_values(robot, values_of_csv(read_bytes(values), str(values)))
         if estimate is not None:
-            from runtime.estimate_files import load_whole_estimate
+            from runtime.documents.estimates import load_whole_estimate
 
             standard = load_whole_estimate(estimate).details.get("standard")
             robot = with_estimate(robot, standard, str(estimate))

@@ -35,6 +35,6 @@ def schema(
         typer.echo(schema_text(), nl=False)
     else:
         from runtime.core.documents import json_text
-        from runtime.estimate_files import json_schema
+        from runtime.study import json_schema
 
         typer.echo(json_text(json_schema(of)), nl=False)

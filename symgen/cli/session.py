@@ -16,9 +16,9 @@ import typer
 
 if TYPE_CHECKING:
     from runtime.core.model import GeneratedModel
-    from runtime.core.study import Study
     from runtime.parallel.checkpoint import Checkpoint
     from runtime.reporting.result_files import Results
+    from runtime.study import Study
     from symgen.description import Robot
 
 BAD_INPUT, NEGATIVE = 2, 1
@@ -209,8 +209,7 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     """
     from runtime.core.errors import InputError
     from runtime.reading.formats import is_measured
-    from runtime.reading.location import located
-    from runtime.reading.names import study_of
+    from runtime.study import located, study_of
 
     study = located(*study_of(records[0]))
     if recorded:
@@ -237,9 +236,8 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
 def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     """The study with what is likely to cure each refusal of its records, written to `path`."""
     from runtime.core.errors import InputError
-    from runtime.reading.location import study_text
-    from runtime.reading.suggested import suggested
     from runtime.reporting.result_files import write_all
+    from runtime.study import study_text, suggested
 
     if path.exists():
         raise InputError("the study to suggest exists; choose another name", file=str(path))
@@ -264,7 +262,8 @@ def require_record(study: Study, file: str) -> None:
 
 def changed(study: Study, **sections: Mapping[str, Any]) -> Study:
     """The study with some settings replaced, checked like those of a file; None: as it is."""
-    from runtime.core.study import study_from_mapping, to_mapping
+    from runtime.core.settings import to_mapping
+    from runtime.study import study_from_mapping
 
     mapping = to_mapping(study)
     for section, given in sections.items():

@@ -20,15 +20,13 @@ from pathlib import Path
 from typing import Any
 
 from runtime.core.errors import InputError
-from runtime.core.study import to_mapping
+from runtime.core.settings import to_mapping
+from runtime.documents.yaml_text import yaml_text, yaml_values
 from runtime.reading.bags import stored_files
 from runtime.reading.datasets import DATASETS
 from runtime.reading.formats import BAG, endings, is_measured
-from runtime.reading.location import located, study_text
-from runtime.reading.names import study_of
 from runtime.reporting.result_files import write_all
-from runtime.study_files import study_from_text
-from runtime.yaml_text import yaml_text, yaml_values
+from runtime.study import located, study_from_text, study_of, study_text
 from symgen.description import packaged_robots
 from symgen.description.files import content_of
 

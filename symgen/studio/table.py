@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from runtime.yaml_text import yaml_values
+from runtime.documents.yaml_text import yaml_values
 from symgen.description import parse_robot
 from symgen.errors import DescriptionError
 

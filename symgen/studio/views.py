@@ -162,7 +162,7 @@ def series(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     validate on, with positions, at instants that its estimate read.
     """
     from runtime.core.validation import direct_comparison
-    from runtime.estimate_files import load_whole_estimate
+    from runtime.documents.estimates import load_whole_estimate
 
     place = Path(request["run"])
     loaded, study, (record, *_), named = _read(path, place / "study.yaml", request["record"])
@@ -190,8 +190,8 @@ def _read(path: str, study_file: Path, asked: str | None = None) -> tuple[Any, .
     those that are fitted, or the one that is `asked` for, "" for the first. Files of a command are
     relative to its study.
     """
-    from runtime.reading.location import located
     from runtime.reading.records import read_records
+    from runtime.study import located
 
     model = runtime.load_model(symgen.model(path))
     study = located(runtime.load_study(study_file), study_file.parent)

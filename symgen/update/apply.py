@@ -21,7 +21,7 @@ import numpy as np
 
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
-from runtime.estimate_files import load_whole_estimate
+from runtime.documents.estimates import load_whole_estimate
 from runtime.physical.inertia import PhysicalModel, physical_model
 from symgen.certify.modules import model as emitted
 from symgen.description.files import content_of, read_robot

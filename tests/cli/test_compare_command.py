@@ -11,8 +11,8 @@ from campaign import campaign
 from typer.testing import CliRunner
 
 import symgen
-from runtime.core.study import study_from_mapping
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.cli.main import app
 
 RATE = 100

@@ -11,7 +11,7 @@ from campaign import campaign
 from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
-from runtime.excitation.trajectories import motion_from_mapping
+from runtime.loop.trajectories import motion_from_mapping
 from symgen.cli.main import app
 
 STUDY = """

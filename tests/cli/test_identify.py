@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from runtime.core.least_squares.estimate import Estimate
 from runtime.reporting.result_files import write_all
-from runtime.study_files import load_study
+from runtime.study import load_study
 from symgen.cli.identify import identify
 from symgen.cli.main import app
 

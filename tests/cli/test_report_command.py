@@ -9,7 +9,7 @@ import pytest
 from campaign import campaign
 from typer.testing import CliRunner
 
-from runtime.study_files import load_study
+from runtime.study import load_study
 from symgen.cli.main import app
 
 FILES = {

@@ -13,9 +13,9 @@ from runtime import load_model
 from runtime.compose import observe
 from runtime.core.errors import SettingsError
 from runtime.core.essential import essential_of
-from runtime.core.study import study_from_mapping
 from runtime.core.validation import record_errors
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.cli.main import app
 
 RATE = 500

@@ -17,8 +17,8 @@ import numpy as np
 
 import symgen
 from runtime.core.record import Record
-from runtime.core.study import Study, study_from_mapping
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 from runtime.wrench import WrenchModel
 from symgen.description.yaml import parse_robot
 

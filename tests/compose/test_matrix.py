@@ -20,10 +20,10 @@ from runtime import compose
 from runtime.core.errors import InputError
 from runtime.core.estimation import estimated
 from runtime.core.rows.prepared import stacked
-from runtime.core.study import Study
 from runtime.friction.curves import friction_curves
 from runtime.plausible.delay import delay as delay_of
 from runtime.plausible.plausibility import plausibility as plausibility_of
+from runtime.study import Study
 
 CLOSE = 1e-12
 """Of the largest entry."""

@@ -29,7 +29,7 @@ from campaign import campaign, some
 from ruamel.yaml import YAML
 from typer.main import get_command
 
-from runtime.study_files import study_from_text
+from runtime.study import study_from_text
 from symgen.cli.main import app
 from symgen.description.schema import json_schema
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import runtime
 import symgen
-from runtime.core.study import Study
+from runtime.study import Study
 from symgen.cli.main import VERBS
 from symgen.description import packaged_robots
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from runtime.core.study import Columns
+    from runtime.reading.settings import Columns
 
 
 def read_robot(path: Path) -> object:
@@ -40,9 +40,8 @@ def read_and_derive(path: Path) -> object:
 
 
 def read_study(path: Path) -> object:
-    from runtime.core.study import to_mapping
-    from runtime.reading.location import located, study_text
-    from runtime.study_files import load_study
+    from runtime.core.settings import to_mapping
+    from runtime.study import load_study, located, study_text
 
     study = load_study(path)
     to_mapping(study)
@@ -51,7 +50,7 @@ def read_study(path: Path) -> object:
 
 def read_motion(path: Path) -> object:
     from runtime.loop.reference import reference_of
-    from runtime.study_files import load_study
+    from runtime.study import load_study
 
     study = load_study(path)
     if study.controller is not None and study.controller.reference.motion is not None:
@@ -72,15 +71,15 @@ def two_joints() -> object:
 
 
 def read_record(path: Path) -> object:
-    from runtime.core.study import RecordSettings
-    from runtime.reading.records import read_record as read
+    from runtime.reading.settings import RecordSettings
+    from runtime.study import read_record as read
 
     settings = RecordSettings(files=(path.name,), columns=columns_of(path))
     return read(settings, folder=path.parent)
 
 
 def columns_of(path: Path) -> Columns:
-    from runtime.core.study import Columns
+    from runtime.reading.settings import Columns
 
     if path.suffix == ".npy":
         return Columns(t="1", q=("2", "3"), tau=("4", "5"))
@@ -128,7 +127,8 @@ def read_settings(path: Path) -> object:
 
 def read_estimate(path: Path) -> object:
     """What is read can be shown and written, and is read again with the same bits."""
-    from runtime.core.least_squares.estimate import Estimate, load_estimate
+    from runtime.core.least_squares.estimate import Estimate
+    from runtime.documents.estimates import load_estimate
 
     found = load_estimate(path)
     text = found.to_json()

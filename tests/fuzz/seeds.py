@@ -211,8 +211,9 @@ def bag_tables() -> tuple[dict, ...]:
 
 @cache
 def study_tables() -> tuple[dict, ...]:
-    from runtime.core.study import Study, study_from_mapping, to_mapping
+    from runtime.core.settings import to_mapping
     from runtime.reading.datasets import dataset_study
+    from runtime.study import Study, study_from_mapping
 
     small = {
         "symgen": 1,
@@ -284,7 +285,7 @@ def estimate_file() -> bytes:
     from runtime.core.model import load_model
     from runtime.core.record import Record
     from runtime.core.rows.observation import stack
-    from runtime.core.study import study_from_mapping
+    from runtime.study import study_from_mapping
     from symgen.description import load_robot
     from symgen.emit.generate import generate_module
 

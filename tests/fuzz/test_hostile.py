@@ -17,10 +17,9 @@ from fuzz.archives import npy_header, plain_npy
 from fuzz.seeds import csv_file, model_files, npz_members, robot_file, urdf_files
 from runtime.core.errors import InputError
 from runtime.core.model import load_model
-from runtime.core.study import RecordSettings
 from runtime.reading.files import read_bytes
-from runtime.reading.records import read_record
-from runtime.study_files import load_study
+from runtime.reading.settings import RecordSettings
+from runtime.study import load_study, read_record
 from symgen.description import load_robot
 from symgen.errors import DescriptionError
 

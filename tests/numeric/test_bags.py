@@ -12,8 +12,8 @@ from campaign import campaign, some
 
 from runtime import read_record
 from runtime.core.errors import InputError
-from runtime.core.study import study_from_mapping
 from runtime.reading.formats import read_table
+from runtime.study import study_from_mapping
 
 N, RATE = 40, 200
 STAMPS = 1_700_000_000_123_456_789 + np.arange(N) * (10**9 // RATE)

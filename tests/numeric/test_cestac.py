@@ -22,8 +22,9 @@ from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Rows, Signals, Study
+from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
 from runtime.parallel.processes import processes
+from runtime.study import Rows, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20))
 RECORD = record()

@@ -15,9 +15,10 @@ from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study
+from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reading import read_counts
+from runtime.study import Rows, Study
 
 SIGNALS = Signals(median=1, lowpass=Lowpass(cutoff=20), reader="counts")
 TIME = np.arange(6000) / 1000.0

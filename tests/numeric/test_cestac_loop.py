@@ -14,10 +14,11 @@ from runtime.compose import cestac, estimate_of, observe
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.study import CestacSettings, EstimateSettings, study_from_mapping
+from runtime.core.study import CestacSettings, EstimateSettings
 from runtime.loop.cestac import loop_of
 from runtime.loop.simulation import Simulator
 from runtime.parallel.processes import processes
+from runtime.study import study_from_mapping
 
 STEP = 2e-4
 TORQUE = {"saturation": None, "noise": 0.05}

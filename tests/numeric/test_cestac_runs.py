@@ -17,14 +17,8 @@ from runtime.core.least_squares.method import linear_system
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Origin, Record
 from runtime.core.rows.regressor import Columns
-from runtime.core.study import (
-    CestacSettings,
-    EstimateSettings,
-    Lowpass,
-    Rows,
-    Signals,
-    Study,
-)
+from runtime.core.study import CestacSettings, EstimateSettings, Lowpass, Signals
+from runtime.study import Rows, Study
 
 
 @pytest.fixture(scope="module")

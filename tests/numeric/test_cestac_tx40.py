@@ -14,10 +14,11 @@ import pytest
 from runtime.compose import cestac, estimate_of, observe, stated
 from runtime.core.essential import essential_of
 from runtime.core.model import load_model
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.core.validation import split_validation
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 MODEL = Path(__file__).resolve().parents[2] / "generated" / "tx40.py"
 # Table 2: value, tolerance in % (ours: what this record gives, with the treatment of low speed

@@ -17,8 +17,8 @@ import symgen
 from runtime.compose import problem
 from runtime.core.errors import InputError, ModelError
 from runtime.core.model import require
-from runtime.core.study import study_from_mapping
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.certify.modules import certified_files
 from symgen.description.yaml import parse_robot
 from symgen.errors import DescriptionError, SymgenError

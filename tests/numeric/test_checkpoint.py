@@ -20,8 +20,9 @@ from planar_data import record
 from runtime.compose import cestac
 from runtime.core.cestac.runs import Run, Runs
 from runtime.core.errors import InputError
-from runtime.core.study import CestacSettings, Lowpass, Signals, Study
+from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.parallel.checkpoint import Checkpoint
+from runtime.study import Study
 
 RECORD = record(N=3000)
 HERE = Path(__file__).parent

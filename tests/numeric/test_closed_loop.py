@@ -17,7 +17,7 @@ from runtime import InputError, Record, identify, load_model
 from runtime.compose import estimate_of, observe
 from runtime.core.errors import SettingsError
 from runtime.core.essential import essential_of
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.loop.closed_loop import loop_of, slips
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
@@ -26,6 +26,7 @@ from runtime.loop.simulated_motion import judged, simulated_motion
 from runtime.loop.simulation import Simulator
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 SIMULATING = ("iv", "didim")

@@ -8,8 +8,9 @@ import runtime
 import symgen
 from runtime.core.signals.cutoff import cutoff
 from runtime.core.signals.filters import median_filtered
-from runtime.core.study import Signals, Study
+from runtime.core.study import Signals
 from runtime.median import taken
+from runtime.study import Study
 
 RATE = 1000.0
 T = np.arange(10_000) / RATE

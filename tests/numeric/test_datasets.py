@@ -7,9 +7,9 @@ import pooch
 import pytest
 
 from runtime.core.errors import DataUnavailableError, InputError
-from runtime.core.study import study_from_mapping
 from runtime.reading import datasets
 from runtime.reading.datasets import DATASETS, Dataset, dataset_study, fetch, locate
+from runtime.study import study_from_mapping
 
 CONTENT = b"q1,tau1\n1,2\n"
 

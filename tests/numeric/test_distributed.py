@@ -16,8 +16,9 @@ from planar_data import record
 
 from runtime.compose import cestac
 from runtime.core.errors import InputError
-from runtime.core.study import CestacSettings, Lowpass, Signals, Study
+from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.parallel.cluster import cluster as mapped
+from runtime.study import Study
 
 RECORD = record(N=3000)
 STUDY = Study(

@@ -15,9 +15,10 @@ from scipy.integrate import solve_ivp
 from runtime import identify
 from runtime.compose import problem
 from runtime.core.record import Record
-from runtime.core.study import Lowpass, Signals, Study, study_from_mapping
+from runtime.core.study import Lowpass, Signals
 from runtime.elastic import elasticity
 from runtime.reading.records import read_records
+from runtime.study import Study, study_from_mapping
 
 RATE, N = 500.0, 6000
 K, D = np.array([4000.0, 1500.0]), np.array([6.0, 2.0])

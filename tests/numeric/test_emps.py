@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from runtime import load_model, observe
-from runtime.core.study import study_from_mapping
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 EMITTED = Path(__file__).parents[2] / "generated"
 PUBLISHED = [95.1089, 203.5034, 20.3935, -3.1648]  # M kg, Fv N s/m, Fc N, offset N

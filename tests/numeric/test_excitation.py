@@ -16,12 +16,13 @@ from runtime.core.model import load_model
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.settings import structure
-from runtime.core.study import Decimate, Lowpass, Signals, Study
+from runtime.core.study import Decimate, Lowpass, Signals
 from runtime.excitation.criteria import Weights, excesses, limits_of, planned, usage, weights_of
 from runtime.excitation.optimiser import Search, improved, one_start, smoothed
 from runtime.excitation.settings import ExcitationSettings, Sphere
-from runtime.excitation.trajectories import Motion, Part, motion_from_mapping
 from runtime.loop.dry_friction import dry_friction
+from runtime.loop.trajectories import Motion, Part, motion_from_mapping
+from runtime.study import Study
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

@@ -9,9 +9,9 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.study import study_from_mapping
 from runtime.expected import expected_error, with_values
 from runtime.physical.inertia import physical_model
+from runtime.study import study_from_mapping
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,9 @@ from runtime import InputError
 from runtime.compose import estimate_of
 from runtime.core.cestac.result import Cestac, cestac_arrays, cestac_csv, level_result
 from runtime.core.cestac.runs import Level, Run, Runs
-from runtime.core.least_squares.estimate import Estimate, load_estimate
-from runtime.estimate_files import json_schema
+from runtime.core.latex import escaped, name_cell, number_cell, unit_cell
+from runtime.core.least_squares.estimate import Estimate
+from runtime.documents.estimates import load_estimate
 from runtime.reporting.arrays import (
     array_files,
     estimate_arrays,
@@ -31,7 +32,7 @@ from runtime.reporting.arrays import (
     matlab_names,
     npz,
 )
-from runtime.reporting.latex import escaped, name_cell, number_cell, unit_cell
+from runtime.study import json_schema
 
 HOSTILE = (
     "\\input{/etc/passwd}",

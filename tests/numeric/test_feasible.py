@@ -22,7 +22,7 @@ from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.model import load_model
 from runtime.core.rows.observation import Observation
 from runtime.core.signs import negative_elements
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.core.validation import split_validation
 from runtime.physical.feasibility import (
     Ellipsoid,
@@ -45,6 +45,7 @@ from runtime.physical.semidefinite import closest, everything
 from runtime.physical.signs import reach_of
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"

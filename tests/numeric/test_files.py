@@ -13,7 +13,8 @@ import pytest
 from runtime import read_record
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
-from runtime.core.study import RecordSettings, study_from_mapping
+from runtime.reading.settings import RecordSettings
+from runtime.study import study_from_mapping
 
 N, RATE = 1003, 500.0
 DRIVES = Drives([[30.0, 0.0], [12.0, -20.0]], [0.1, -0.2], [0.5, 0.4])

@@ -20,9 +20,9 @@ from campaign import sampled
 
 from runtime import load_model, observe
 from runtime.core.essential import essential_of
-from runtime.core.study import study_from_mapping
 from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 FORMATS = (
     "csv",

@@ -14,13 +14,13 @@ from runtime import InputError, Record, observe
 from runtime.compose import estimate_of, problem
 from runtime.core.model import load_model
 from runtime.core.residuals import correlation_time, residual_correlation
-from runtime.core.study import study_from_mapping
 from runtime.friction.curves import Friction, friction_curves, friction_figure, own_friction
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting import figures as plots
 from runtime.reporting.page import Page, render
 from runtime.reporting.sections import part_section
+from runtime.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

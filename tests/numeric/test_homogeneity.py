@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 import runtime
 import symgen
 from runtime.agreement import _fit, _holm, _in_all, homogeneity
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 20}}})
 

@@ -23,8 +23,8 @@ from rosbags.typesys import get_types_from_msg
 
 from runtime import read_record
 from runtime.core.errors import InputError
-from runtime.core.study import study_from_mapping
 from runtime.reading.formats import read_table
+from runtime.study import study_from_mapping
 
 ALWAYS = 2**24  # bytes that any file may unpack to, here
 BEYOND = ALWAYS + 2**20

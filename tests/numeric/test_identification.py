@@ -19,8 +19,8 @@ from runtime import InputError
 from runtime.compose import assess
 from runtime.core.provenance import origin, record_names
 from runtime.core.record import Origin
-from runtime.core.study import Lowpass, Signals, study_from_mapping
-from runtime.reading.location import located, study_text
+from runtime.core.study import Lowpass, Signals
+from runtime.study import located, study_from_mapping, study_text
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 STUDY = study_from_mapping(

@@ -15,10 +15,11 @@ from runtime.compose import estimate_of, observe
 from runtime.core.errors import SettingsError
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.model import load_model
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.robust import slope, weight
+from runtime.study import study_from_mapping
 
 HUBER = EstimateSettings(method="irls")
 TUKEY = EstimateSettings(method="irls", options={"loss": "tukey"})

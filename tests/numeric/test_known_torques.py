@@ -12,7 +12,7 @@ import scipy.io
 
 from runtime import Record, read_record
 from runtime.core.errors import InputError
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 
 T = np.arange(40) / 100
 Q = np.stack([np.sin(T), np.cos(3 * T)], axis=1)

@@ -13,9 +13,10 @@ import runtime
 import symgen
 from runtime.compose import estimate_of
 from runtime.core.errors import InputError
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
 from runtime.core.validation import prediction_errors
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 pytestmark = pytest.mark.skipif(
     not (kr300.DATA / "A.mat").is_file(), reason=f"no record in {kr300.DATA}"

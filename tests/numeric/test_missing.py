@@ -24,10 +24,10 @@ from runtime.core.missing import Missing, bridged
 from runtime.core.model import drives_of
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Lowpass, Rows, Signals, Study
+from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.counts.reader import encoder_position
-from runtime.reading.records import read_record
 from runtime.reading.settings import RecordSettings
+from runtime.study import Rows, Study, read_record
 from symgen.cli.main import app
 
 GENERATED = Path(__file__).parents[2] / "generated"

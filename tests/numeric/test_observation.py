@@ -26,9 +26,10 @@ from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.regressor import Columns, distinct_entries
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States, decimated, decimation_plan, filtered_states
-from runtime.core.study import Decimate, EssentialSettings, EstimateSettings, study_from_mapping
+from runtime.core.study import Decimate, EssentialSettings, EstimateSettings
 from runtime.core.uncertainty import block_bootstrap
 from runtime.core.validation import weak_directions
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit import spec
 from symgen.regroup.regrouping import regroup

@@ -13,7 +13,7 @@ from campaign import campaign
 import runtime
 import symgen
 from runtime.core.model import joint_units
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 
 ARM = """
 symgen: 1

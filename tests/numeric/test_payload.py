@@ -11,10 +11,10 @@ from runtime import InputError, Record, observe
 from runtime.compose import problem
 from runtime.core.errors import SettingsError
 from runtime.core.model import load_model
-from runtime.core.study import PayloadSettings, study_from_mapping
 from runtime.payload.gains import drive_gains
 from runtime.payload.load import payload
 from runtime.physical.inertia import INERTIAL, physical_model
+from runtime.study import PayloadSettings, study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 RATE = 500.0

@@ -19,13 +19,13 @@ from runtime.compose import estimate_of
 from runtime.core.limits import LIMIT
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.states import lowpassed
-from runtime.core.study import Rows, Study, study_from_mapping
 from runtime.physical.inertia import physical_model
 from runtime.physical.semidefinite import LinearBounds, closest, everything
 from runtime.plausible.bodies import Bodies, Grams, least_squares, physical_fit
 from runtime.plausible.motion import excited, low_speed_of_rest, standing_share, unexcited_shares
 from runtime.plausible.samples import Samples, excerpts, samples_of
 from runtime.reading.records import read_records
+from runtime.study import Rows, Study, study_from_mapping
 from symgen.description.yaml import parse_robot
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"

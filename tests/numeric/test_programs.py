@@ -5,10 +5,11 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.study import EssentialSettings, study_from_mapping
+from runtime.core.study import EssentialSettings
 from runtime.physical.semidefinite import Program
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 
 @pytest.fixture

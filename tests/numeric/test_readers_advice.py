@@ -14,8 +14,9 @@ from runtime.advisor.readers import curves
 from runtime.compose import advise, cestac, problem
 from runtime.core.limits import LIMIT
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import CestacSettings, Rows, Study
+from runtime.core.study import CestacSettings
 from runtime.reporting.sections import part_section
+from runtime.study import Rows, Study
 
 NAMES = ("ZZ1R", "ZZ2", "FV1")
 STUDY = Study(

@@ -17,8 +17,9 @@ from runtime import Record, read_record
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.record import Origin
-from runtime.core.study import RecordSettings, study_from_mapping
 from runtime.reading.records import read_records
+from runtime.reading.settings import RecordSettings
+from runtime.study import study_from_mapping
 
 N, RATE = 60, 200.0
 T = np.arange(N) / RATE

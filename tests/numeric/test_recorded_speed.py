@@ -16,7 +16,8 @@ from runtime import identify
 from runtime.compose import observe, plausibility
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import Lowpass, Signals, Study
+from runtime.core.study import Lowpass, Signals
+from runtime.study import Study
 
 RATE, N = 500.0, 8000
 STEP, NOISE = 2e-3, 4e-3  # rad, rad/s

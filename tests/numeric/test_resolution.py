@@ -26,10 +26,11 @@ from runtime.core.rows.prepared import decimated_torque
 from runtime.core.rows.switches import Switch, switches
 from runtime.core.signals.filters import decimated, filtered_states
 from runtime.core.signals.noise_gain import bandwidth
-from runtime.core.study import Decimate, Lowpass, Signals, study_from_mapping
+from runtime.core.study import Decimate, Lowpass, Signals
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
 from runtime.reporting.sections import part_section
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_files
 

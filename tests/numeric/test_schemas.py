@@ -10,9 +10,9 @@ import pytest
 
 import runtime
 from runtime.core.least_squares.estimate import Status
-from runtime.core.study import Study, study_from_mapping, to_mapping
-from runtime.estimate_files import json_schema
+from runtime.core.settings import to_mapping
 from runtime.reading.datasets import DATASETS, dataset_study
+from runtime.study import Study, json_schema, study_from_mapping
 
 ROOM = Path(runtime.__file__).parent
 

@@ -21,7 +21,8 @@ from runtime.core.record import Record
 from runtime.core.rows.prepared import decimated_torque, observation_from_states
 from runtime.core.rows.selection import select_rows
 from runtime.core.signals.filters import States
-from runtime.core.study import EstimateSettings, study_from_mapping
+from runtime.core.study import EstimateSettings
+from runtime.study import study_from_mapping
 
 RATE, N = 500.0, 4000
 NOISE = np.array([3.0, 3.0, 2.0, 0.8, 0.8, 0.5])  # N m, of each joint

@@ -13,10 +13,10 @@ from campaign import campaign
 from scipy.integrate import solve_ivp
 
 from runtime import InputError, load_model
+from runtime.compose import simulate as simulate_study
 from runtime.core.errors import SettingsError
 from runtime.core.settings import structure
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import study_from_mapping
 from runtime.loop.control_law import control_law, discrete_poles, parameters_of
 from runtime.loop.controller_tick import plant_function
 from runtime.loop.dry_friction import dry_friction
@@ -24,10 +24,10 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.result import SimulationError
 from runtime.loop.settings import Controller
 from runtime.loop.simulation import Simulator
-from runtime.loop.simulation import simulate as simulate_study
 from runtime.loop.stick_slip import friction_function
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 GTAU = 35.15065188248547  # N/V
@@ -323,8 +323,8 @@ def test_motor_encoder_saturation_and_seeds(tx40, truth):
 
 
 def test_record_and_csv_carry_the_reference(tx40, truth, tmp_path):
-    from runtime.core.study import RecordSettings
-    from runtime.reading.records import read_record
+    from runtime.reading.settings import RecordSettings
+    from runtime.study import read_record
 
     settings = controller(record_every=5, reference={"points": {"duration": 0.4}})
     reference = reference_of(settings, tx40)

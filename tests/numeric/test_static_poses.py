@@ -10,7 +10,7 @@ import runtime
 import symgen
 from oracles.pinocchio_model import PinocchioModel
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 from symgen.cli.main import app
 from symgen.description import load_robot
 

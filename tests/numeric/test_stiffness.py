@@ -14,7 +14,7 @@ from oracles.pinocchio_model import PinocchioModel
 from runtime import Record, observe
 from runtime.compose import estimate_of
 from runtime.core.model import load_model
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module
 

@@ -13,18 +13,10 @@ from runtime.core import gone
 from runtime.core.arithmetic import number
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.gone import WENT
-from runtime.core.study import (
-    CestacSettings,
-    Lowpass,
-    Rows,
-    Signals,
-    Study,
-    study_from_mapping,
-    to_mapping,
-)
+from runtime.core.settings import to_mapping
+from runtime.core.study import CestacSettings, Lowpass, Signals
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.reading.names import study_of
-from runtime.study_files import load_study, study_from_text
+from runtime.study import Rows, Study, load_study, study_from_mapping, study_from_text, study_of
 
 DESIGN = """
 symgen: 1

@@ -16,9 +16,10 @@ from runtime import estimate, observe, read_record, resample
 from runtime.core.clock import remedy_text, time_stamps
 from runtime.core.errors import InputError
 from runtime.core.record import Record
-from runtime.core.study import Resample, study_from_mapping
 from runtime.reading.records import read_records
 from runtime.reading.resampling import resampled
+from runtime.reading.settings import Resample
+from runtime.study import study_from_mapping
 
 RATE = 500.0
 T = np.arange(2000) / RATE

@@ -16,8 +16,9 @@ from scipy.integrate import solve_ivp
 
 from runtime import InputError, identify
 from runtime.core.errors import SettingsError
-from runtime.core.study import study_from_mapping, to_mapping
+from runtime.core.settings import to_mapping
 from runtime.reading.records import read_records
+from runtime.study import study_from_mapping
 
 RATE, N = 200.0, 3000
 KP, KD = np.array([400.0, 120.0]), np.array([30.0, 8.0])

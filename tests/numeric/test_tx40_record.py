@@ -9,8 +9,8 @@ import pytest
 
 from runtime import read_record
 from runtime.core.signals.filters import filtered_states
-from runtime.core.study import study_from_mapping
 from runtime.reading.datasets import dataset_study
+from runtime.study import study_from_mapping
 
 RATIO = np.diag([32.0, 32, 45, -48, 45, 32])
 RATIO[5, 4] = 32  # motor 6 turns with joint 5 as well

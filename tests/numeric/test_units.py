@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from runtime import read_record
 from runtime.core.errors import InputError, SettingsError
-from runtime.core.study import study_from_mapping
 from runtime.reading.units import GRAMMAR, SI, TABLE, position_unit, speed, time_unit, torque_unit
+from runtime.study import study_from_mapping
 
 OURS = {"counts", "count", "°", "Nm", "mNm", "rev"}
 
@@ -166,7 +166,7 @@ def test_degrees_and_milliampere(tmp_path):
 
 def test_pint_is_loaded_only_where_it_is_needed():
     code = (
-        "import sys\nfrom runtime.core.study import study_from_mapping\n"
+        "import sys\nfrom runtime.study import study_from_mapping\n"
         "study_from_mapping({'record': {'units': {'q': 'deg', 'tau': 'mA', 't': 'ms'}}})\n"
         "assert 'pint' not in sys.modules\n"
         "study_from_mapping({'record': {'units': {'q': 'mrad'}}})\n"

@@ -15,7 +15,7 @@ import symgen
 from oracles.applying import motion
 from oracles.pinocchio_model import PinocchioModel
 from runtime.core.errors import InputError
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 from runtime.wrench import WrenchModel
 
 OPTION = ("base_wrench_regressor",)

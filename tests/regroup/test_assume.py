@@ -11,7 +11,7 @@ import runtime
 import symgen
 from oracles.random_robots import random_robot
 from runtime.assumptions import assumptions_asked
-from runtime.core.study import study_from_mapping
+from runtime.study import study_from_mapping
 from symgen.certify.modules import certify
 from symgen.description.yaml import parse_robot, write_yaml
 from symgen.errors import DescriptionError

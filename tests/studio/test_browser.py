@@ -20,7 +20,7 @@ import pytest
 from browser import WEAK_CONTRAST, Browser, started_browser
 
 import symgen
-from runtime.yaml_text import yaml_text
+from runtime.documents.yaml_text import yaml_text
 from symgen.studio import table
 from symgen.studio.folder import WorkFolder
 

@@ -48,7 +48,8 @@ from runtime.core.problem import Problem
 from runtime.core.provenance import processor
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import common_drives
-from runtime.core.study import CestacSettings, Study, to_mapping
+from runtime.core.settings import to_mapping
+from runtime.core.study import CestacSettings, Study
 from runtime.loop.cestac import Loop, loop_of, without_loop_options
 from runtime.parallel.checkpoint import Checkpoint
 

@@ -38,6 +38,7 @@ from scipy.special import stdtrit
 from runtime.core.cestac.runs import Level, Runs
 from runtime.core.documents import Result, json_text
 from runtime.core.errors import InputError
+from runtime.core.json_results import Vector
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
@@ -56,7 +57,6 @@ from runtime.core.part import (
 )
 from runtime.core.rows.observation import Observation
 from runtime.core.table import Table, csv_text, notebook
-from runtime.json_files import Vector
 
 Array = np.ndarray
 

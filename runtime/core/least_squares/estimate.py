@@ -17,16 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from runtime.core.documents import json_text
+from runtime.core.json_results import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text
+from runtime.core.latex import parameter_table
 from runtime.core.markup import number
 from runtime.core.table import Table, notebook
-from runtime.json_files import InfIfNull, Matrix, NanIfNull, Vector, Whole, from_text, read_text
-from runtime.reporting.latex import parameter_table
 
 Array = np.ndarray
 
@@ -278,10 +277,3 @@ class Estimate:
         return parameter_table(
             shown, self.X[place], self.relative_sigma[place], self.units, blocks=blocks
         )
-
-
-def load_estimate(path: Path | str) -> Estimate:
-    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as
-    `Estimate.from_json`.
-    """
-    return from_text(Estimate, read_text(path), SCHEMA, str(path))

@@ -24,8 +24,8 @@ from runtime.core.least_squares.solution import Solution, solve
 from runtime.core.model import GeneratedModel, joint_labels
 from runtime.core.rows.factor import Array, Factor
 from runtime.core.rows.observation import Observation
-from runtime.core.settings import Count, Positive, Settings
-from runtime.core.study import EstimateSettings, to_mapping
+from runtime.core.settings import Count, Positive, Settings, to_mapping
+from runtime.core.study import EstimateSettings
 
 
 class LinearOptions(Settings):

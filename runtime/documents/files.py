@@ -1,25 +1,50 @@
-"""Study files: YAML 1.2, read to plain values with the line of every key, so that an error names
-its line.
-"""
+"""Files of text: whether there is one, its text, and settings in YAML with the line of every key."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 from typing import TypeVar
 
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.limits import LIMIT
 from runtime.core.settings import structure
-from runtime.core.study import Study
-from runtime.reading.files import require_file
-from runtime.yaml_text import yaml_values
+from runtime.documents.yaml_text import yaml_values
 
 T = TypeVar("T")
 
+LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 million
 
-def load_study(path: str | Path) -> Study:
-    """The Study of a study file; raises SettingsError with file, line and key."""
-    return study_from_text(text_of(path), file=Path(path).name)
+
+def require_file(path: Path) -> int:
+    """Bytes of a file on disk; InputError for folders, and for pipes and devices, which may never answer or never end."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as e:
+        raise InputError(
+            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+        ) from e
+    if not S_ISREG(status.st_mode):
+        what = "a folder" if S_ISDIR(status.st_mode) else "a pipe or a device"
+        raise InputError(
+            f"cannot be read: {what}; expected a file, copy its content into one", file=str(path)
+        )
+    return status.st_size
+
+
+def result_text(path: str | Path) -> str:
+    """The text of a file with a JSON result."""
+    path = Path(path)
+    try:
+        if require_file(path) > LARGEST:
+            raise InputError(
+                f"more than {LARGEST} bytes; expected a result of symgen", file=str(path)
+            )
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(
+            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
+        ) from e
 
 
 def text_of(path: str | Path) -> str:
@@ -38,11 +63,6 @@ def text_of(path: str | Path) -> str:
         ) from e
     except OSError as e:
         raise InputError(f"cannot be read: {e.strerror or e}", file=str(path)) from e
-
-
-def study_from_text(text: str, *, file: str = "study") -> Study:
-    """The Study of the text of a study file."""
-    return settings_from_text(Study, text, file=file)
 
 
 def settings_from_text(kind: type[T], text: str, *, file: str) -> T:

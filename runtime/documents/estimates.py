@@ -1,4 +1,4 @@
-"""Layouts of estimate.json and cestac.json as types, the JSON Schemas of these and of study files, and the estimate in a file that a robot file or a program is given.
+"""Layouts of estimate.json and cestac.json as types, their JSON Schemas, and the estimate in a file that a robot file or a program is given.
 
 SI units, rad, joint side. Equation numbers are those of the chapter. A number that does not exist is null. Readers leave out keys that they do not know; keys may be added under the same version.
 """
@@ -18,12 +18,12 @@ from runtime.core.cestac.result import SCHEMA as CESTAC
 from runtime.core.cestac.result import LevelResult, Verdict
 from runtime.core.cestac.runs import Run
 from runtime.core.errors import InputError
+from runtime.core.json_results import NanIfNull, Vector, Whole, from_text
 from runtime.core.least_squares.estimate import SCHEMA as ESTIMATE
-from runtime.core.least_squares.estimate import Estimate, JointFit, load_estimate
+from runtime.core.least_squares.estimate import Estimate, JointFit
 from runtime.core.parameter_sets import SetName, whole_set
-from runtime.core.study import Study
 from runtime.core.validation import RecordError, WeakDirections
-from runtime.json_files import NanIfNull, Vector, Whole, from_text, read_text
+from runtime.documents.files import result_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,6 +223,13 @@ class CestacDocument:
     notes: tuple[str, ...] = ()
 
 
+def load_estimate(path: Path | str) -> Estimate:
+    """The Estimate in a file that `Estimate.to_json` or `symgen identify -o` wrote; InputError as
+    `Estimate.from_json`.
+    """
+    return from_text(Estimate, result_text(path), ESTIMATE, str(path))
+
+
 def load_whole_estimate(path: Path | str) -> Estimate:
     """The estimate of all base parameters in estimate.json that a robot file or a program is given:
     of the set that stands for the robot, or where that is the essential one, of the physical
@@ -230,7 +237,7 @@ def load_whole_estimate(path: Path | str) -> Estimate:
     details.standard are those of that set; the others, the covariance among them, those of
     least squares. InputError as `load_estimate`.
     """
-    fit, text = load_estimate(path), read_text(path)
+    fit, text = load_estimate(path), result_text(path)
     if not json.loads(text).get("sets"):
         return fit
     document = from_text(SetsDocument, text, ESTIMATE, str(path))
@@ -262,10 +269,8 @@ class ResultSchema(GenerateJsonSchema):
         return {"type": ["number", "null"]}
 
 
-def json_schema(of: str) -> dict[str, Any]:
-    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
-    if of == "study":
-        return TypeAdapter(Study).json_schema()
+def result_schema(of: str) -> dict[str, Any]:
+    """JSON Schema of estimate.json ("estimate") or of cestac.json ("cestac")."""
     kind, schema = {
         "estimate": (IdentificationDocument, ESTIMATE),
         "cestac": (CestacDocument, CESTAC),

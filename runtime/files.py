@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
 from runtime.core.part import Part
 from runtime.core.result import Identification
-from runtime.core.study import RecordSettings, Study
+from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.poses import StaticPoses
 from runtime.excitation.result import Excitation
 from runtime.loop.result import Simulation, csv_text
-from runtime.reading.location import study_text
+from runtime.reading.settings import RecordSettings
 from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, estimate_arrays
 from runtime.reporting.motions import excitation_page, simulation_figure
@@ -31,8 +31,8 @@ from runtime.reporting.page import Page, Section, render
 from runtime.reporting.pages import advice_page, identification_page, resolution_page
 from runtime.reporting.parameters import parameters_csv
 from runtime.reporting.result_files import Results, write_all
+from runtime.study import Study, study_text
 from runtime.treatments import Ranking
-from runtime.yaml_text import yaml_text
 
 Files: TypeAlias = dict[str, str | bytes]
 
@@ -92,7 +92,10 @@ def identification_files(
     """Files of an identification; title, warning, verdict, sections : as for
     `identification_page`.
     """
-    unit, fit, study = result.torque_unit, result.model_estimate, study_text(result.study, folder)
+    unit = result.torque_unit
+    fit = result.model_estimate
+    settings: Any = result.study
+    study = study_text(settings, folder)
     page = identification_page(
         result, study, title=title, warning=warning, verdict=verdict, sections=sections
     )

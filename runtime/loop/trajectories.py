@@ -13,7 +13,7 @@ import numpy as np
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.limits import LIMIT
 from runtime.core.settings import require, structure, to_mapping
-from runtime.excitation.families import AnyFamily, Array, Family
+from runtime.loop.families import AnyFamily, Array, Family
 
 BLOCK = 2**22  # times at once, by coefficients: a family holds a row of them for each time
 

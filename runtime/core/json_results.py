@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import fields
-from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar
 
 import numpy as np
@@ -17,11 +16,8 @@ from pydantic_core import core_schema
 
 from runtime.core.errors import InputError
 from runtime.core.settings_errors import settings_error
-from runtime.reading.files import require_file
 
 T = TypeVar("T")
-
-LARGEST = 200_000_000  # bytes of a JSON result; that of 1000 parameters has 30 million
 
 
 class Numbers:
@@ -62,21 +58,6 @@ Matrix = Annotated[np.ndarray, Numbers(list[list[Number]])]
 Whole = Annotated[
     int, Field(strict=True, ge=0, lt=2**63), WithJsonSchema({"type": "integer", "minimum": 0})
 ]
-
-
-def read_text(path: str | Path) -> str:
-    """The text of a file with a JSON result."""
-    path = Path(path)
-    try:
-        if require_file(path) > LARGEST:
-            raise InputError(
-                f"more than {LARGEST} bytes; expected a result of symgen", file=str(path)
-            )
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(
-            f"cannot be read: {getattr(e, 'strerror', None) or e}", file=str(path)
-        ) from e
 
 
 def from_text(kind: type[T], text: str, schema: str, file: str) -> T:

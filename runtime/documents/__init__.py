@@ -1,0 +1,1 @@
+"""Texts of files: studies and estimates read and written, YAML, within limits."""

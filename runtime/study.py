@@ -1,0 +1,287 @@
+"""Everything about an experiment that is not the robot: the study file, the sections of the chapter and those of features.
+
+    study = load_study("study.yaml")
+    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 100}}})
+    study.signals.lowpass.order        # 4, the default
+
+Like `runtime.compose` this names features: a section of one is a field of Study.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, TypeAdapter
+
+from runtime.core import study as chapter
+from runtime.core.errors import InputError
+from runtime.core.model import GeneratedModel
+from runtime.core.record import Record
+from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
+from runtime.documents.estimates import result_schema
+from runtime.documents.files import settings_from_text, text_of
+from runtime.documents.yaml_text import yaml_text
+from runtime.excitation.settings import ExcitationSettings
+from runtime.loop.settings import Controller
+from runtime.payload import settings as load
+from runtime.reading.datasets import DATASETS, dataset_study
+from runtime.reading.formats import endings, is_measured
+from runtime.reading.records import read_records
+from runtime.reading.settings import Records, RecordSettings, with_law
+from runtime.reading.units import speed
+
+
+class Rows(chapter.Rows):
+    """Rows of W and Y that are used.
+
+    Attributes
+    ----------
+    low_speed : float or tuple of float, rad/s or m/s
+        Rows of joint j with |qd_j| below it are left out: sign(qd) is noise in them. A text may
+        have another unit: 2 rpm.
+    """
+
+    low_speed: Annotated[PerJoint[NotNegative], BeforeValidator(speed)] = 0.0
+
+
+class ValidateSettings(chapter.ValidateSettings):
+    """Data that the parameters are fitted on, and data that they predict.
+
+    Attributes
+    ----------
+    record : tuple of RecordSettings
+        Further records, predicted with the parameters of the study.
+    """
+
+    record: Records = ()
+
+
+class PayloadSettings(load.PayloadSettings):
+    """Records with a load fixed to a link; the records of the study are those without it.
+
+    Attributes
+    ----------
+    record : tuple of RecordSettings
+        Records with the load.
+    """
+
+    record: Records = ()
+
+
+class Recorded(Settings):
+    """What stands first in a study file.
+
+    Attributes
+    ----------
+    symgen : int
+        Version of the study file.
+    record : tuple of RecordSettings
+        One or several records of one robot.
+    """
+
+    symgen: chapter.Version = chapter.SCHEMA
+    record: Records = ()
+
+
+class Study(chapter.Study, Recorded):
+    """All settings of an experiment.
+
+    Attributes
+    ----------
+    payload : PayloadSettings or None
+        Records with a load.
+    controller : Controller or None
+        Closed loop of simulation, IV and DIDIM.
+    excitation : ExcitationSettings or None
+        Search for an exciting motion.
+    """
+
+    rows: Rows = field(default_factory=Rows)
+    validate: ValidateSettings = field(default_factory=ValidateSettings)
+    payload: PayloadSettings | None = None
+    controller: Controller | None = None
+    excitation: ExcitationSettings | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "record", with_law(self.record, self.controller))
+        for section in ("validate", "payload"):
+            given = getattr(self, section)
+            if given is not None and any(record.by_law for record in given.record):
+                own = replace(given, record=with_law(given.record, self.controller))
+                object.__setattr__(self, section, own)
+
+
+def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
+    """The Study of a mapping as read from a study file; raises SettingsError with the path of the
+    offending key.
+
+    Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
+    record).
+    """
+    return structure(Study, mapping)
+
+
+def json_schema(of: str) -> dict[str, Any]:
+    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
+    return TypeAdapter(Study).json_schema() if of == "study" else result_schema(of)
+
+
+def load_study(path: str | Path) -> Study:
+    """The Study of a study file; raises SettingsError with file, line and key."""
+    return study_from_text(text_of(path), file=Path(path).name)
+
+
+def study_from_text(text: str, *, file: str = "study") -> Study:
+    """The Study of the text of a study file."""
+    return settings_from_text(Study, text, file=file)
+
+
+def study_of(record: str | Path) -> tuple[Study, Path]:
+    """The Study that a name means, and the folder its files are relative to.
+
+    Parameters
+    ----------
+    record : str or Path
+        A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
+    """
+    path = Path(record)
+    if str(record) in DATASETS:
+        return study_from_mapping(dataset_study(str(record))), Path()
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return load_study(path), path.parent
+    if is_measured(path):
+        return Study(record=(RecordSettings(files=(path.name,)),)), path.parent
+    raise InputError(
+        f"no record {str(record)!r}; expected a dataset ({', '.join(DATASETS)}), a study file (.yaml) or a measured file ({', '.join(endings())}, the folder of a ROS 2 bag)"
+    )
+
+
+def read_record(
+    path: str | Path | RecordSettings,
+    model: GeneratedModel | None = None,
+    *,
+    folder: str | Path = ".",
+    missing: bool = False,
+) -> Record:
+    """One measured record, joint side, SI.
+
+    Parameters
+    ----------
+    path : str, Path or RecordSettings
+        A measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side), a study file, a dataset, or settings.
+    model : module, optional
+        Emitted model of the robot; needed where a side is "motor", which its drives convert, and checked for its number of joints.
+    folder : str or Path
+        Where relative file names start; of a study file, those in it start where it is.
+    missing : bool
+        Whether positions may be missing, nan or an empty field, as `signals.reader: counts` admits; a study file that names this reader says so itself.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or hold something else, and several records, or one that `resample` splits.
+    """
+    if isinstance(path, RecordSettings):
+        settings: tuple[RecordSettings, ...] = (path,)
+    else:
+        named = Path(folder) / path
+        study, folder = study_of(named if named.exists() else path)
+        settings = study.record
+        missing = missing or study.signals.admits_missing
+    records = read_records(settings, model, folder=folder, missing=missing)
+    if len(records) != 1:
+        names = ", ".join(record.name for record in records)
+        raise InputError(
+            f"{len(records)} records or pieces between gaps; read_records gives them all: {names}"
+        )
+    return records[0]
+
+
+def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
+    """The study with the remedy of each refusal in its records, and a sentence on each. Remedies are likely, by names and time stamps, not known: a person looks at them.
+
+    Raises
+    ------
+    InputError
+        A refusal that has no remedy, or whose remedy does not help.
+    """
+    sentences: list[str] = []
+    while True:
+        try:
+            read_records(study.record, model, missing=study.signals.admits_missing)
+        except InputError as e:
+            text = f"{e}; suggested: record: {' '.join(yaml_text(e.remedy or {}).split())}"
+            if not e.remedy or text in sentences:
+                raise
+            sentences.append(text)
+            mapping = to_mapping(study)
+            for record in mapping["record"]:
+                for key, value in e.remedy.items():
+                    if isinstance(value, Mapping):
+                        value = {**(record[key] or {}), **value}
+                    record[key] = value
+            study = study_from_mapping(mapping)
+        else:
+            return study, sentences
+
+
+def located(study: Study, folder: Path) -> Study:
+    """The study with every file, until now relative to `folder`, relative to the current folder."""
+    return _with_files(study, lambda file: str(folder / file))
+
+
+def study_text(study: Study, destination: Path, *, defaults: bool = True) -> str:
+    """The text of study.yaml in the folder `destination`; files relative to that folder. defaults :
+    every setting; else those that differ from their default, and the units of each record.
+    """
+    mapping = to_mapping(
+        _with_files(study, lambda file: Path(os.path.relpath(file, destination)).as_posix())
+    )
+    if not defaults:
+        mapping = {"symgen": mapping["symgen"], **_differing(mapping, to_mapping(Study()))}
+        usual = to_mapping(RecordSettings())
+        mapping["record"] = [
+            _differing(record, usual) | {"units": record["units"]} for record in mapping["record"]
+        ]
+    return yaml_text(mapping)
+
+
+def _differing(mapping: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries that are not the usual ones, sections by entry."""
+    return {
+        key: _differing(value, usual[key])
+        if isinstance(value, Mapping) and isinstance(usual.get(key), Mapping)
+        else value
+        for key, value in mapping.items()
+        if value != usual.get(key)
+    }
+
+
+def _with_files(study: Study, change: Callable[[str], str]) -> Study:
+    """The study with `change` of every file name; those of datasets stay."""
+
+    def changed(records: tuple[RecordSettings, ...]) -> tuple[RecordSettings, ...]:
+        return tuple(
+            record
+            if record.dataset is not None
+            else replace(record, files=tuple(map(change, record.files)))
+            for record in records
+        )
+
+    study = replace(
+        study,
+        record=changed(study.record),
+        validate=replace(study.validate, record=changed(study.validate.record)),
+    )
+    if study.payload is not None:
+        study = replace(study, payload=replace(study.payload, record=changed(study.payload.record)))
+    if study.controller is not None and study.controller.reference.file is not None:
+        reference = replace(
+            study.controller.reference, file=change(study.controller.reference.file)
+        )
+        study = replace(study, controller=replace(study.controller, reference=reference))
+    return study
