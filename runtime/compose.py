@@ -388,13 +388,14 @@ def compare(
         A candidate without validation records, or with others than the first; none that can be identified.
     """
     from runtime import treatments as comparing
+    from runtime.plausible.motion import speed_of_rest
 
     if isinstance(candidates, Mapping):
         problems = {
             name: prepared(_candidate(model, one), STEPS) for name, one in candidates.items()
         }
     else:
-        problems = comparing.treatments(_candidate(model, candidates), STEPS)
+        problems = comparing.treatments(_candidate(model, candidates), STEPS, speed_of_rest)
     judged = [] if variants is None else [partial(plausibility_of, variants=variants)]
     return comparing.compare(problems, extras({}), judged)
 

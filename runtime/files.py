@@ -28,7 +28,7 @@ from runtime.reporting import figures as plots
 from runtime.reporting.arrays import array_files, estimate_arrays
 from runtime.reporting.motions import excitation_page, simulation_figure
 from runtime.reporting.page import Page, Section, render
-from runtime.reporting.pages import advice_page, identification_page, resolution_page
+from runtime.reporting.pages import identification_page, part_page, resolution_page
 from runtime.reporting.parameters import parameters_csv
 from runtime.reporting.result_files import Results, write_all
 from runtime.study import Study, study_text
@@ -144,7 +144,9 @@ def _(result: Cestac, folder: Path, study: Study) -> Files:
 @files_of.register
 def _(result: Advice, folder: Path, study: Study) -> Files:
     text = study_text(study, folder)
-    return page_files(advice_page(result, text)) | {
+    subject = "encoder resolution advised on"
+    page = part_page(result, subject, result.verdict, result.provenance, text)
+    return page_files(page) | {
         "study.yaml": text,
         **part_files(result),
     }

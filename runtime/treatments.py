@@ -19,7 +19,7 @@ validation records, which are then no unseen data for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,8 +36,6 @@ from runtime.core.record import Record
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import stacked
 from runtime.core.table import Table
-from runtime.plausible.motion import low_speed_of_rest
-from runtime.plausible.samples import samples_of
 
 STATED = "as stated"
 
@@ -196,11 +194,18 @@ def compare(
     )
 
 
-def treatments(problem: Problem, steps: Sequence[Step]) -> dict[str, Problem]:
-    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps."""
+def treatments(
+    problem: Problem,
+    steps: Sequence[Step],
+    speed_of_rest: Callable[[Problem], float | tuple[float, ...] | None],
+) -> dict[str, Problem]:
+    """A problem as stated, without the rows of joints that stand, and with its known torques left out, as far as these differ; each after all steps.
+
+    speed_of_rest : rows.low_speed of a prepared problem that leaves out the rows of joints that stand; None where few do.
+    """
     stated = prepared(problem, steps)
     found = {STATED: stated}
-    low = low_speed_of_rest(samples_of(stated.prepared, stated.settings), stated.settings)
+    low = speed_of_rest(stated)
     if low is not None:
         settings = problem.settings
         settings = replace(settings, rows=replace(settings.rows, low_speed=low))

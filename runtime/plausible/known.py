@@ -166,7 +166,7 @@ class TorqueUnit(Part):
 
 def torque_unit(result: Identification) -> TorqueUnit | None:
     """Whether the unit of the torques is doubtful; None where it is not."""
-    by_law = any(record.by_law for record in result.study.record)
+    by_law = any(record.origin.by_law for record in result.records)
     doubt = torque_unit_doubt(result.model, result.observation, by_law)
     return TorqueUnit(f"{doubt}.") if doubt else None
 

@@ -22,14 +22,15 @@ from runtime.core.errors import InputError
 from runtime.core.estimation import estimate_of
 from runtime.core.least_squares.method import LINEAR
 from runtime.core.limits import LIMIT
+from runtime.core.problem import Problem
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.predicted import Weights, kept_correlation
 from runtime.core.rows.prepared import stacked
 from runtime.core.rows.selection import per_joint
+from runtime.core.signals.velocities import agreement
 from runtime.core.study import EstimateSettings, Signals, Study
 from runtime.plausible.case import Case
-from runtime.plausible.samples import Samples
-from runtime.speeds import agreement
+from runtime.plausible.samples import Samples, samples_of
 
 Array = np.ndarray
 
@@ -89,6 +90,11 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
         for v, x in zip(np.where(samples.still(), 0.0, samples.standing()), low, strict=True)
     )
     return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
+
+
+def speed_of_rest(problem: Problem) -> float | tuple[float, ...] | None:
+    """`low_speed_of_rest` of the records of a problem."""
+    return low_speed_of_rest(samples_of(problem.prepared, problem.settings), problem.settings)
 
 
 def _rounded_up(x: float) -> float:

@@ -4,11 +4,12 @@ and provenance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from runtime.advisor.advice import Advice
 from runtime.core.cestac.result import Cestac
 from runtime.core.checklist import Checklist, rounded
+from runtime.core.part import Part
 from runtime.core.result import Identification
 from runtime.core.table import Table
 from runtime.reporting.page import Number, Page, Section, state_mark
@@ -78,20 +79,21 @@ def identification_page(
 def resolution_page(result: Cestac, study: str) -> Page:
     """The page of a resolution study; study : text of study.yaml."""
     return Page(
-        title=f"{_robot(result)}: encoder resolution on {_records(result)}",
+        title=f"{_robot(result.provenance)}: encoder resolution on {_records(result.provenance)}",
         verdict=result.message,
         sections=[resolution_section(result), settings_section(study)],
         numbers=level_numbers(result),
     )
 
 
-def advice_page(advice: Advice, study: str) -> Page:
-    """The page of an advice; study : text of study.yaml."""
-    title = f"{_robot(advice)}: encoder resolution advised on {_records(advice)}"
+def part_page(
+    part: Part, subject: str, verdict: str, provenance: Mapping[str, Any], study: str
+) -> Page:
+    """The page of one part; subject : what the title says of it.   study : text of study.yaml."""
     return Page(
-        title=title,
-        verdict=advice.verdict,
-        sections=[part_section(advice), settings_section(study)],
+        title=f"{_robot(provenance)}: {subject} {_records(provenance)}",
+        verdict=verdict,
+        sections=[part_section(part), settings_section(study)],
     )
 
 
@@ -166,9 +168,9 @@ def provenance_section(result: Identification) -> Section:
     )
 
 
-def _robot(result: Cestac | Advice) -> str:
-    return str(result.provenance.get("robot", "robot"))
+def _robot(provenance: Mapping[str, Any]) -> str:
+    return str(provenance.get("robot", "robot"))
 
 
-def _records(result: Cestac | Advice) -> str:
-    return ", ".join(result.provenance.get("records", ())) or "a record"
+def _records(provenance: Mapping[str, Any]) -> str:
+    return ", ".join(provenance.get("records", ())) or "a record"

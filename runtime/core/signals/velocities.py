@@ -1,0 +1,66 @@
+"""Velocities that were recorded beside differences of the positions: how they differ on the motion itself.
+
+v = gain dq/dt - lag d2q/dt2 + rest
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime.core.limits import LIMIT
+from runtime.core.signals.cutoff import white_noise
+from runtime.core.signals.filters import filtered_states, lowpass_filtered, median_filtered
+from runtime.core.study import Signals
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedAgreement:
+    """Recorded velocities beside differences of the positions, by joint, shape (n,).
+
+    Attributes
+    ----------
+    gain : ndarray
+        Of the differences in the recorded velocity.
+    lag : ndarray, s
+        By which the recorded velocity is late.
+    share : ndarray
+        What gain and lag take, of the rms of the velocity.
+    crossing : ndarray, Hz
+        f_c by the noise of both.
+    """
+
+    gain: Array
+    lag: Array
+    share: Array
+    crossing: Array
+
+    @property
+    def agrees(self) -> Array:
+        """Joints whose recorded velocity is used, bool, shape (n,)."""
+        return np.asarray(self.share <= LIMIT.SPEED_DISAGREES)
+
+
+def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreement:
+    """Of positions q and velocities v, shape (N, n), with the low-pass of the study."""
+    states = filtered_states(q, rate, signals)
+    v_f, low = median_filtered(v, signals.median), signals.lowpass
+    if low is not None:
+        for _ in {*low.on}:
+            v_f = lowpass_filtered(v_f, rate, low)
+    inner = slice(len(q) // 20, len(q) - len(q) // 20)
+    found = np.array(
+        [
+            np.linalg.lstsq(np.column_stack([s, -a]), y, rcond=None)[0]
+            for s, a, y in zip(states.qd[inner].T, states.qdd[inner].T, v_f[inner].T, strict=True)
+        ]
+    )
+    gain, lag = found.T
+    speed, rise = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (states.qd, states.qdd))
+    share = np.hypot(gain - 1, lag * rise / np.where(speed > 0, speed, 1.0))
+    noise_q, noise_v = (np.sqrt(white_noise(x, rate, signals.median)) for x in (q, v))
+    crossing = noise_v / (2 * np.pi * np.where(noise_q > 0, noise_q, np.inf))
+    return SpeedAgreement(gain, lag, np.where(speed > 0, share, np.inf), crossing)
