@@ -47,6 +47,7 @@ from runtime.core.drives import Drives
 from runtime.core.essential import essential_of
 from runtime.core.model import GeneratedModel
 from runtime.core.signals.filters import filtered_states
+from runtime.counts.own_encoder import own_encoder
 from runtime.parallel.processes import processes
 from runtime.reading.datasets import dataset_study
 from runtime.reading.records import read_records
@@ -63,7 +64,7 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
     return Task(
-        (prepared_record(problem(model, record, study).prepared[0], study),),
+        (prepared_record(problem(model, record, study).prepared[0], study, own_encoder),),
         model,
         names,
         replace(study.estimate, columns="all"),

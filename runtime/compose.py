@@ -39,6 +39,7 @@ from runtime.core.rows.observation import Observation
 from runtime.core.signals.states import Reader, lowpassed
 from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
+from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted
 from runtime.elastic import elastic_gears
 from runtime.expected import ExpectedError
@@ -47,6 +48,7 @@ from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
 from runtime.link_side import torques_of_links
 from runtime.loop import didim, iv
+from runtime.loop.cestac import loop_of
 from runtime.loop.closed_loop import observed_loop
 from runtime.loop.fixed_point import FixedPointOptions
 from runtime.loop.simulated_motion import beside_record
@@ -124,7 +126,11 @@ EXTRAS: list[Extra] = [
     OnRequest("friction", "friction", friction_of_joints),
     OnRequest("physical", "physical consistency", consistency, as_fitted),
     OnRequest("advice", "resolution advice", advice_of, no_advice),
-    OnRequest("resolution", "resolution study", resolution_of),
+    OnRequest(
+        "resolution",
+        "resolution study",
+        partial(resolution_of, own_encoder=own_encoder, loop_of=loop_of),
+    ),
 ]
 
 Records = Record | Sequence[Record]
@@ -419,7 +425,8 @@ def cestac(
 
     return resolution.cestac(
         problem(model, records, study, simulator=simulator),
-        simulator=simulator,
+        own_encoder=own_encoder,
+        loop_of=partial(loop_of, simulator=simulator),
         map=alone_each(map),
         **options,
     )

@@ -66,9 +66,6 @@ EDGES = {  # of runtime: a feature imports core and itself; what else it uses, a
         "controller": "the law completes a record that logs no torque",
     },
 }
-MENDING: dict[str, set[str]] = {  # edges that are to go
-    "core": {"counts", "loop", "parallel"},
-}
 ONLY_IN = {  # library: files and folders that may import it
     "jinja2": (
         "symgen/emit/render.py",
@@ -189,7 +186,7 @@ def test_a_feature_of_the_runtime_imports_the_core_and_itself() -> None:
     wrong = set()
     for name in (n for n in MODULES if n.partition(".")[0] == "runtime" and feature(n)):
         own = feature(name)
-        allowed = {"core", own, *EDGES.get(own, ()), *MENDING.get(own, ())}
+        allowed = {"core", own, *EDGES.get(own, ())}
         users = {m for m in imports(name) if m.partition(".")[0] == "runtime"}
         wrong |= {f"{name} -> {m}" for m in users if feature(m) not in allowed}
     assert wrong == set()

@@ -38,6 +38,7 @@ from runtime.core.rows.prepared import observation_of
 from runtime.core.rows.selection import certain_rows
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
 from runtime.core.signals.states import Reader, lowpassed
+from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted as counted_states
 from runtime.counts.reader import encoder_position
 from runtime.counts.reading import Starts, read_counts
@@ -104,7 +105,7 @@ class CoarseEncoders:
         readings = problem.changed(settings=study, reader=STATES[reader]).prepared
         for own in readings:
             require_positions(own.record.missing, "advice on encoders", own.record.file)
-            part = prepared_record(own, study, drives)
+            part = prepared_record(own, study, own_encoder, drives)
             read = part.states or filtered_states(part.q, part.rate, part.selection.signals)
             states = replace(read, errors=None, channels=part.channels)
             q = encoder_position(states.q, side)

@@ -48,6 +48,11 @@ class OwnEncoder:
     reading: Reading | None
     drives: Drives | None
 
+    @property
+    def read(self) -> bool:
+        """Whether its counts have been read."""
+        return self.reading is not None
+
     def positions(self, q: Array, delta: float, rng: np.random.Generator) -> Array:
         """Joint positions, shape (N, n), that an encoder of step delta may be judged on: q as
         measured, or a draw.

@@ -33,13 +33,13 @@ import numpy as np
 from runtime.core.cestac.rounding import stream
 from runtime.core.cestac.runs import Level
 from runtime.core.errors import SettingsError
-from runtime.core.least_squares.method import Method
 from runtime.core.model import GeneratedModel
 from runtime.core.problem import Problem
 from runtime.core.rows.observation import LoopRows, Observation
+from runtime.core.settings import to_mapping
 from runtime.core.signals.states import lowpassed
 from runtime.core.study import EstimateSettings
-from runtime.loop.closed_loop import ClosedLoop, closed_loop
+from runtime.loop.closed_loop import ClosedLoop, LoopPart, closed_loop
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference, reference_of
 
@@ -108,6 +108,48 @@ class Loop:
             return closed_loop(self.problem, self.problem.prepared, self.simulator, **self.options)
         return self._of(self.simulator, self.simulator.controller.seed, 0.0)
 
+    @property
+    def parts(self) -> tuple[LoopPart, ...]:
+        """The records of the loop."""
+        return tuple(self.closed.parts)
+
+    @property
+    def estimate(self) -> EstimateSettings:
+        """Settings of the estimate, as a method that simulates no loop takes them."""
+        settings: EstimateSettings = self.study.estimate
+        if self.problem.method.observe is not None:
+            return settings
+        options = {key: value for key, value in settings.options.items() if key not in ALIKE}
+        return replace(settings, options=options)
+
+    @property
+    def described(self) -> Mapping[str, Any]:
+        """The controller, for JSON."""
+        return {"controller": to_mapping(self.simulator.controller)}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader of a study must know beside its figures."""
+        method = self.study.estimate.method
+        notes = [self.closed.assumption] if self.closed.assumption else []
+        if self.study.cestac.place == "loop":
+            notes.append(
+                "The encoder rounds inside the simulated loop, whose parameters are the values of the robot file; every run is a record of its own, compared with the mean of as many records of the same seeds whose encoder is that of the study."
+            )
+        elif method == "didim":
+            notes.append(
+                "didim reads of the recorded positions the first alone; rounding them says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
+            )
+        elif method == "iv":
+            notes.append(
+                "The instruments of iv know no rounding of recorded positions; what an encoder in the loop does to them: place: loop."
+            )
+        return tuple(notes)
+
+    def measured(self) -> Observation:
+        """Rows of the records as measured."""
+        return self.closed.measured()
+
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
         """`observation` of the perturbed positions of every record, shape (N, n), with the loop
         attached.
@@ -123,8 +165,8 @@ class Loop:
             ),
         )
 
-    def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
-        """The loop of a record made with encoders of steps of level.delta; of those of the study at
+    def simulated(self, level: Level, draw: tuple[int, ...]) -> Observation:
+        """Rows of a record made with encoders of steps of level.delta; of those of the study at
         a level without steps.
         """
         random = stream(self.study.cestac.seed, draw[-1])
@@ -137,7 +179,7 @@ class Loop:
                 encoder_step=np.full(n, level.delta),
                 offset=law.offset + np.linalg.solve(law.R, phase),
             )
-        return self._of(simulator, int(random.integers(2**31)), level.delta)
+        return self._of(simulator, int(random.integers(2**31)), level.delta).measured()
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
         """A record made by `simulator`, under the loop without its steps; the reader of counts is
@@ -167,7 +209,7 @@ def _loop(problem: Problem) -> Loop:
     return Loop(problem, Simulator(problem.model, settings.controller))
 
 
-def loop_of(problem: Problem, simulator: Simulator | None) -> Loop | None:
+def loop_of(problem: Problem, simulator: Simulator | None = None) -> Loop | None:
     """The loop of a problem that simulates one; else None. simulator : default: that of the section `controller`."""
     study: Any = problem.settings
     if study.cestac.place != "loop" and problem.method.observe is None:
@@ -190,15 +232,3 @@ def loop_of(problem: Problem, simulator: Simulator | None) -> Loop | None:
     if simulator is not None and simulator.controller == quiet.controller:
         return Loop(quiet_problem, simulator)
     return _loop(quiet_problem)
-
-
-def without_loop_options(
-    settings: EstimateSettings, methods: Mapping[str, Method]
-) -> EstimateSettings:
-    """The settings as a method that simulates no loop takes them."""
-    if methods[settings.method].observe is not None:
-        return settings
-    return replace(
-        settings,
-        options={key: value for key, value in settings.options.items() if key not in ALIKE},
-    )

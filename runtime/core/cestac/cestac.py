@@ -26,7 +26,7 @@ from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from runtime.core.cestac.perturbed import (
 from runtime.core.cestac.result import Cestac, level_result
 from runtime.core.cestac.run import USABLE, run_block
 from runtime.core.cestac.runs import Level, Runs
+from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.estimation import estimate_of, point_estimate
 from runtime.core.least_squares.estimate import Estimate
@@ -49,12 +50,7 @@ from runtime.core.provenance import processor
 from runtime.core.result import Identification
 from runtime.core.rows.prepared import common_drives
 from runtime.core.settings import to_mapping
-from runtime.core.study import CestacSettings, Study
-from runtime.loop.cestac import Loop, loop_of, without_loop_options
-from runtime.parallel.checkpoint import Checkpoint
-
-if TYPE_CHECKING:
-    from runtime.loop.simulation import Simulator
+from runtime.core.study import CestacSettings
 
 Progress = Callable[[int, int], None]
 Key = tuple[int, int]
@@ -64,12 +60,13 @@ Map = Callable[..., Iterable[Any]]
 def cestac(
     problem: Problem,
     *,
+    own_encoder: EncoderOf,
+    loop_of: LoopOf,
     columns: Sequence[str] | None = None,
     map: Map = map,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
     provenance: Mapping[str, Any] | None = None,
-    simulator: Simulator | None = None,
 ) -> Cestac:
     """Change of the estimate under coarser encoders and torque sensors, by the settings
     study.cestac and the method of study.estimate.
@@ -78,6 +75,10 @@ def cestac(
     ----------
     problem : Problem
         Prepared.
+    own_encoder : callable
+        From a record to the encoder that made it, where the law of rounding asks for it.
+    loop_of : callable
+        From a problem to the closed loop that it simulates; None where it simulates none.
     columns : sequence of str, optional
         Essential names where they are known; default: those of the problem. Unused unless settings.cestac.columns is "essential".
     map : callable, optional
@@ -90,9 +91,6 @@ def cestac(
         same settings are not repeated.
     provenance : mapping, optional
         Further entries of Cestac.provenance; names and time stamps of the records are there.
-    simulator : Simulator, optional
-        Closed loop of iv, didim, and of place: loop; default: that of study.controller, with
-        the CasADi model beside `model`.
 
     Raises
     ------
@@ -124,15 +122,15 @@ def cestac(
             ),
             path=("cestac", "rounding"),
         )
-    loop = loop_of(problem, simulator)
+    loop = loop_of(problem)
     if settings.place == "loop":
         assert loop is not None
-        as_measured = [part.prepared for part in loop.closed.parts]
+        as_measured = [part.prepared for part in loop.parts]
     asked = to_mapping(study.estimate)
     if loop is not None:
-        study = replace(study, estimate=without_loop_options(study.estimate, problem.methods))
+        study = replace(study, estimate=loop.estimate)
     task = Task(
-        records=prepared_records(as_measured, study, drives, loop),
+        records=prepared_records(as_measured, study, own_encoder, drives, loop),
         model=model,
         names=study_columns(problem, as_measured, columns, loop),
         estimate=replace(study.estimate, columns="all"),
@@ -155,7 +153,7 @@ def cestac(
         "cestac": to_mapping(settings),
         "rate": [record.rate for record in whole],
         "torque_side": "joint" if drives is None else "motor",
-        **({} if loop is None else {"controller": to_mapping(loop.simulator.controller)}),
+        **({} if loop is None else loop.described),
     }
     runs = _all_runs(
         task,
@@ -178,32 +176,11 @@ def cestac(
         levels=tuple(level_result(level, own, measured, reference) for level, own in levels),
         settings=described,
         provenance={**reference.provenance, "seed": settings.seed, "processor": processor()},
-        notes=(*notes(study, loop), *(record.note for record in task.records if record.note)),
+        notes=(
+            *(() if loop is None else loop.notes),
+            *(record.note for record in task.records if record.note),
+        ),
     )
-
-
-def notes(study: Study, loop: Loop | None) -> tuple[str, ...]:
-    """What the reader of a study must know beside its figures."""
-    method, place = study.estimate.method, study.cestac.place
-    if loop is None:
-        return ()
-    told = [loop.closed.assumption] if loop.closed.assumption else []
-    if place == "loop":
-        told.append(
-            "The encoder rounds inside the simulated loop, whose parameters are the values of the "
-            "robot file; every run is a record of its own, compared "
-            "with the mean of as many records of the same seeds whose encoder is that of the study."
-        )
-    elif method == "didim":
-        told.append(
-            "didim reads of the recorded positions the first alone; rounding them says nothing of an encoder in the loop, whose controller answers its steps: place: loop does."
-        )
-    elif method == "iv":
-        told.append(
-            "The instruments of iv know no rounding of recorded positions; what an encoder in the "
-            "loop does to them: place: loop."
-        )
-    return tuple(told)
 
 
 def _refuse(reference: Estimate) -> None:
@@ -313,9 +290,14 @@ def _identity(
     }
 
 
-def resolution(result: Identification) -> Cestac:
-    """The study of an identification at the steps of settings.cestac, of the columns that these name."""
+def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) -> Cestac:
+    """The study of an identification at the steps of settings.cestac, of the columns that these name; own_encoder, loop_of : as of `cestac`."""
     if not result.determined:
         raise InputError("the record does not determine the parameters")
     essential = result.study.cestac.columns == "essential"
-    return cestac(result.problem, columns=result.essential.names if essential else None)
+    return cestac(
+        result.problem,
+        own_encoder=own_encoder,
+        loop_of=loop_of,
+        columns=result.essential.names if essential else None,
+    )

@@ -19,6 +19,7 @@ import numpy as np
 
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
+from runtime.core.cestac.sources import EncoderOf, Loop, LoopRecord, RecordEncoder
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
 from runtime.core.essential import essential_of
@@ -34,9 +35,6 @@ from runtime.core.rows.selection import Selection, select_rows
 from runtime.core.signals.filters import States, filtered_states
 from runtime.core.signals.states import Reader, require_motion
 from runtime.core.study import CestacSettings, EstimateSettings, Study
-from runtime.counts.own_encoder import OwnEncoder, own_encoder
-from runtime.loop.cestac import Loop
-from runtime.loop.closed_loop import LoopPart
 
 Array = np.ndarray
 
@@ -58,7 +56,7 @@ class PreparedRecord:
         Y before rows are left out.
     states : States or None
         Of the record as measured, where it can be read as counts; None: by the low-pass.
-    own : OwnEncoder or None
+    own : RecordEncoder or None
         The encoder that made it, under law phase.
     missing : Missing or None
         Samples without a position, in every run the same.
@@ -75,7 +73,7 @@ class PreparedRecord:
     selection: Selection
     torque: Array
     states: States | None = None
-    own: OwnEncoder | None = None
+    own: RecordEncoder | None = None
     missing: Missing | None = None
     channels: Mapping[str, Array] = field(default_factory=dict)
     note: str = ""
@@ -121,19 +119,22 @@ class Task:
 
 
 def prepared_record(
-    own: Prepared, study: Study, drives: Drives | None = None, part: LoopPart | None = None
+    own: Prepared,
+    study: Study,
+    own_encoder: EncoderOf,
+    drives: Drives | None = None,
+    part: LoopRecord | None = None,
 ) -> PreparedRecord:
     """Rows and torques of the measured record, through the filters of the study with the median of
     study.cestac.
 
+    own_encoder : from a record to the encoder that made it.
     part : rows of a simulated loop, chosen by its reference; default: by the measured velocities.
     """
     signals, record = replace(study.signals, median=study.cestac.median), own.record
     encoder, counts, note = own_encoder(record, study, drives), None, ""
     if signals.reader == "counts" and (
-        signals.step is not None
-        or record.missing
-        or (encoder is not None and encoder.reading is not None)
+        signals.step is not None or record.missing or (encoder is not None and encoder.read)
     ):
         known = (
             signals
@@ -175,6 +176,7 @@ def prepared_record(
 def prepared_records(
     records: Sequence[Prepared],
     study: Study,
+    own_encoder: EncoderOf,
     drives: Drives | None = None,
     loop: Loop | None = None,
 ) -> tuple[PreparedRecord, ...]:
@@ -183,9 +185,9 @@ def prepared_records(
     """
     if study.cestac.place == "loop":
         return ()
-    parts = [None] * len(records) if loop is None else list(loop.closed.parts)
+    parts = [None] * len(records) if loop is None else list(loop.parts)
     return tuple(
-        prepared_record(record, study, drives, part)
+        prepared_record(record, study, own_encoder, drives, part)
         for record, part in zip(records, parts, strict=True)
     )
 
@@ -204,7 +206,7 @@ def study_columns(
     settings = problem.settings
     require_motion(settings.signals, "the study of encoders")
     if settings.cestac.columns == "essential" and columns is None:
-        rows = stacked(problem.model, records) if loop is None else loop.closed.measured()
+        rows = stacked(problem.model, records) if loop is None else loop.measured()
         linear = linear_companion(settings.estimate)
         return essential_of(rows, settings.essential, linear).names
     return base_columns(problem.model, settings.cestac.columns, columns or (), "cestac", "columns")
@@ -265,7 +267,8 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
     """
     loop = task.loop
     if loop is not None and task.settings.place == "loop":
-        return (loop.simulated(level, draw) if draw else loop.closed).measured().columns(task.names)
+        rows = loop.simulated(level, draw) if draw else loop.measured()
+        return rows.columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
     positions = [
         run_position(task, r, level, own) for r, (own, _) in zip(task.records, keys, strict=True)
