@@ -10,7 +10,7 @@ import pytest
 from campaign import sampled, some
 from certify.printed import equations
 from certify.tables import formulas_hold
-from symbols.printed_back import error_of
+from printed_back import error_of
 
 from symgen.certify.texts import TOLERANCE
 from symgen.certify.witness import Witness, ungrouped
