@@ -51,7 +51,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 5cf2cfd2b3b20eda49990bd9cf55bddbbaf38bc32cfbc4b27ebf4afc0ab55548
+sha256 of all but these lines: 886fd2f1f7ccb28a322d4dd9298d2971d8aba3318cd833d8bbbe6f255aee4d4f
 """
 
 import numpy as np
@@ -455,9 +455,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, g=g)
     inertia = inertia_matrix(q, X, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(q: "Array", *, frame: int | None = None, g: float = 9.81) -> "Array":

@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 53ecffc7f329612bff9e82b4ee9775dd358fa29a9c1e0e337d39f5744dec5506
+sha256 of all but these lines: 9aa904ff36536d5c5c881871e0a88ecbce7cfd57d4a89f2ba159558d502962f6
 """
 
 import numpy as np
@@ -456,9 +456,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, g=g)
     inertia = inertia_matrix(q, X, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(q: "Array", *, frame: int | None = None, g: float = 9.81) -> "Array":

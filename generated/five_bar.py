@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: b230028f3abbf1685dd999f25bb42f25114f96c4742e031f29fd729a93c30c0e
+sha256 of all but these lines: f467e9e7c1c850e1a2241db532aa3bf519356fe2a26051f6a75fb9bc21a272b9
 """
 
 import numpy as np
@@ -218,7 +218,6 @@ def base_parameters(
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
-    xp = np
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _, Ia3, FV3, FS3, OFFSET3, _, _, _, _, _,
@@ -231,7 +230,7 @@ def base_parameters(
     ZZ3R = ZZ3 + Ia3 - L3**2/L4*MX4 + L3**2*M4
     MX3R = MX3 - L3/L4*MX4 + L3*M4
     ZZ4R = ZZ4 - L4*MX4
-    return (np.array if xp is np else xp.stack)([
+    return np.array([
         ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MX3R, MY3, FV3, FS3, OFFSET3,
         ZZ4R, MY4,
     ])
@@ -246,10 +245,7 @@ def regressor(
     A view on one store of shape (17, 2, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    xp, filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3,
-        L4)))
-    if xp is not np:
-        return filled
+    filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
     return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
@@ -260,16 +256,12 @@ def observation_matrix(
     """W of Y = W X + rho, shape (2*N, 17), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    xp, filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3,
-        L4)))
-    if xp is not np:
-        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 17))
+    filled = _stored(q, qd, qdd, out, (L1, L3, g), closing=((L0, L1, L2, L3, L4), (L1, L2, L3, L4)))
     return filled.reshape(17, -1).T
 
 
 def _stored(q, qd, qdd, out, constants, closing=None):
-    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 2, 17)."""
-    xp = np
+    """`out`, or a new store, filled."""
     states = _closed(_states(q, qd, qdd), closing)
     N = len(states[0])
     out = store(N) if out is None else out
@@ -277,7 +269,7 @@ def _stored(q, qd, qdd, out, constants, closing=None):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(17, 2, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return xp, _filled(_regressor_block, D, states, constants)
+    return _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
@@ -344,16 +336,11 @@ def forward_dynamics(
     L2: float = 0.36, L3: float = 0.27, L4: float = 0.34, g: float = 9.81
 ) -> "Array":
     """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
-    xp = np
-    if xp is np:
-        _states(q, qd, tau)
-        tau = np.asarray(tau, dtype=float)
-    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4,
-        g=g)
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0,
+        L1=L1, L2=L2, L3=L3, L4=L4, g=g)
     inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

@@ -74,7 +74,7 @@ with probability below 6e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: da78d0519462a0039508696046d60561c227a0bbe52f09cca0ff1af985bc5b95
+sha256 of all but these lines: cf5eb66a2e7e5e73ed3232fa76994124ee5656ea7b19edba675e643a2d25f799
 """
 
 import numpy as np
@@ -208,7 +208,6 @@ def base_parameters(
     """
     if hasattr(standard, "keys"):
         standard = [standard[name] for name in STANDARD_PARAMETERS]
-    xp = np
     (
         _, _, _, _, _, ZZ1, MX1, MY1, _, _, Ia1, FV1, FS1, OFFSET1, _, _, _, _, _, ZZ2, MX2,
         MY2, _, M2, _, _, _, _, _, ZZ3, MX3, MY3, _, _
@@ -218,7 +217,7 @@ def base_parameters(
     ZZ2R = ZZ2 + L2**2/L3*MX3
     MX2R = MX2 + L2/L3*MX3
     ZZ3R = ZZ3 - L3*MX3
-    return (np.array if xp is np else xp.stack)([
+    return np.array([
         ZZ1R, MX1R, MY1, FV1, FS1, OFFSET1, ZZ2R, MX2R, MY2, ZZ3R, MY3,
     ])
 
@@ -232,9 +231,7 @@ def regressor(
     A view on one store of shape (11, 1, N). `out` is such a store, made by `store(N)` and
     reused: a fresh one costs page faults, up to several times the arithmetic for large N.
     """
-    xp, filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
-    if xp is not np:
-        return filled
+    filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
     return filled[..., 0].T if np.ndim(q) == 1 else filled.transpose(2, 1, 0)
 
 
@@ -245,15 +242,12 @@ def observation_matrix(
     """W of Y = W X + rho, shape (1*N, 11), Fortran order, rows joint-major: the same
     store, no copy.
     """
-    xp, filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
-    if xp is not np:
-        return xp.reshape(xp.moveaxis(filled, -2, 0), (-1, 11))
+    filled = _stored(q, qd, qdd, out, (L1, g), closing=((L0, L1, L2, L3), (L1, L2, L3)))
     return filled.reshape(11, -1).T
 
 
 def _stored(q, qd, qdd, out, constants, closing=None):
-    """The package, and D: of NumPy `out`, or a new store, filled; of others (..., 1, 11)."""
-    xp = np
+    """`out`, or a new store, filled."""
     states = _closed(_states(q, qd, qdd), closing)
     N = len(states[0])
     out = store(N) if out is None else out
@@ -261,7 +255,7 @@ def _stored(q, qd, qdd, out, constants, closing=None):
         kind = f"{type(out).__name__} of shape {np.shape(out)}"
         raise ValueError(f"out: expected store({N}) of shape {(11, 1, N)}, found {kind}")
     D = out.view(np.ndarray)
-    return xp, _filled(_regressor_block, D, states, constants)
+    return _filled(_regressor_block, D, states, constants)
 
 
 def inverse_dynamics(
@@ -328,15 +322,11 @@ def forward_dynamics(
     L2: float = 0.5, L3: float = 0.4, g: float = 9.81
 ) -> "Array":
     """qdd = A(q)**-1 (tau - bias). Shape (N, 1)."""
-    xp = np
-    if xp is np:
-        _states(q, qd, tau)
-        tau = np.asarray(tau, dtype=float)
-    rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
+    _states(q, qd, tau)
+    rest = np.asarray(tau, dtype=float) - inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0,
+        L1=L1, L2=L2, L3=L3, g=g)
     inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

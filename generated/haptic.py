@@ -89,7 +89,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: c4d965e357cce497b9aa42bd80e0cdabe54375e067e7324de2a2622f6fca8b85
+sha256 of all but these lines: 201fa57b94630337ae1a3fecdeed3d41580e1f58d9f8fc4c693f5c9a88c0b65f
 """
 
 import numpy as np
@@ -594,9 +594,9 @@ def forward_dynamics(
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, D4=D4, D6=D6, c=c, gx=gx,
         gy=gy)
     inertia = inertia_matrix(q, X, D3=D3, D4=D4, D6=D6, c=c, gx=gx, gy=gy)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

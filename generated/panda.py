@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: e824f9cc732f6f6f2fcc7aa42abef31008767599695fabbb51cc0fe84242f055
+sha256 of all but these lines: 6c7eb840ac5f7407185ab603070719d472a76e73e1417ba8d53fbdefe5744965
 """
 
 import numpy as np
@@ -602,9 +602,9 @@ def forward_dynamics(
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5,
         D7=D7, g=g)
     inertia = inertia_matrix(q, X, RL1=RL1, RL3=RL3, D4=D4, RL5=RL5, D7=D7, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

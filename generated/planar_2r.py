@@ -67,7 +67,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 94d11e07986df064d5c7d085be454e2b0308f0af95d2a8f6533056c9e7713a59
+sha256 of all but these lines: 90027ea51fd2461c6656f40207a30a5bc87acb43aff4416810a9836c32bec3e1
 """
 
 import numpy as np
@@ -487,9 +487,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, g=g)
     inertia = inertia_matrix(q, X, D2=D2, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(q: "Array", *, frame: int | None = None, D2: float = 0.5, g: float = 9.81) -> "Array":

@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 668dc2926531b48a5973b4a82d53df7ef27455ec6c53418bbaed43048ae7f0b7
+sha256 of all but these lines: 1e5728b1674450aba7f9a09a780c12cd77b5d3cde871eabe2a068528f8e1e276
 """
 
 import numpy as np
@@ -587,9 +587,9 @@ def forward_dynamics(
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, RL2=RL2, D3=D3, RL3=RL3, D4=D4,
         RL4=RL4, g=g)
     inertia = inertia_matrix(q, X, RL2=RL2, D3=D3, RL3=RL3, D4=D4, RL4=RL4, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

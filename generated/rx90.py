@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 5bf87108bdda7ec2f0bd561c1b7e810a857adfbe0640f7957ecf72e1660b4cd5
+sha256 of all but these lines: f730d8236cb5018d49c4a8dd17eaf15c9502845cf3a613f40c6a6daaf2972f7e
 """
 
 import numpy as np
@@ -563,9 +563,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, RL4=RL4, g=g)
     inertia = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

@@ -73,7 +73,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 535699c9eaa4a189529021592bb815e4bb8269e782622be96f2281efed01a232
+sha256 of all but these lines: 632212721ad8c980f90d7581f7761f1206d3a1d2376763eec67442f184d586dd
 """
 
 import numpy as np
@@ -527,9 +527,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, D3=D3, g=g)
     inertia = inertia_matrix(q, X, D2=D2, D3=D3, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

@@ -88,7 +88,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d8f39dbbd306e83357f6178069610146db729010d8758b86938f76366d1a11aa
+sha256 of all but these lines: 485773b20d4c4197993baabf20aa5c1a91f195417e5bc863219eb5e7a4e976af
 """
 
 import numpy as np
@@ -613,9 +613,9 @@ def forward_dynamics(
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8,
         g=g)
     inertia = inertia_matrix(q, X, D2=D2, D3=D3, D4=D4, RL4=RL4, D8=D8, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

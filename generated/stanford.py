@@ -78,7 +78,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d04ba365b5a51b956bf049d0684938c8c8ec523336a402e433d80e63a177857d
+sha256 of all but these lines: 63ab7e26ca720dc7dec8b704a45b07f6f187d0f5a5bf97186bd449b727e30c0b
 """
 
 import numpy as np
@@ -560,9 +560,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, RL1=RL1, RL2=RL2, g=g)
     inertia = inertia_matrix(q, X, RL1=RL1, RL2=RL2, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

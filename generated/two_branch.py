@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: bc499821239a7b8ab0be97b55bcc5f76f58d6a9d7a0c86bce8ef523d243af69c
+sha256 of all but these lines: 211b83a0b090f4762cb5fcf18f87e8104f591b35b69c931b0133a1cc7683dbe5
 """
 
 import numpy as np
@@ -631,9 +631,9 @@ def forward_dynamics(
         RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
     inertia = inertia_matrix(q, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6, D7=D7,
         RL8=RL8, GX=GX, GZ=GZ)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

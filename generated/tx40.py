@@ -82,7 +82,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 2426abf0e8447932531e49c57cb7ab5dbceb504bc56b0d1481b284992e939d46
+sha256 of all but these lines: 534ccd38e69f38175c32d14fc06446a3ef29f5d05aa61a7021d34f9b9ec4eaa1
 """
 
 import numpy as np
@@ -567,9 +567,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, RL4=RL4, g=g)
     inertia = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(

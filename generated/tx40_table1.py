@@ -80,7 +80,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: d0bf308fb58ddc2664cf8d2dc64c85f13620ee91438c84a4d638097b9027245d
+sha256 of all but these lines: 62d082ef8fa018cf18bd4ed417fb9c36e3b6d4cb7fbc96fa060fd1def4db83a3
 """
 
 import numpy as np
@@ -563,9 +563,9 @@ def forward_dynamics(
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D3=D3, RL4=RL4, g=g)
     inertia = inertia_matrix(q, X, D3=D3, RL4=RL4, g=g)
-    if xp is np:
-        return np.linalg.solve(inertia, rest[..., None])[..., 0]
-    return xp.solve(inertia, rest)
+    if xp is not np:
+        return xp.solve(inertia, rest)
+    return np.linalg.solve(inertia, rest[..., None])[..., 0]
 
 
 def jacobian(
