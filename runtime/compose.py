@@ -13,18 +13,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from runtime import robust as irls
 from runtime.advisor.advice import no_advice
-from runtime.advisor.advisor import advice_of
 from runtime.agreement import agreement
 from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import estimation
 from runtime.core import identify as identification
 from runtime.core.automatic import automatic_cutoff
-from runtime.core.cestac.cestac import resolution as resolution_of
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
 from runtime.core.identify import Extra, OnRequest
@@ -43,7 +42,6 @@ from runtime.counts.own_encoder import own_encoder
 from runtime.counts.reader import counted
 from runtime.elastic import elastic_gears
 from runtime.expected import ExpectedError
-from runtime.friction.curves import friction as friction_of_joints
 from runtime.laws.scalars import fitted_scalars, scalars_of_laws
 from runtime.laws.transmitted import transmitted_torque
 from runtime.link_side import torques_of_links
@@ -57,7 +55,6 @@ from runtime.payload.study import LOADED, load_of_study, payload_study
 from runtime.physical import feasible
 from runtime.physical.consistency import as_fitted, consistency
 from runtime.plausible.known import torque_unit
-from runtime.plausible.plausibility import plausibility_of
 from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
@@ -113,23 +110,43 @@ METHODS: dict[str, Method] = {
     ),
 }
 
+
+def later(module: str, name: str) -> Callable[..., Any]:
+    """A function of a module that is loaded when it is first called: what is made on request costs nothing elsewhere."""
+
+    def called(*given: Any, **options: Any) -> Any:
+        return getattr(import_module(module), name)(*given, **options)
+
+    return called
+
+
 EXTRAS: list[Extra] = [
     torque_unit,
     doubt_of_gains,
-    OnRequest("plausible", "plausibility of the record", plausibility_of),
+    OnRequest(
+        "plausible",
+        "plausibility of the record",
+        later("runtime.plausible.plausibility", "plausibility_of"),
+    ),
     scalars_of_laws,
     load_of_study,
     elastic_gears,
     EncoderSteps,
     agreement,
     ExpectedError,
-    OnRequest("friction", "friction", friction_of_joints),
+    OnRequest("friction", "friction", later("runtime.friction.curves", "friction")),
     OnRequest("physical", "physical consistency", consistency, as_fitted),
-    OnRequest("advice", "resolution advice", advice_of, no_advice),
+    OnRequest(
+        "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), no_advice
+    ),
     OnRequest(
         "resolution",
         "resolution study",
-        partial(resolution_of, own_encoder=own_encoder, loop_of=loop_of),
+        partial(
+            later("runtime.core.cestac.cestac", "resolution"),
+            own_encoder=own_encoder,
+            loop_of=loop_of,
+        ),
     ),
 ]
 
@@ -402,8 +419,11 @@ def compare(
         }
     else:
         problems = comparing.treatments(_candidate(model, candidates), STEPS, speed_of_rest)
-    judged = [] if variants is None else [partial(plausibility_of, variants=variants)]
-    return comparing.compare(problems, extras({}), judged)
+    of_the_best = []
+    if variants is not None:
+        plausible = later("runtime.plausible.plausibility", "plausibility_of")
+        of_the_best.append(partial(plausible, variants=variants))
+    return comparing.compare(problems, extras({}), of_the_best)
 
 
 @single_threaded

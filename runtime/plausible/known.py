@@ -22,7 +22,7 @@ motor currents as effort.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -35,7 +35,9 @@ from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.table import Table
 from runtime.physical.inertia import INERTIAL
-from runtime.plausible.trials import Baseline
+
+if TYPE_CHECKING:
+    from runtime.plausible.trials import Baseline
 
 Array = np.ndarray
 

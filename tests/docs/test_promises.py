@@ -28,7 +28,11 @@ def texts(place: str) -> str:
     for name in re.findall(r"`([\w/]+\.py)`", place):
         paths += [path for room in ("runtime", "symgen") for path in (ROOT / room).rglob(name)]
     paths += [ROOT / "README.md"] if "README" in place else []
-    paths += [ROOT / "runtime/reporting/parameters.py"] if "page of `report`" in place else []
+    if "page of `report`" in place:
+        paths += [
+            ROOT / "runtime/reporting/parameters.py",
+            ROOT / "runtime/physical/consistency.py",
+        ]
     return " ".join(plain(path.read_text()) for path in paths)
 
 
