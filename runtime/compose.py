@@ -26,6 +26,7 @@ from runtime.core import identify as identification
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
+from runtime.core.gone import gone
 from runtime.core.identify import Extra, OnRequest
 from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import ordinary
@@ -35,7 +36,7 @@ from runtime.core.model import GeneratedModel
 from runtime.core.problem import Note, Problem, Step, prepared
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
-from runtime.core.signals.states import Reader, lowpassed
+from runtime.core.signals.states import SignalReader, lowpassed
 from runtime.core.study import EstimateSettings
 from runtime.counts.encoder_advice import EncoderSteps
 from runtime.counts.own_encoder import own_encoder
@@ -87,7 +88,11 @@ STEPS: list[Step] = [
     fitted_scalars,
     law_of_controller,
 ]
-READERS: dict[str, Reader] = {"lowpass": lowpassed, "counts": counted, "static": at_rest}
+READERS: dict[str, SignalReader] = {
+    "lowpass": SignalReader(lowpassed),
+    "counts": SignalReader(counted),
+    "static": SignalReader(at_rest),
+}
 METHODS: dict[str, Method] = {
     **LINEAR,
     # robust least squares, Huber or Tukey
@@ -153,6 +158,23 @@ EXTRAS: list[Extra] = [
 Records = Record | Sequence[Record]
 
 
+def known(study: Study) -> Study:
+    """The study with all options of its reader; SettingsError where its method or reader is not in the lists."""
+    signals = study.signals
+    for path, name, names in (
+        (("estimate", "method"), study.estimate.method, METHODS),
+        (("signals", "reader"), signals.reader, READERS),
+    ):
+        if name not in names:
+            *others, last = names
+            expected = f"{name!r}; expected {', '.join(others)} or {last}"
+            raise SettingsError(gone(path, name) or expected, path=path)
+    options = READERS[signals.reader].checked(signals)
+    if options == signals.options:
+        return study
+    return replace(study, signals=replace(signals, options=options))
+
+
 def stated(
     model: GeneratedModel,
     records: Records,
@@ -161,18 +183,8 @@ def stated(
     simulator: Simulator | None = None,
 ) -> Problem:
     """The problem of model, records and study as it is stated, before any step."""
-    study = study or Study()
+    study = known(study or Study())
     methods: Mapping[str, Method] = METHODS
-    if study.estimate.method not in methods:
-        raise SettingsError(
-            f"{study.estimate.method!r}; expected {' or '.join(methods)}",
-            path=("estimate", "method"),
-        )
-    if study.signals.reader not in READERS:
-        raise SettingsError(
-            f"{study.signals.reader!r}; expected {' or '.join(READERS)}",
-            path=("signals", "reader"),
-        )
     if simulator is not None:
         observe = partial(observed_loop, simulator=simulator)
         methods = {
@@ -180,7 +192,9 @@ def stated(
             for name, method in METHODS.items()
         }
     several = (records,) if isinstance(records, Record) else tuple(records)
-    return Problem(model, several, tuple(unseen), study, READERS[study.signals.reader], methods)
+    return Problem(
+        model, several, tuple(unseen), study, READERS[study.signals.reader].states, methods
+    )
 
 
 def problem(

@@ -128,17 +128,20 @@ class Signals(Settings):
         Window of the median filter on torques; auto: as on positions, but none where it would take
         torque that goes with the motion, as from a controller that answers every count
         (`runtime.median`).
+    options : mapping
+        Options of the reader.
     """
 
     median: OddWindow = 5
     lowpass: Lowpass | None = field(default_factory=Lowpass)
     ends: Literal["one-sided", "second-order"] = "one-sided"
     decimate: Decimate | None = field(default_factory=Decimate)
-    reader: Literal["lowpass", "counts", "static"] = "lowpass"
+    reader: Text = "lowpass"
     step: PerJoint[Positive] | None = None
     side: Literal["joint", "motor"] = "joint"
     velocity: Literal["auto", "differences"] | PerJoint[Positive] = "auto"
     torque_median: OddWindow | Literal["auto"] = "auto"
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for key, given in (
@@ -205,7 +208,7 @@ class EstimateSettings(Settings):
         Options of the method.
     """
 
-    method: Literal["ols", "wls", "irls", "iv", "didim", "feasible"] = "ols"
+    method: Text = "ols"
     weights: Literal["none", "joint", "iterated", "covariance"] = "none"
     columns: Literal["all"] | Many[Text] = "all"
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -278,7 +281,8 @@ class CestacSettings(Settings):
     common : bool
         The same random numbers for every delta.
     median : int
-        Window of the median filter in this study, 1 for none: a median enlarges the bias.
+        Window of the median filter on the rounded positions, 1 for none: a median enlarges the
+        bias. The estimate that runs are compared with has that of signals.
     """
 
     side: Literal["joint", "motor"] = "joint"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import TypeVar
@@ -84,7 +86,22 @@ def settings_from_text(kind: type[T], text: str, *, file: str) -> T:
     try:
         return structure(kind, {} if values is None else values)
     except SettingsError as e:
-        known = (e.path[:k] for k in range(len(e.path), -1, -1) if e.path[:k] in lines)
-        raise SettingsError(
-            e.reason, path=e.path, file=file, line=lines.get(next(known, ()))
-        ) from None
+        raise _at_line(e, lines, file) from None
+
+
+@contextmanager
+def lines_of(path: str | Path) -> Iterator[None]:
+    """A SettingsError on a setting of this study file names the file and the line."""
+    try:
+        yield
+    except SettingsError as e:
+        _, lines = yaml_values(text_of(path), file=Path(path).name)
+        raise _at_line(e, lines, Path(path).name) from None
+
+
+def _at_line(
+    error: SettingsError, lines: Mapping[tuple[str | int, ...], int], file: str
+) -> SettingsError:
+    """The error with the line of its key, or of the section that should hold it."""
+    places = (error.path[:k] for k in range(len(error.path), -1, -1) if error.path[:k] in lines)
+    return SettingsError(error.reason, path=error.path, file=file, line=lines.get(next(places, ())))

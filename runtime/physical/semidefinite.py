@@ -345,7 +345,7 @@ class Quadratic:
         solution = _solution(self.solver.solve)
         if solution is None or STATUS.get(str(solution.status)) not in SOLVED:
             self.solver = None
-            solution = _solution(self._solver(squares, linear, scaled=False))
+            solution = _solution(self._solver(squares, linear, scaled=False).solve)
         x = np.zeros(len(g)) if solution is None else np.array(solution.x)
         return self.scale * np.where(np.isfinite(x), x, 0.0)
 

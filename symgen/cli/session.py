@@ -207,11 +207,17 @@ def study_of_arguments(records: Sequence[str], *, recorded: bool = True) -> Stud
     is a measured file like it, a record of its own.
     recorded : whether the study has to name a record.
     """
+    from runtime import compose
     from runtime.core.errors import InputError
+    from runtime.documents.files import lines_of
     from runtime.reading.formats import is_measured
     from runtime.study import located, study_of
 
-    study = located(*study_of(records[0]))
+    stated, folder = study_of(records[0])
+    if Path(records[0]).suffix.lower() in (".yaml", ".yml"):
+        with lines_of(records[0]):
+            stated = compose.known(stated)
+    study = located(stated, folder)
     if recorded:
         require_record(study, records[0])
     for record in records[1:]:

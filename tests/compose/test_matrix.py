@@ -17,6 +17,7 @@ import pytest
 from features import FEATURES, Case
 
 from runtime import compose
+from runtime.advisor.advice import Advice
 from runtime.core.errors import InputError
 from runtime.core.estimation import estimated
 from runtime.core.rows.prepared import stacked
@@ -192,15 +193,21 @@ def assess(case: Case, result: Any) -> None:
     found = compose.assess(case.model, case.records, case.study)
     same_rows(found.observation, result.observation)
     equal(found.estimate.X, result.estimate.X)
-    if found.resolution is not None:
-        same_reference(found.resolution.reference, result)
-    if found.advice is not None:
-        same_reference(found.advice.reference, result)
-    if found.friction:
+    resolution = found.part("resolution")
+    if resolution is not None:
+        same_reference(resolution.reference, result)
+    advice = found.part("advice")
+    if isinstance(advice, Advice):
+        same_reference(advice.reference, result)
+    friction = found.part("friction")
+    if friction is not None:
         curves = friction_curves(result.problem, result.estimate)
-        for curve, expected in zip(found.friction, curves, strict=True):
+        for curve, expected in zip(friction.curves, curves, strict=True):
             equal(curve.f, expected.f)
             assert curve.law_name == expected.law_name
+    else:
+        assert case.feature == "poses at rest"
+    assert (resolution is None) == (case.feature == "poses at rest")
     allowed = [text for text, _ in MISSING.get(case.feature, ())]
     for sentence in found.missing:
         assert any(text in sentence for text in allowed), sentence

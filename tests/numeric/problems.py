@@ -31,7 +31,7 @@ def observed_states(q, rate, signals, drives=None, *, missing=None):
         missing=missing,
         origin=Origin(drives=drives),
     )
-    return READERS[signals.reader](record, signals)
+    return READERS[signals.reader].states(record, signals)
 
 
 def loop_of_records(model, records, study, simulator, **options):

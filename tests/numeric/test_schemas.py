@@ -91,7 +91,6 @@ def test_studies_follow_their_schema(name):
         {"signals": {"median": 5.5}},
         {"signals": {"lowpas": {}}},
         {"signals": {"lowpass": {"cutoff": -1}}},
-        {"estimate": {"method": "magic"}},
         {"cestac": {"runs": 1}},
         {"rows": {"window": [0]}},
         {"record": [{"side": "left"}]},

@@ -3,16 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from runtime.core.errors import SettingsError
 from runtime.core.missing import COUNTS, require_positions
 from runtime.core.record import Record
+from runtime.core.settings import Settings, structure, to_mapping
 from runtime.core.signals.filters import States, filtered_states
 from runtime.core.study import Signals
 
 Reader: TypeAlias = Callable[[Record, Signals], States]
 """From a record to its joint states q, qd, qdd, shape (N, n) each, by the settings of the signals."""
+
+
+@dataclass(frozen=True)
+class SignalReader:
+    """A reader that a study may name.
+
+    Attributes
+    ----------
+    states : Reader
+    options : type or None
+        Settings class of signals.options, which it reads there; None: it has none.
+    """
+
+    states: Reader
+    options: type[Settings] | None = None
+
+    def checked(self, signals: Signals) -> dict[str, Any]:
+        """All options of the settings, defaults filled in; SettingsError where they do not suit."""
+        path = ("signals", "options")
+        if self.options is not None:
+            return to_mapping(structure(self.options, signals.options, path))
+        if signals.options:
+            raise SettingsError(
+                f"given, but reader {signals.reader} has no options; leave them out", path=path
+            )
+        return {}
 
 
 def lowpassed(record: Record, signals: Signals) -> States:
