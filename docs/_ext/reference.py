@@ -214,9 +214,11 @@ def keys(cls: Any) -> str:
 
 
 def meaning(cls: type) -> dict[str, str]:
-    """{key: what its docstring says, with shape and unit} of a settings class."""
+    """{key: what its docstring says, or that of its base, with shape and unit} of a settings class."""
     found = {}
-    for title, lines in docstrings.sections(inspect.cleandoc(cls.__doc__ or "").splitlines()):
+    texts = [inspect.cleandoc(base.__doc__ or "") for base in reversed(cls.__mro__)]
+    parts = [part for text in texts for part in docstrings.sections(text.splitlines())]
+    for title, lines in parts:
         for names, kind, said in docstrings.entries(lines) if title == "Attributes" else ():
             unit = ", ".join(
                 part
