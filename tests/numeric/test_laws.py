@@ -37,7 +37,7 @@ TRUE = {"vs1": 0.08, "vs2": 0.15, "phase2": 0.7}
 X_TRUE = {
     "FV1": 2.0, "FS1": 3.0, "FV2": 1.5, "FS2": 2.0, "STR1": 2.0, "STR2": 1.5, "CG2": 0.4,
 }  # fmt: skip
-STUDY = runtime.core.study.study_from_mapping(
+STUDY = runtime.study.study_from_mapping(
     {"signals": {"median": 1, "lowpass": None, "decimate": None}, "rows": {"trim": 0}}
 )
 
@@ -151,7 +151,7 @@ def test_a_law_that_is_not_there_is_a_sentence(model) -> None:
 
 
 def test_methods_that_simulate_refuse_scalars(model) -> None:
-    study = runtime.core.study.study_from_mapping({"estimate": {"method": "iv"}})
+    study = runtime.study.study_from_mapping({"estimate": {"method": "iv"}})
     with pytest.raises(runtime.InputError, match="not fitted by iv"):
         runtime.identify(model, record_of(model, 0.1), study)
 
