@@ -169,6 +169,7 @@ def perturbation(
     signals = replace(study.signals, median=study.cestac.median)
     positions = replace(signals, reader="lowpass", step=None, side="joint")
     own = replace(record, study=replace(study, signals=positions), reader=lowpassed)
+    own.take_states(record)
     band = bandwidth(signals, own.record.rate)
     require_positions(own.record.missing, "the effect of steps on them", own.record.file)
     selection = own.selection
