@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,5 +54,16 @@ def archive_of(path: Path) -> dict[str, Array]:
             raise InputError("holds an array of one name twice; store it once", file=file)
         with np.load(stream, allow_pickle=False) as arrays:
             return {
-                name.removesuffix(".npy"): arrays[name] for name in members if name.endswith(".npy")
+                name.removesuffix(".npy"): _plain(arrays, name)
+                for name in members
+                if name.endswith(".npy")
             }
+
+
+def _plain(arrays: Any, name: str) -> Array:
+    """One array of an archive; ValueError, with its name, for pickled objects and damage."""
+    try:
+        return np.asarray(arrays[name])
+    except ValueError as e:
+        key = name.removesuffix(".npy")
+        raise ValueError(f"{key} holds pickled objects or other than numbers: {e}") from e
