@@ -3,8 +3,8 @@ equal ones once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
 linear: filter
-the signals, then place them. The regressor is evaluated in pieces of samples on one reused store and
-decimated piece by piece: the signals are not stored.
+the signals, then place them. They are evaluated in pieces of samples, by the operations of the module that
+they need (`runtime.core.rows.tape`), and decimated piece by piece: the signals are not stored.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel, channels_of
 from runtime.core.rows.observation import column_numbers
+from runtime.core.rows.tape import Tape, recorded
 from runtime.core.signals.decimation import PIECE, Plan, decimated_parts
 from runtime.core.signals.filters import States
 
@@ -63,13 +64,20 @@ class Columns:
     ) -> None:
         self.model = model
         self.names = tuple(model.BASE_PARAMETERS) if names is None else tuple(names)
-        self._rooms: dict[int, tuple[Array, Array]] = {}
+        self._signals: dict[int, Array] = {}
+        self._stores: dict[int, Array] = {}
 
     @cached_property
     def entries(self) -> Entries:
         """Where the distinct signals of these columns stand."""
         numbers = np.array(column_numbers(self.names, self.model.BASE_PARAMETERS), dtype=int)
         return distinct_entries(self.model, numbers)
+
+    @cached_property
+    def tape(self) -> Tape | None:
+        """The operations of the distinct signals; None where the module has to be called."""
+        n = len(self.model.JOINTS)
+        return recorded(self.model, [divmod(int(place), n) for place in self.entries.place])
 
     def decimated(self, states: States, plan: Plan | None, instants: slice = slice(None)) -> Array:
         """Store of decimated columns, shape (b, n, K): column k of joint j, of the states (N, n) of
@@ -108,9 +116,14 @@ class Columns:
     def _evaluated(self, states: States) -> Array:
         """Distinct signals of the states (B, n), shape (S, B), until the next call."""
         B = len(states)
-        if B not in self._rooms:
-            self._rooms[B] = self.model.store(B), np.empty((len(self.entries.place), B))
-        store, signals = self._rooms[B]
+        if B not in self._signals:
+            self._signals[B] = np.empty((len(self.entries.place), B))
+        signals = self._signals[B]
+        if self.tape is not None:
+            return self.tape.evaluate(states.q, states.qd, states.qdd, signals)
+        if B not in self._stores:
+            self._stores[B] = self.model.store(B)
+        store = self._stores[B]
         timed = in_time(self.model, states)
         try:
             D = self.model.regressor(states.q, states.qd, states.qdd, out=store, **timed)

@@ -1,0 +1,195 @@
+"""The regressor of a model as operations on rows of samples, of which those are done that wanted entries need.
+
+    tape = recorded(model, [(k, j), ...])       # entries of D, column k, joint j
+    tape.evaluate(q, qd, qdd, out)              # out, shape (S, B)
+
+An emitted module writes D by operations on whole rows. They are recorded once, by calling the module with rows that
+remember what is done to them. An operation that no wanted entry needs is left out, and a row is written over once
+nothing reads it any more, so that all rows stay in the cache. What is left is done in the order of the module: the
+results agree with its own in every bit.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any
+
+import numpy as np
+
+from runtime.core.model import GeneratedModel
+
+Array = np.ndarray
+
+STATES = ("q", "qd", "qdd")
+POWERS = {2: np.square, 0.5: np.sqrt, -1: np.reciprocal}
+"""What NumPy does for a power of an array."""
+
+
+class NotRecordedError(Exception):
+    """The module does more than operations on rows."""
+
+
+@dataclass(eq=False)
+class Row:
+    """A row of samples: a state, or the result of an operation on rows and numbers.
+
+    function : None for a state, whose arguments are its array (0 for q) and its joint.
+    """
+
+    function: np.ufunc | None
+    arguments: tuple[Any, ...]
+
+    __array_ufunc__ = None  # NumPy's numbers leave operations to this class
+
+    def __add__(self, x: Any) -> Row:
+        return Row(np.add, (self, x))
+
+    def __radd__(self, x: Any) -> Row:
+        return Row(np.add, (x, self))
+
+    def __sub__(self, x: Any) -> Row:
+        return Row(np.subtract, (self, x))
+
+    def __rsub__(self, x: Any) -> Row:
+        return Row(np.subtract, (x, self))
+
+    def __mul__(self, x: Any) -> Row:
+        return Row(np.multiply, (self, x))
+
+    def __rmul__(self, x: Any) -> Row:
+        return Row(np.multiply, (x, self))
+
+    def __truediv__(self, x: Any) -> Row:
+        return Row(np.divide, (self, x))
+
+    def __rtruediv__(self, x: Any) -> Row:
+        return Row(np.divide, (x, self))
+
+    def __neg__(self) -> Row:
+        return Row(np.negative, (self,))
+
+    def __pow__(self, exponent: Any) -> Row:
+        if exponent in POWERS:
+            return Row(POWERS[exponent], (self,))
+        return Row(np.power, (self, exponent))
+
+    def __bool__(self) -> bool:
+        raise NotRecordedError("a decision by a value")
+
+
+class Functions:
+    """Functions of NumPy, of rows and of numbers."""
+
+    def __getattr__(self, name: str) -> Any:
+        function = getattr(np, name)
+        if isinstance(function, float):
+            return function
+        if not isinstance(function, np.ufunc):
+            raise NotRecordedError(name)
+
+        def called(*arguments: Any) -> Any:
+            of_rows = any(isinstance(x, Row) for x in arguments)
+            return Row(function, arguments) if of_rows else function(*arguments)
+
+        return called
+
+
+class Tape:
+    """Wanted entries of D, and the operations that they need.
+
+    Parameters
+    ----------
+    entries : sequence of Row or float
+    n : int
+        Joints.
+    """
+
+    def __init__(self, entries: Sequence[Row | float], n: int) -> None:
+        self.entries = entries
+        self.n = n
+        self.operations = in_order(entries)
+        self._rooms: dict[int, tuple[Array, list[Any], list[Any]]] = {}
+
+    def evaluate(self, q: Array, qd: Array, qdd: Array, out: Array) -> Array:
+        """The entries, shape (S, B), of states of shape (B, n), written to `out`."""
+        B = len(q)
+        if B not in self._rooms:
+            self._rooms[B] = self._bound(B)
+        states, operations, entries = self._rooms[B]
+        for rows, x in zip(states, (q, qd, qdd), strict=True):
+            rows[:] = x.T
+        for function, arguments, row in operations:
+            function(*arguments, out=row)
+        for row, entry in zip(out, entries, strict=True):
+            row[:] = entry
+        return out
+
+    def _bound(self, B: int) -> tuple[Array, list[Any], list[Any]]:
+        """States, operations and entries on rows of B samples."""
+        states = np.empty((len(STATES), self.n, B))
+        rows: dict[int, Array] = {}
+
+        def bound(x: Any) -> Any:
+            if not isinstance(x, Row):
+                return x
+            return states[x.arguments] if x.function is None else rows[id(x)]
+
+        read = Counter(id(x) for x in self.entries)
+        for row in self.operations:
+            read.update({id(x) for x in row.arguments})
+        operations = []
+        free: list[Array] = []
+        for row in self.operations:
+            arguments = [bound(x) for x in row.arguments]
+            for key in {id(x) for x in row.arguments}:
+                read[key] -= 1
+                if read[key] == 0 and key in rows:
+                    free.append(rows[key])
+            rows[id(row)] = free.pop() if free else np.empty(B)
+            operations.append((row.function, arguments, rows[id(row)]))
+        return states, operations, [bound(x) for x in self.entries]
+
+
+def in_order(entries: Sequence[Row | float]) -> list[Row]:
+    """The operations that the entries need, each after those that it needs."""
+    order: list[Row] = []
+    done: set[int] = set()
+    stack = _operations(entries)
+    while stack:
+        row = stack[-1]
+        waiting = [x for x in _operations(row.arguments) if id(x) not in done]
+        if waiting and id(row) not in done:
+            stack += waiting
+            continue
+        stack.pop()
+        if id(row) not in done:
+            done.add(id(row))
+            order.append(row)
+    return order
+
+
+def _operations(values: Sequence[Any]) -> list[Row]:
+    return [x for x in values if isinstance(x, Row) and x.function is not None]
+
+
+def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape | None:
+    """The entries (k, j) of D of an emitted module; None of one that does more than operations on rows, or reads functions of time."""
+    block = getattr(model, "_regressor_block", None)
+    n = len(model.JOINTS)
+    states = {name: [Row(None, (i, j)) for j in range(n)] for i, name in enumerate(STATES)}
+    if block is None:
+        return None
+    table: dict[tuple[int, int], Any] = {}
+    known: dict[str, Any] = {**model.CONSTANTS, **states, "xp": Functions(), "D": table}
+    names = tuple(signature(block).parameters)
+    if not known.keys() >= set(names):
+        return None
+    try:
+        block(*(known[name] for name in names))
+    except (NotRecordedError, AttributeError, TypeError, ValueError):
+        return None
+    constant = model.store(1)
+    return Tape([table.get(place, float(constant[(*place, 0)])) for place in places], n)
