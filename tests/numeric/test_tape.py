@@ -55,6 +55,17 @@ def of_time(xp, q, qd, qdd, u, D):
     D[0, 0] = u * q[0]
 
 
+def test_a_constant_that_is_a_function_of_time_is_not_recorded():
+    model = SimpleNamespace(
+        JOINTS=(1,),
+        CONSTANTS={"u": 1.0},
+        CHANNELS={"u": ("FV1",)},
+        _regressor_block=of_time,
+        store=lambda N: np.zeros((1, 1, N)),
+    )
+    assert recorded(model, [(0, 0)]) is None
+
+
 @pytest.mark.parametrize("block", [decided, sorted_rows, of_time])
 def test_what_is_no_operation_on_rows_is_not_recorded(block):
     model = SimpleNamespace(

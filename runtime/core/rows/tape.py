@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from runtime.core.model import GeneratedModel
+from runtime.core.model import GeneratedModel, channels_of
 
 Array = np.ndarray
 
@@ -180,7 +180,7 @@ def recorded(model: GeneratedModel, places: Sequence[tuple[int, int]]) -> Tape |
     block = getattr(model, "_regressor_block", None)
     n = len(model.JOINTS)
     states = {name: [Row(None, (i, j)) for j in range(n)] for i, name in enumerate(STATES)}
-    if block is None:
+    if block is None or channels_of(model):
         return None
     table: dict[tuple[int, int], Any] = {}
     known: dict[str, Any] = {**model.CONSTANTS, **states, "xp": Functions(), "D": table}
