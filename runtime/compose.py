@@ -2,7 +2,7 @@
 
     STEPS      Problem -> Problem: what changes a problem before rows are made of it, in this order
     READERS    Record, Signals -> States: signals.reader of a study
-    METHODS    Observation -> Estimate: estimate.method of a study
+    METHODS    Observation -> rows of a least squares -> their fit: estimate.method of a study
     EXTRAS     Identification -> Part: what else is asked of the records
 
 Each call builds a Problem of model, records and study, prepares it by STEPS and hands it to one function of the package. A feature is one file and one line of a list.
@@ -60,7 +60,7 @@ from runtime.reading.records import read_records
 from runtime.reading.settings import RecordSettings
 from runtime.rest import at_rest, poses_at_rest
 from runtime.speeds import recorded_speeds
-from runtime.study import Study
+from runtime.study import Study, study_schema
 from runtime.threads import alone_each, single_threaded
 from runtime.wrench import force_sensors
 
@@ -602,6 +602,19 @@ def simulate(
     return simulation.simulate(
         model, study.controller, records=records, folder=folder, ideal=ideal, name=name
     )
+
+
+def json_schema(of: str) -> dict[str, Any]:
+    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
+    from runtime.documents.estimates import result_schema
+
+    if of != "study":
+        return result_schema(of)
+    schema = study_schema()
+    sections = schema["$defs"]
+    sections["EstimateSettings"]["properties"]["method"]["enum"] = [*METHODS]
+    sections["Signals"]["properties"]["reader"]["enum"] = [*READERS]
+    return schema
 
 
 def _with_loaded(

@@ -22,7 +22,6 @@ from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.settings import NotNegative, PerJoint, Settings, structure, to_mapping
-from runtime.documents.estimates import result_schema
 from runtime.documents.files import settings_from_text, text_of
 from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
@@ -125,9 +124,9 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
     return structure(Study, mapping)
 
 
-def json_schema(of: str) -> dict[str, Any]:
-    """JSON Schema of study files ("study"), of estimate.json ("estimate"), or of cestac.json ("cestac")."""
-    return TypeAdapter(Study).json_schema() if of == "study" else result_schema(of)
+def study_schema() -> dict[str, Any]:
+    """JSON Schema of study files; methods and readers are texts there, whose lists `runtime.compose` holds."""
+    return TypeAdapter(Study).json_schema()
 
 
 def load_study(path: str | Path) -> Study:

@@ -1,4 +1,4 @@
-"""What is to be estimate of the law whose torque stands for a measured one: `controller.law` with
+"""What is to be found of the law whose torque stands for a measured one: `controller.law` with
 kd: fit, delay: fit.
 
     W X = tau(t - delay),      tau = sat(tau_0 + kd v),      v = qd_ref - qd, tau_0 the law without kd
@@ -51,7 +51,7 @@ class LawEstimate(Result):
     text : str
         The same in words.
     error : float, %
-        Of the torque, with what was estimate.
+        Of the torque, with what was found.
     """
 
     joints: tuple[str, ...]

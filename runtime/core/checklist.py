@@ -1,8 +1,8 @@
 """Can the values of an identification be used? One question after another, each with its answer,
 the limit, and what to do.
 
-The verdict is the worst of the answers. Limits are constants of this module: they are conventions
-of practice, not theorems. Errors are relative, in %:
+The verdict is the worst of the answers. Limits stand in runtime/core/limits.toml: they are conventions of
+practice, not theorems. Errors are relative, in %:
 100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of the block
 bootstrap (`runtime.core.uncertainty`), never
 eq. (10) alone.

@@ -32,7 +32,7 @@ class Note:
     Attributes
     ----------
     kind : str
-        Name of the step, by which code asks for the note; no code reads the text.
+        What it is about, by which code asks for it; no code reads the text.
     text : str
         Sentences for people; "" where there are data alone.
     data : mapping

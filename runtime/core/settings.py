@@ -136,12 +136,6 @@ def _in_order(window: tuple[float | None, float | None]) -> tuple[float | None, 
     return window
 
 
-def _not_one(runs: int) -> int:
-    require(runs != 1, "1 run; expected 0 or at least 2")
-    return runs
-
-
-Resamples = Annotated[Seed, AfterValidator(_not_one)]
 OddWindow = Annotated[Count, AfterValidator(_odd)]
 Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 """[t0, t1] in s; null leaves an end open."""

@@ -189,10 +189,6 @@ class Rows(Settings):
     low_speed: PerJoint[NotNegative] = 0.0
 
 
-SIMULATING = ("iv", "didim")
-"""Methods that simulate the closed loop."""
-
-
 class EstimateSettings(Settings):
     """The estimator and its columns.
 

@@ -18,13 +18,12 @@ from runtime.core.record import Record
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import window_of
 from runtime.core.signals.filters import (
-    Lowpass,
     States,
     filtered_states,
     lowpass_filtered,
     median_filtered,
 )
-from runtime.core.study import Study
+from runtime.core.study import Lowpass, Study
 
 Array = np.ndarray
 

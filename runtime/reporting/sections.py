@@ -147,7 +147,7 @@ def motion_section(result: Identification) -> Section:
 
 
 def trail_section(result: Identification) -> Section:
-    """How the essential parameters were result."""
+    """How the essential parameters were found."""
     essential = result.essential
     first = len(result.estimate.names)
     rows = [

@@ -34,7 +34,7 @@ def schema(
 
         typer.echo(schema_text(), nl=False)
     else:
+        from runtime.compose import json_schema
         from runtime.core.documents import json_text
-        from runtime.study import json_schema
 
         typer.echo(json_text(json_schema(of)), nl=False)

@@ -9,10 +9,11 @@ import jsonschema
 import pytest
 
 import runtime
+from runtime.compose import json_schema
 from runtime.core.least_squares.estimate import Status
 from runtime.core.settings import to_mapping
 from runtime.reading.datasets import DATASETS, dataset_study
-from runtime.study import Study, json_schema, study_from_mapping
+from runtime.study import Study, study_from_mapping
 
 ROOM = Path(runtime.__file__).parent
 
@@ -102,6 +103,14 @@ def test_editors_see_what_the_reader_refuses(wrong):
         jsonschema.validate(wrong, json_schema("study"))
     with pytest.raises(runtime.InputError):
         study_from_mapping(wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"signals": {"reader": "lowpas"}}, {"estimate": {"method": "tls"}}]
+)
+def test_editors_know_the_lists(wrong):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(wrong, json_schema("study"))
 
 
 def test_editors_show_what_a_key_holds():

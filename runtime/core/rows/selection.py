@@ -256,13 +256,11 @@ def per_joint(value: float | tuple[float, ...], n: int, name: str) -> Array:
 def certain_rows(
     model: GeneratedModel,
     states: States,
-    *,
-    deviations: float = UNCERTAIN,
 ) -> Array:
     """Rows of every joint in which the state and each direction of dry friction are known, bool,
     shape (n, K), of states (K, n) with known errors.
 
-    A row of joint j is uncertain where |s| is below `deviations` of s, s = G qd the speed of a
+    A row of joint j is uncertain where |s| is below UNCERTAIN deviations of s, s = G qd the speed of a
     column that switches and acts on j.
     """
     certain = np.ones(states.q.T.shape, dtype=bool)
@@ -271,5 +269,5 @@ def certain_rows(
         for switch in switches(model, model.BASE_PARAMETERS, passive="left out"):
             certain[list(switch.joints)] &= np.abs(
                 states.qd @ switch.G
-            ) >= deviations * states.errors.along(switch.G)
+            ) >= UNCERTAIN * states.errors.along(switch.G)
     return certain

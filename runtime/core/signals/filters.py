@@ -247,23 +247,3 @@ def require_longer(samples: int, pad: int) -> None:
             f"{samples} samples; this zero-phase filter needs more than {pad}, use a longer record "
             "or window, or a lower order"
         )
-
-
-__all__ = [
-    "Decimate",
-    "Lowpass",
-    "Signals",
-    "SpeedErrors",
-    "States",
-    "butterworth",
-    "decimated",
-    "decimation_factor",
-    "decimation_plan",
-    "derivative",
-    "filtered_states",
-    "kept_samples",
-    "lowpass_filtered",
-    "median_filtered",
-    "require_longer",
-    "zero_phase",
-]
