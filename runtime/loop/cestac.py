@@ -165,8 +165,12 @@ class Loop:
             ),
         )
 
-    def simulated(self, level: Level, draw: tuple[int, ...]) -> Observation:
-        """Rows of a record made with encoders of steps of level.delta; of those of the study at
+    def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
+        """Rows of a record made with encoders of steps of level.delta."""
+        return self.simulated(level, draw).measured()
+
+    def simulated(self, level: Level, draw: tuple[int, ...]) -> ClosedLoop:
+        """The loop of a record made with encoders of steps of level.delta; of those of the study at
         a level without steps.
         """
         random = stream(self.study.cestac.seed, draw[-1])
@@ -179,7 +183,7 @@ class Loop:
                 encoder_step=np.full(n, level.delta),
                 offset=law.offset + np.linalg.solve(law.R, phase),
             )
-        return self._of(simulator, int(random.integers(2**31)), level.delta).measured()
+        return self._of(simulator, int(random.integers(2**31)), level.delta)
 
     def _of(self, simulator: Any, seed: int, delta: float) -> ClosedLoop:
         """A record made by `simulator`, under the loop without its steps; the reader of counts is

@@ -10,7 +10,7 @@ from campaign import campaign
 from problems import loop_of_records
 from test_closed_loop import ARM, arm, away  # noqa: F401  (arm is a fixture)
 
-from runtime.compose import cestac, estimate_of, observe
+from runtime.compose import cestac, estimate_of, observe, problem
 from runtime.core.cestac.rounding import rounded, stream
 from runtime.core.cestac.runs import Level
 from runtime.core.errors import InputError, SettingsError
@@ -107,7 +107,7 @@ def test_the_encoder_in_the_loop_has_a_random_phase(arm, study, simulator):  # n
     """
     model, *_ = arm
     asked = in_loop(study)
-    loop = loop_of(model, (), asked, simulator)
+    loop = loop_of(problem(model, (), asked, simulator=simulator), simulator)
     fine, coarse = (loop.simulated(Level(step), (0, 0)).parts[0].record for step in (1e-7, STEP))
     phases = (coarse.q / STEP) % 1
     assert np.allclose(phases, phases[0], atol=1e-6) and abs(phases[0, 0] - phases[0, 1]) > 0.01

@@ -267,7 +267,7 @@ def perturbed(columns: Columns, task: Task, level: Level, draw: tuple[int, ...])
     """
     loop = task.loop
     if loop is not None and task.settings.place == "loop":
-        rows = loop.simulated(level, draw) if draw else loop.measured()
+        rows = loop.rows(level, draw) if draw else loop.measured()
         return rows.columns(task.names)
     keys = [stream_keys(draw, k) for k in range(len(task.records))]
     positions = [

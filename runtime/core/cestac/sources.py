@@ -72,7 +72,7 @@ class Loop(Protocol):
     def perturbed(self, observation: Observation, positions: Sequence[Array]) -> Observation:
         """`observation` of the perturbed positions of every record, with the loop attached."""
 
-    def simulated(self, level: Level, draw: tuple[int, ...]) -> Observation:
+    def rows(self, level: Level, draw: tuple[int, ...]) -> Observation:
         """Rows of a record made with encoders of steps of level.delta."""
 
 
