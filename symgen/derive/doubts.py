@@ -14,7 +14,7 @@ from symgen.description.robot import REVOLUTE, Robot
 
 FAR = 0.3  # rad, or of the longest length
 CLOSE = 1e-3  # rad: nearer to a round angle than a drawing shows, and not on it
-LONGEST = 100.0  # m
+LONGEST = 100.0  # m; of gravity in m/s^2
 LOPSIDED = 50.0  # a length over the sum of the others
 DEGREES = 30.0  # rad: a zero or a limit beyond is one in degrees ...
 UNLIMITED = 1000.0  # ... unless it stands for none at all
@@ -51,8 +51,11 @@ def nearly_round(robot: Robot, within: float = CLOSE) -> list[str]:
 
 
 def other_units(robot: Robot) -> list[str]:
-    """Sizes that no robot has in m and rad: lengths, zeros of the drives, limits."""
+    """Sizes that no robot has in m and rad: gravity, lengths, zeros of the drives, limits."""
     notes = []
+    g = math.hypot(*(e.value(robot.constants) for e in robot.gravity))
+    if g > LONGEST:
+        notes.append(f"gravity is {g:g} m/s^2; lengths are in m, not mm")
     lengths = {
         (f.j, name): abs(getattr(f, name).value(robot.constants))
         for f in robot.frames

@@ -86,7 +86,7 @@ def test_a_record_contradicts_what_is_false() -> None:
     tau += 0.05 * rng.standard_normal(tau.shape)
     study = study_from_mapping({"signals": {"median": 1, "lowpass": None, "decimate": None}})
     record = runtime.Record(t, q, tau, rate=200.0)
-    fit = runtime.estimate(free, runtime.observe(free, record, study))
+    fit = runtime.estimate(free, record, study)
     tests = {a.name: a for a in assumptions_asked(free, fit, sorted(robot.assume))}
     assert tests["MX3"].p_value < 1e-6 and "contradicts MX3 = 0" in tests["MX3"].text
     assert abs(tests["MX3"].value - 0.3) < 0.05
