@@ -1,6 +1,6 @@
 """EMPS, one prismatic axis: base parameters, regressor, dynamics.
 
-GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.2.0.
+GENERATED from emps.yaml, sha256 819142f28b57, by symgen 0.4.0.
 Do not edit; symgen generate emps
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -45,13 +45,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-16; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 886fd2f1f7ccb28a322d4dd9298d2971d8aba3318cd833d8bbbe6f255aee4d4f
+sha256 of all but these lines: b4fc4254558a4bb849e8652feb087123e3cfe51b497464a9c1eec439f5af5069
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Upper branch of the CEA LIST haptic interface, 3 actuated joints, parallelogram and double
     parallelogram: base parameters, regressor, dynamics.
 
-GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.2.0.
+GENERATED from haptic.yaml, sha256 905194db7b3b, by symgen 0.4.0.
 Do not edit; symgen generate haptic
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -83,13 +83,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 201fa57b94630337ae1a3fecdeed3d41580e1f58d9f8fc4c693f5c9a88c0b65f
+sha256 of all but these lines: ab469c9cd18a2121ca3d39cf5920b19da9a1cdd30b8ad1ade74ff41ca1b1bd50
 """
 
 import numpy as np

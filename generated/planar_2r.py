@@ -1,6 +1,6 @@
 """Planar arm, 2 revolute joints, vertical plane: base parameters, regressor, dynamics.
 
-GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.2.0.
+GENERATED from planar_2r.yaml, sha256 42ca3cd332bb, by symgen 0.4.0.
 Do not edit; symgen generate planar_2r
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -61,13 +61,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 1e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 90027ea51fd2461c6656f40207a30a5bc87acb43aff4416810a9836c32bec3e1
+sha256 of all but these lines: b4338fb4b2546d22d972508ebdb4134e6e18f4f2aeb9a4db1a4350954e16fff6
 """
 
 import numpy as np

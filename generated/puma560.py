@@ -1,6 +1,6 @@
 """Unimation PUMA 560, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.2.0.
+GENERATED from puma560.yaml, sha256 01eccfddc5c5, by symgen 0.4.0.
 Do not edit; symgen generate puma560
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -74,13 +74,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 9e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 1e5728b1674450aba7f9a09a780c12cd77b5d3cde871eabe2a068528f8e1e276
+sha256 of all but these lines: edb0259d92c6d2e3a9a8c91d17e981200bc333e00fcd51ec96075a8dacbccd61
 """
 
 import numpy as np

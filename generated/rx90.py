@@ -1,6 +1,6 @@
 """Stäubli RX-90, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.2.0.
+GENERATED from rx90.yaml, sha256 7e24e40e8e70, by symgen 0.4.0.
 Do not edit; symgen generate rx90
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -74,13 +74,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: f730d8236cb5018d49c4a8dd17eaf15c9502845cf3a613f40c6a6daaf2972f7e
+sha256 of all but these lines: 92babab433974800d79f701986564f2cc74f394c1a530d0369b0ae1f43ae2d03
 """
 
 import numpy as np

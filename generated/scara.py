@@ -1,6 +1,6 @@
 """SCARA with joints RRRP: base parameters, regressor, dynamics.
 
-GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.2.0.
+GENERATED from scara.yaml, sha256 de085ba960d7, by symgen 0.4.0.
 Do not edit; symgen generate scara
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -67,13 +67,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 4e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 632212721ad8c980f90d7581f7761f1206d3a1d2376763eec67442f184d586dd
+sha256 of all but these lines: 07f2977f8f8a42d058e98387edaa8e114a176ec7c096270f8e01eb19760b8bea
 """
 
 import numpy as np

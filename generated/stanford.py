@@ -1,6 +1,6 @@
 """Stanford arm, 5 revolute joints and prismatic joint 3: base parameters, regressor, dynamics.
 
-GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.2.0.
+GENERATED from stanford.yaml, sha256 123dd30dfd2b, by symgen 0.4.0.
 Do not edit; symgen generate stanford
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -72,13 +72,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 7e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 63ab7e26ca720dc7dec8b704a45b07f6f187d0f5a5bf97186bd449b727e30c0b
+sha256 of all but these lines: 31224d3ccceafeb41dccb294d11291bd72d447659d407c6cbbf625ab8917f54a
 """
 
 import numpy as np

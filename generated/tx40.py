@@ -1,6 +1,6 @@
 """Stäubli TX40, 6 revolute joints: base parameters, regressor, dynamics.
 
-GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.2.0.
+GENERATED from tx40.yaml, sha256 1cd8e9c50efa, by symgen 0.4.0.
 Do not edit; symgen generate tx40
 
 Modified Denavit-Hartenberg, Khalil and Kleinfinger (1986); q in the order of JOINTS
@@ -76,13 +76,13 @@ Arrays      NumPy's and lists, float64; or those of one other package (CuPy, JAX
             last: these functions are pure, so that jax.jit, vmap, grad and torch.func take them
 CasADi      casadi("inverse_dynamics") is a casadi.Function of columns
 
-Certificate by symgen 0.2.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
+Certificate by symgen 0.4.0: formulas exact modulo 1406887367 and 1406887351, a false one passes
 with probability below 8e-15; base_parameters, regressor, observation_matrix, inverse_dynamics,
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 534ccd38e69f38175c32d14fc06446a3ef29f5d05aa61a7021d34f9b9ec4eaa1
+sha256 of all but these lines: fe65e0d6e9af196077361b26c6528977769cedc97642b6560b5580d4d6328b53
 """
 
 import numpy as np

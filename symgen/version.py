@@ -1,3 +1,3 @@
 """The version, part of the header of every emitted module."""
 
-VERSION = "0.2.0"
+VERSION = "0.4.0"
