@@ -55,7 +55,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs" / "examples"
 
 import haptic_motion
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from problems import observed_states
 
 Array = np.ndarray

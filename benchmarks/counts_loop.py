@@ -43,7 +43,7 @@ from runtime.counts.reading import read_counts
 from runtime.loop.closed_loop import ClosedLoop
 from runtime.study import Study
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from problems import loop_of_records
 
 Array = np.ndarray

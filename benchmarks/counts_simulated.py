@@ -58,7 +58,7 @@ from runtime.loop.reference import Reference, reference_of
 from runtime.loop.simulation import Simulator
 from runtime.study import Study, study_from_mapping
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from problems import observed_states
 
 Array = np.ndarray

@@ -40,7 +40,7 @@ from runtime.reading.datasets import dataset_study, fetch
 from runtime.reading.records import read_records
 from runtime.study import Study, study_from_mapping
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from problems import loop_of_records
 
 GENERATED = Path(__file__).resolve().parents[1] / "generated"

@@ -40,7 +40,7 @@ from symgen import load_robot
 from symgen.certify.witness import bodies
 from symgen.emit.generate import generate_files
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "numeric"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from problems import observed_states
 
 Array = np.ndarray[Any, Any]

@@ -19,7 +19,7 @@ import truth_simulator as world
 from truth_simulator import Bodies, Motion, Robot, Truth
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tests" / "numeric")]
+sys.path[:0] = [str(ROOT / "tests" / "support")]
 
 from slips import Case, Slip  # noqa: E402
 

@@ -29,8 +29,8 @@ REGROUPED = (
     "regroup/test_loops.py",
     "cli/test_generate.py",
 )
-SIGNALS = ("numeric/test_signals.py", "numeric/test_decimation.py", "numeric/test_observation.py")
-ESTIMATES = ("numeric/test_estimators.py", "numeric/test_estimate.py")
+SIGNALS = ("core/test_signals.py", "core/test_decimation.py", "core/test_observation.py")
+ESTIMATES = ("core/test_estimators.py", "core/test_estimate.py")
 
 
 @dataclass(frozen=True)
@@ -70,21 +70,21 @@ FAULTS = (
     Fault("runtime/core/signals/filters.py", "np.gradient(x, 1 / rate, axis=0", "np.gradient(x, 2 / rate, axis=0", "velocities half as large", SIGNALS),
     Fault("runtime/core/signals/filters.py", "CUTOFF * rate / (2 * signals.lowpass.hertz)", "CUTOFF * rate / signals.lowpass.hertz", "decimation by twice the factor of eq. (13)", SIGNALS),
     Fault("runtime/core/signals/filters.py", "np.minimum(np.maximum(a, b), shifted[-1])", "np.minimum(np.minimum(a, b), shifted[-1])", "the running median is the smaller of two", SIGNALS),
-    Fault("runtime/core/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("numeric/test_observation.py",)),
-    Fault("runtime/core/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("numeric/test_observation.py",)),
-    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.window_of_torques)", "tau", "torques without their median filter", ("numeric/test_observation.py", "numeric/test_cestac.py")),
+    Fault("runtime/core/rows/selection.py", "np.abs(qd[instants].T) >= slow", "np.abs(qd[instants]).max(axis=1) >= slow", "low speed judged by the fastest joint", ("core/test_observation.py",)),
+    Fault("runtime/core/rows/selection.py", 'np.searchsorted(t, t1, side="right"', 'np.searchsorted(t, t1, side="left"', "the last sample of a window is lost", ("core/test_observation.py",)),
+    Fault("runtime/core/rows/prepared.py", "median_filtered(tau, selection.signals.window_of_torques)", "tau", "torques without their median filter", ("core/test_observation.py", "core/test_cestac.py")),
     Fault("runtime/core/rows/factor.py", "R=joint.R * w)", "R=joint.R * w**2)", "weights of the joints squared", ESTIMATES),
-    Fault("runtime/core/rows/observation.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("numeric/test_observation.py", *ESTIMATES)),
+    Fault("runtime/core/rows/observation.py", "start = sum(self.rows[:j])", "start = sum(self.rows[: j + 1]) - self.rows[0]", "rows of a joint looked for at another place", ("core/test_observation.py", *ESTIMATES)),
     # model: units and drives
-    Fault("runtime/core/drives.py", "* self.torque_constant) @ self._matrix", "/ self.torque_constant) @ self._matrix", "divided by torque constants", ("numeric/test_drives.py",)),
-    Fault("runtime/core/drives.py", "self._checked(qm).T).T + self.offset", "self._checked(qm).T).T - self.offset", "offset of the joints with the wrong sign", ("numeric/test_drives.py",)),
+    Fault("runtime/core/drives.py", "* self.torque_constant) @ self._matrix", "/ self.torque_constant) @ self._matrix", "divided by torque constants", ("core/test_drives.py",)),
+    Fault("runtime/core/drives.py", "self._checked(qm).T).T + self.offset", "self._checked(qm).T).T - self.offset", "offset of the joints with the wrong sign", ("core/test_drives.py",)),
     # estimators
     Fault("runtime/core/least_squares/linear.py", "freedom = system.weighted.rows - fit.rank", "freedom = system.weighted.rows", "degrees of freedom of sigma_rho, eq. (9)", ESTIMATES),
     Fault("runtime/core/least_squares/linear.py", "else sigma_rho**2)", "else sigma_rho)", "covariance of eq. (10) by the deviation in place of the variance", ESTIMATES),
-    Fault("runtime/core/least_squares/wls.py", "system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known", "system, weighted=raw.weighted(scales), scales=tuple(scales), known", "noisy joints weigh more", ("numeric/test_estimators.py",)),
-    Fault("runtime/robust.py", "(1 - (u / tuning) ** 2) ** 2, 0.0)", "1 - (u / tuning) ** 2, 0.0)", "weight function of Tukey without its square", ("numeric/test_irls.py",)),
-    Fault("runtime/core/least_squares/block_covariance.py", "((V.T @ g)[others] / (1 - share[others]))", "(V.T @ g)[others]", "leverage of a block left out of its deletion", ("numeric/test_estimators.py", "numeric/test_trust.py")),
-    Fault("runtime/core/essential.py", "np.argmax(relative)", "np.argmin(relative)", "the best known parameter is removed first", ("numeric/test_essential.py",)),
+    Fault("runtime/core/least_squares/wls.py", "system, weighted=raw.weighted(1 / scales), scales=tuple(scales), known", "system, weighted=raw.weighted(scales), scales=tuple(scales), known", "noisy joints weigh more", ("core/test_estimators.py",)),
+    Fault("runtime/robust.py", "(1 - (u / tuning) ** 2) ** 2, 0.0)", "1 - (u / tuning) ** 2, 0.0)", "weight function of Tukey without its square", ("test_robust.py",)),
+    Fault("runtime/core/least_squares/block_covariance.py", "((V.T @ g)[others] / (1 - share[others]))", "(V.T @ g)[others]", "leverage of a block left out of its deletion", ("core/test_estimators.py", "core/test_trust.py")),
+    Fault("runtime/core/essential.py", "np.argmax(relative)", "np.argmin(relative)", "the best known parameter is removed first", ("core/test_essential.py",)),
     Fault("runtime/core/least_squares/solution.py", "T = solve_triangular(factor.R11, np.eye(b))", "T = solve_triangular(factor.R11, np.eye(b)).T", "the inverse of R transposed: covariances of other parameters", ESTIMATES),
 )  # fmt: skip
 

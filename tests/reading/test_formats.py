@@ -2,7 +2,7 @@
 the same parameters to 1e-9 from its time stamps.
 
 The TX40 record, one sample in five, motor side. The whole record is run by `python
-tests/numeric/test_formats.py`.
+tests/reading/test_formats.py`.
 """
 
 import gzip
