@@ -147,7 +147,7 @@ def test_rank_loss_and_bad_options():
 
 def test_emps_record(emps_data):
     study = study_from_mapping(dataset_study("emps"))
-    model = load_model(Path(__file__).resolve().parents[2] / "generated" / "emps.py")
+    model = load_model(Path(__file__).resolve().parents[1] / "generated" / "emps.py")
     seen = observe(model, read_records(study.record, model)[0], study)
     plain = estimate_of(seen, study.estimate)
     for settings in (HUBER, TUKEY):

@@ -14,7 +14,7 @@ from runtime.core.model import check_states, joint_units, require
 from symgen.description import load_robot
 from symgen.emit.generate import generate_module
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parents[1] / "support"
 EMITTED = HERE.parents[1] / "generated"
 HEAD = '"""A model."""\nimport numpy as np\n'
 

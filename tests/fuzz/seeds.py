@@ -175,7 +175,7 @@ def parquet_files() -> tuple[bytes, ...]:
 @cache
 def bags() -> tuple[dict[str, bytes], ...]:
     """Bags of ROWS messages, plain and compressed: the files of each by name."""
-    from numeric.bag_files import KINDS, joint_states, write_bag
+    from bag_files import KINDS, joint_states, write_bag
 
     stamps = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(ROWS)
     x = record_columns()

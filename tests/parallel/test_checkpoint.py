@@ -103,7 +103,7 @@ SCRIPT = """
 import os, resource, sys, time
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ[name] = "1"
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = [sys.argv[1], os.path.join(sys.argv[1], "..", "support")]
 from pathlib import Path
 from test_checkpoint import RECORD, Checkpoint, cestac, planar, study
 if sys.argv[3] != "0":

@@ -48,7 +48,8 @@ def processes():
         host="127.0.0.1",
     ) as local:
         with dask.Client(local) as client:
-            client.register_plugin(SearchPath(str(Path(__file__).parent)))
+            here = Path(__file__).parent
+            client.register_plugin(SearchPath([str(here), str(here.parent / "support")]))
         yield local
 
 
@@ -57,11 +58,11 @@ class SearchPath(dask.WorkerPlugin):
 
     name = "tests"
 
-    def __init__(self, folder):
-        self.folder = folder
+    def __init__(self, folders):
+        self.folders = folders
 
     def setup(self, worker):
-        sys.path.insert(0, self.folder)
+        sys.path[:0] = self.folders
 
 
 def dying_once(folder, key):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numeric.bag_files import joint_states, write_bag
+from bag_files import joint_states, write_bag
 
 from runtime.core.errors import InputError
 from runtime.reading.records import read_records

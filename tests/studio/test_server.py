@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numeric.bag_files import joint_states, write_bag
+from bag_files import joint_states, write_bag
 
 import symgen
 from symgen.studio import guard, server, serving, table
