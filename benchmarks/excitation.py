@@ -27,9 +27,10 @@ from simulation import LAW
 
 from runtime import load_model
 from runtime.compose import estimate_of, excite, observe
+from runtime.core.rows.predicted import kept_correlation
 from runtime.core.settings import structure
 from runtime.core.signals.filters import decimated, decimation_factor
-from runtime.excitation.criteria import excesses, kept_correlation, planned, weights_of
+from runtime.excitation.criteria import excesses, planned, weights_of
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.control_law import parameters_of
 from runtime.loop.reference import Reference

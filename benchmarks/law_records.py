@@ -18,9 +18,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import runtime
 import symgen
 from runtime.compose import estimate_of, problem
+from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import stacked
@@ -37,7 +37,7 @@ CALVES = (3, 6, 9, 12)
 KP, KD = (20, 20, 40), (1, 1, 2)
 
 
-def go2_model() -> runtime.GeneratedModel:
+def go2_model() -> GeneratedModel:
     """The twelve joints, base fixed in the air."""
     text = (DATA / "go2" / "go2.xml").read_text().replace("<freejoint/>", "")
     with TemporaryDirectory() as folder:
@@ -69,13 +69,13 @@ def go2_study(
     )
 
 
-def observed(model: runtime.GeneratedModel, study: Study) -> list[Observation]:
+def observed(model: GeneratedModel, study: Study) -> list[Observation]:
     """Rows of each run, one cut-off for all."""
     records = read_records(study.record, model)
     return [reading.observation(model) for reading in problem(model, records, study).prepared]
 
 
-def left_out(model: runtime.GeneratedModel, runs: Sequence[Observation]) -> np.ndarray:
+def left_out(model: GeneratedModel, runs: Sequence[Observation]) -> np.ndarray:
     """Error on each run, %, of a fit of the others."""
     errors = []
     for k, own in enumerate(runs):
@@ -87,7 +87,7 @@ def left_out(model: runtime.GeneratedModel, runs: Sequence[Observation]) -> np.n
 
 
 def spread(
-    model: runtime.GeneratedModel, runs: Sequence[Observation], names: Sequence[str]
+    model: GeneratedModel, runs: Sequence[Observation], names: Sequence[str]
 ) -> list[tuple[str, float, float, float]]:
     """Mean over fits of single runs, their scatter, and the stated deviation, by name."""
     fits = [estimate_of(one, WEIGHTED, model=model) for one in runs]

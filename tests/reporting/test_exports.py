@@ -19,7 +19,7 @@ import scipy.io
 from planar_data import OLS, WLS, observation, one_joint_at_rest
 
 from runtime import InputError
-from runtime.compose import estimate_of
+from runtime.compose import estimate_of, json_schema
 from runtime.core.cestac.result import Cestac, cestac_arrays, cestac_csv, level_result
 from runtime.core.cestac.runs import Level, Run, Runs
 from runtime.core.latex import escaped, name_cell, number_cell, unit_cell
@@ -32,7 +32,6 @@ from runtime.reporting.arrays import (
     matlab_names,
     npz,
 )
-from runtime.study import json_schema
 
 HOSTILE = (
     "\\input{/etc/passwd}",
