@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "support")]
 
-import slips  # noqa: E402
+import slip_cases  # noqa: E402
 import slips_simulated  # noqa: E402
 
 
@@ -23,7 +23,7 @@ def main(which: list[str]) -> None:
     folder = Path(os.environ["SYMGEN_DATA"])
     numbers = next((word for word in which if word[0].isdigit()), "1-99").split("-")
     names = [word for word in which if not word[0].isdigit()]
-    for name, case, listed in (*slips.campaigns(folder), *slips_simulated.campaigns()):
+    for name, case, listed in (*slip_cases.campaigns(folder), *slips_simulated.campaigns()):
         if names and not any(word in name for word in names):
             continue
         result = case.judged()
@@ -38,7 +38,7 @@ def main(which: list[str]) -> None:
             if not int(numbers[0]) <= slip.number <= int(numbers[-1]):
                 continue
             start = time.process_time()
-            state, text = slips.told(case, slip.change(case), slip, usual)
+            state, text = slip_cases.told(case, slip.change(case), slip, usual)
             counts[state] += 1
             print(
                 (

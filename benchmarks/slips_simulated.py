@@ -21,7 +21,7 @@ from truth_simulator import Bodies, Motion, Robot, Truth
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests" / "support")]
 
-from slips import Case, Slip  # noqa: E402
+from slip_cases import Case, Slip  # noqa: E402
 
 from symgen.description import load_robot  # noqa: E402
 from symgen.description.files import write_robot  # noqa: E402

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import slips
+import slip_cases
 from campaign import campaign, sampled, some
 
 import runtime
@@ -32,24 +32,24 @@ DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 
 @pytest.fixture(scope="module")
-def right() -> slips.Case:
-    return slips.palletiser()
+def right() -> slip_cases.Case:
+    return slip_cases.palletiser()
 
 
-def test_a_right_study_is_left_alone(right: slips.Case) -> None:
+def test_a_right_study_is_left_alone(right: slip_cases.Case) -> None:
     found = right.judged()
     assert found.worst is None and found.line == "" and not found.named
     assert abs(found.delay.common) < 1e-3
 
 
-@pytest.mark.parametrize("slip", sampled(slips.SIMULATED, 3), ids=lambda slip: slip.name)
+@pytest.mark.parametrize("slip", sampled(slip_cases.SIMULATED, 3), ids=lambda slip: slip.name)
 @some(1)
-def test_a_slip_of_the_palletiser_is_named(right: slips.Case, slip: slips.Slip) -> None:
-    state, text = slips.told(right, slip.change(right), slip, set())
+def test_a_slip_of_the_palletiser_is_named(right: slip_cases.Case, slip: slip_cases.Slip) -> None:
+    state, text = slip_cases.told(right, slip.change(right), slip, set())
     assert state == "named", text
 
 
-def test_speeds_for_other_joints_are_refused_by_name(right: slips.Case) -> None:
+def test_speeds_for_other_joints_are_refused_by_name(right: slip_cases.Case) -> None:
     model, record, study, _ = right.parts()
     study = replace(study, rows=replace(study.rows, low_speed=(0.1,) * (record.n + 1)))
     with pytest.raises(runtime.InputError, match=r"rows.low_speed has \d values; expected one or"):
@@ -59,11 +59,11 @@ def test_speeds_for_other_joints_are_refused_by_name(right: slips.Case) -> None:
 def test_free_tables_are_the_tables_of_other_robots() -> None:
     """alpha, length and gravity as arguments give what a robot file with these entries gives."""
     changed = (
-        slips.PALLETISER.replace("alpha: -pi/2", "alpha: 0.7")
+        slip_cases.PALLETISER.replace("alpha: -pi/2", "alpha: 0.7")
         .replace("D3: 1.0", "D3: 1.7")
         .replace("[0, 0, -g]", "[g, 0, 0]")
     )
-    free = symgen.variants(parse_robot(slips.PALLETISER.encode(), "a"))
+    free = symgen.variants(parse_robot(slip_cases.PALLETISER.encode(), "a"))
     other = symgen.model(parse_robot(changed.encode(), "b"))
     rng = np.random.default_rng(3)
     q, qd, qdd = rng.standard_normal((3, 7, 4))
@@ -75,7 +75,7 @@ def test_free_tables_are_the_tables_of_other_robots() -> None:
     )
 
 
-def test_the_physical_fit_is_that_of_another_cone_program(right: slips.Case) -> None:
+def test_the_physical_fit_is_that_of_another_cone_program(right: slip_cases.Case) -> None:
     """The weighted squares from normal equations against those from residuals, on rows of noise,
     where conditions bind.
     """
@@ -104,7 +104,7 @@ def test_the_physical_fit_is_that_of_another_cone_program(right: slips.Case) -> 
     assert physical_fit(grams, bodies, 1.0, sigma).score >= free.score - 1e-6
 
 
-def test_the_distance_from_values_is_least_at_them(right: slips.Case) -> None:
+def test_the_distance_from_values_is_least_at_them(right: slip_cases.Case) -> None:
     """Links with all ten values pull, those with some do not; at the values the distance is 0, and
     where nothing is measured the fit is there.
     """
@@ -229,7 +229,7 @@ def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
         runtime.identify(model, runtime.Record(t, q, np.cos(q)))
 
 
-def test_too_few_samples_are_not_judged(right: slips.Case) -> None:
+def test_too_few_samples_are_not_judged(right: slip_cases.Case) -> None:
     short = replace(right, t=right.t[:400], q=right.q[:400], tau=right.tau[:400])
     found = short.judged()
     assert not found.named and any(
@@ -301,15 +301,15 @@ def test_right_studies_of_a_large_arm_are_told_no_cause(
     8.9 degrees off 21.
     """
     letter, values = study
-    assert slips.kr300(kr300_folder, letter, values=values).judged().named == ()
+    assert slip_cases.kr300(kr300_folder, letter, values=values).judged().named == ()
 
 
 @campaign
 @pytest.mark.parametrize("number", [1, 6, 8, 13, 18, 24])
 def test_slips_of_the_kr300_are_named(kr300_folder: Path, number: int) -> None:
-    slip = next(slip for slip in slips.KR300 if slip.number == number)
-    case = slips.kr300(kr300_folder, values=True)
-    state, text = slips.told(case, slip.change(case), slip, set())
+    slip = next(slip for slip in slip_cases.KR300 if slip.number == number)
+    case = slip_cases.kr300(kr300_folder, values=True)
+    state, text = slip_cases.told(case, slip.change(case), slip, set())
     assert state == "named", text
 
 
@@ -321,8 +321,8 @@ def test_slips_that_the_kr300_hides_are_told_no_other_cause(
     """A length 30 % too long gained 52 nats as a spring by the values of the file, two exchanged
     ratios that differ by 7 % up to 40 as the scale of a position.
     """
-    slip = next(slip for slip in slips.KR300 if slip.number == number)
-    assert slip.change(slips.kr300(kr300_folder, values=True)).judged().named == ()
+    slip = next(slip for slip in slip_cases.KR300 if slip.number == number)
+    assert slip.change(slip_cases.kr300(kr300_folder, values=True)).judged().named == ()
 
 
 @pytest.fixture(scope="module")
@@ -335,7 +335,7 @@ def kr300_folder() -> Path:
     pytest.skip("no record of the KR300 in SYMGEN_DATA")
 
 
-def test_samples_hold_the_motion_and_the_known_torque(right: slips.Case) -> None:
+def test_samples_hold_the_motion_and_the_known_torque(right: slip_cases.Case) -> None:
     record = runtime.Record(right.t, right.q, right.tau, tau_known=np.full_like(right.q, 2.0))
     samples = samples_of([Prepared(record, Study(), lowpassed)], Study())
     assert np.allclose(samples.tau_known, 2.0) and np.allclose(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import slips
+import slip_cases
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
@@ -20,8 +20,8 @@ from truth_simulator import Truth
 
 
 @pytest.fixture(scope="module")
-def right() -> slips.Case:
-    return slips.palletiser()
+def right() -> slip_cases.Case:
+    return slip_cases.palletiser()
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +29,13 @@ def arm() -> slips_simulated.Simulated:
     return slips_simulated.Simulated("wrist")
 
 
-def causes(case: slips.Case) -> list[str]:
+def causes(case: slip_cases.Case) -> list[str]:
     return [one["cause"] for one in case.judged().named_causes]
 
 
 @pytest.mark.parametrize(("joint", "scale"), [(2, 1.1), (3, 0.9), (4, 2.0), (2, 0.5)])
 def test_the_scale_of_a_position_is_named_with_its_size(
-    right: slips.Case, joint: int, scale: float
+    right: slip_cases.Case, joint: int, scale: float
 ) -> None:
     """It was read as a delay or a coupling. Motor side, about the zero of the encoder."""
     q = np.where(np.arange(right.q.shape[1]) == joint - 1, scale, 1.0) * right.q
@@ -60,7 +60,7 @@ def test_a_factor_far_from_its_first_step_is_found() -> None:
 
 @pytest.mark.parametrize("side", ["joint", "motor"])
 def test_two_columns_that_are_one_are_named(
-    right: slips.Case, arm: slips_simulated.Simulated, side: str
+    right: slip_cases.Case, arm: slips_simulated.Simulated, side: str
 ) -> None:
     """Columns of the file: those of motors with other gears are no equal positions of joints."""
     case = arm.right if side == "joint" else right
@@ -69,7 +69,7 @@ def test_two_columns_that_are_one_are_named(
     assert "Positions of joints 2 and 3 are the same" in [one.finding for one in found.checks()]
 
 
-def test_torques_with_the_wrong_sign_have_friction(right: slips.Case) -> None:
+def test_torques_with_the_wrong_sign_have_friction(right: slip_cases.Case) -> None:
     """The best physical robot of these has none: it cannot be negative."""
     checks = {one.question: one.state for one in replace(right, tau=-right.tau).judged().checks()}
     assert checks["Were the torques measured?"] == "good"

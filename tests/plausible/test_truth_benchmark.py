@@ -12,7 +12,7 @@ from campaign import sampled
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-import slips
+import slip_cases
 import slips_simulated
 import truth
 import truth_counts
@@ -157,7 +157,7 @@ def test_slips_of_strangers_are_named(slip_of: tuple[str, int]) -> None:
     robot = slips_simulated.Simulated(name)
     (slip,) = (slip for slip in robot.slips() if slip.number == number)
     assert robot.right.judged().worst is None
-    state, text = slips.told(robot.right, slip.change(robot.right), slip, set())
+    state, text = slip_cases.told(robot.right, slip.change(robot.right), slip, set())
     assert state == "named", text
 
 
