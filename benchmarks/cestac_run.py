@@ -63,15 +63,17 @@ def task_of(model: GeneratedModel, record: Record, study: Study, names: tuple[st
     """What every run of the study needs."""
     study = replace(study, cestac=replace(study.cestac, median=1))
     drives = Drives.from_mapping(model.DRIVES) if model.DRIVES else None
+    whole = problem(model, record, study)
     return Task(
-        (prepared_record(problem(model, record, study).prepared[0], study, own_encoder),),
+        (prepared_record(whole.prepared[0], study, own_encoder),),
         model,
         names,
         replace(study.estimate, columns="all"),
         study.cestac,
         levels_of(study.cestac),
         drives,
-        {},
+        whole.reader,
+        whole.methods,
     )
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from runtime.core.errors import SettingsError
 from runtime.loop.settings import Controller
@@ -85,6 +84,8 @@ def late(t: Array, x: Array, delay: float) -> Array:
     """x, shape (N, n), later by `delay` s, between samples by a cubic spline; ends repeat."""
     if not delay:
         return x
+    from scipy.interpolate import CubicSpline  # 60 ms, where it is used
+
     return np.asarray(CubicSpline(t, x)(np.clip(t - delay, t[0], t[-1])))
 
 

@@ -25,7 +25,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from runtime.core.clock import GAP, TimeStamps, remedy_text, time_stamps
 from runtime.core.errors import InputError
@@ -202,6 +201,8 @@ def _uniform(t: Array, signals: Sequence[Array], rate: float, method: str) -> St
 def _interpolated(t: Array, x: Array, at: Array, method: str) -> Array:
     """x, shape (N, n), at other instants; of a mask, whether a sample next to them is in it."""
     if method == "cubic" and x.dtype != np.bool_:
+        from scipy.interpolate import CubicSpline  # 60 ms, where it is used
+
         return np.asarray(CubicSpline(t, x, axis=0)(at))
     straight = np.stack([np.interp(at, t, column) for column in x.T], axis=1)
     return straight > LAST if x.dtype == np.bool_ else straight
