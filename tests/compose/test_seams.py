@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from features import STRIBECK, arm, force_sensors, record, study
+from features import STRIBECK, arm, force_sensors, record, recorded_speeds, study
 
 import runtime
 import symgen
@@ -108,3 +108,17 @@ def test_cestac_compares_with_the_estimate_of_identify(tx40_data, median):
     reference = cestac(model, records, asked).reference
     assert reference.names == found.names
     np.testing.assert_allclose(reference.X, found.estimate.X, rtol=1e-12)
+
+
+def test_steps_change_recorded_velocities_with_the_positions(tmp_path):
+    """Runs of steps of nothing are the estimate of identify, and coarse steps move it as they move differences."""
+    case = recorded_speeds(tmp_path)
+    settings = replace(
+        case.study.cestac, delta=(1e-9, 1e-3), runs=5, median=case.study.signals.median
+    )
+    asked = replace(case.study, cestac=settings)
+    found = cestac(case.model, case.records, asked)
+    assert found.reference.settings["signals"]["velocity"] != "auto"
+    X = found.reference.X
+    assert np.abs(found.levels[0].mean - X).max() < 1e-5 * np.abs(X).max()
+    assert np.abs(found.levels[1].mean - X).max() > 1e-3 * np.abs(X).max()

@@ -32,9 +32,9 @@ from runtime.core.rows.observation import Observation, stack
 from runtime.core.rows.prepared import Prepared, decimated_torque, observation_of, stacked
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, select_rows
-from runtime.core.signals.filters import States, filtered_states
+from runtime.core.signals.filters import States, derivative, filtered_states
 from runtime.core.signals.states import Reader, require_motion
-from runtime.core.study import CestacSettings, EstimateSettings, Study
+from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
 
 Array = np.ndarray
 
@@ -64,6 +64,9 @@ class PreparedRecord:
         Functions of time that laws of the model read, (N,) by name.
     note : str
         Why the record as measured is not read as counts, where the study asks for counts.
+    slip : ndarray or None, shape (N, n), rad/s or m/s
+        Recorded velocities less the differences of q, where signals.velocity uses them. A drive takes its velocity from its
+        encoder, so that steps change both and leave this.
     """
 
     q: Array
@@ -77,6 +80,7 @@ class PreparedRecord:
     missing: Missing | None = None
     channels: Mapping[str, Array] = field(default_factory=dict)
     note: str = ""
+    slip: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +159,8 @@ def prepared_record(
     else:  # without a limit any speed will do
         speeds = record.q
         if np.any(study.rows.low_speed):
-            speeds = (counts or filtered_states(record.q, record.rate, signals)).qd
+            v = record.channels.get("qd")
+            speeds = (counts or filtered_states(record.q, record.rate, signals, v)).qd
         selection = select_rows(record, speeds, signals, study.rows)
         torque = decimated_torque(record.torque, selection)
     return PreparedRecord(
@@ -170,7 +175,16 @@ def prepared_record(
         record.missing,
         own.channels,
         note,
+        _slip(record, signals),
     )
+
+
+def _slip(record: Record, signals: Signals) -> Array | None:
+    v = record.channels.get("qd")
+    if v is None or isinstance(signals.velocity, str):
+        return None
+    slip: Array = v - derivative(record.q, record.rate, signals.ends)
+    return slip
 
 
 def prepared_records(
@@ -303,7 +317,8 @@ def run_states(task: Task, record: PreparedRecord, q: Array, level: Level) -> St
     """
     signals = record.selection.signals
     if signals.reader == "lowpass" or not level.delta:
-        states = record.states or filtered_states(q, record.rate, signals)
+        v = None if record.slip is None else derivative(q, record.rate, signals.ends) + record.slip
+        states = record.states or filtered_states(q, record.rate, signals, v)
     else:
         known = replace(signals, step=level.delta, side=task.settings.side)
         try:
