@@ -80,8 +80,11 @@ def identify(
         )
         if results is not None:
             runtime.report(result, results)
-        said = session.assumptions_of(robot, records, study, exact=exact)
-        text = result.to_text() if verbose else result.brief(len(said))
-        text = "\n".join([*(f"assume: {line}" for line in said), text])
-        session.show(result.to_json() if json else text, results, json=json)
+        if json:
+            text = result.to_json()
+        else:
+            said = session.assumptions_of(robot, records, study, exact=exact)
+            found = result.to_text() if verbose else result.brief(len(said))
+            text = "\n".join([*(f"assume: {line}" for line in said), found])
+        session.show(text, results, json=json)
     session.end(good=result.checklist.state != "no")
