@@ -158,14 +158,14 @@ class FittedLaws(Part):
 
 
 def fitted_scalars(problem: Problem) -> Problem:
-    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself where it has none.
+    """The step: the model with the scalars of its laws fitted to the records (`fit:` of the robot file); the problem itself where there are none.
 
     Raises
     ------
     InputError
         A method that simulates the loop with the scalars of the file.
     """
-    if not hasattr(problem.model, "FIT"):
+    if not problem.records or not hasattr(problem.model, "FIT"):
         return problem
     estimate = problem.settings.estimate
     if problem.method.observe is not None:

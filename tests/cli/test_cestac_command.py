@@ -152,7 +152,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(emps_data, tmp_p
 
     def interrupted(checkpoint, runs):
         taken.append(len(runs))
-        checkpoint._new.append(runs)
+        checkpoint._runs.append(runs)
         if sum(taken) >= 6:
             raise KeyboardInterrupt
 

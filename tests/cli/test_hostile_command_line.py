@@ -239,7 +239,13 @@ def test_corpus(path, tmp_path):
             command = ("convert", "emps", "out.urdf", "--estimate", file)
         case _:
             command = ("identify", "model.py", file)
-    code, said = answered(*command)
+    if FORMATS[path.parent.name].foreign:  # a library may end the process: docs/reliability.md
+        ended = symgen(*map(str, command))
+        code, said = ended.returncode, ended.stderr.decode()
+        if code < 0:
+            return
+    else:
+        code, said = answered(*command)
     refuted = (
         code == 1 and "say --at-values" in said
     )  # a valid file, at whose constants the generic formulas do not hold
