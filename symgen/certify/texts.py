@@ -44,7 +44,8 @@ HELPERS = {"store", "casadi"}
 NUMPY, STACKED, CASADI = "on NumPy's arrays", "stacked as for other packages", "by CasADi"
 DERIVATIVES = "inverse_dynamics_derivatives"
 Use = Callable[[ModuleType, str, Check, Mapping[str, float]], Array]
-TILES = 70  # samples of the functions in C: some tiles, the last one not full
+TILES = 71  # samples of the functions in C: some tiles, the last not full; odd, so that rows of a
+# store begin anywhere in a line of the cache
 
 
 @dataclass(frozen=True)
