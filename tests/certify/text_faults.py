@@ -42,16 +42,29 @@ SAME = (  # changed lines that change no value, and why
     (r"how == -1|S - start, how\)", "the way of writing: through the caches, or past them"),
     (r"reshape\(\d+, -2\)", "NumPy takes any negative size as the one that is left"),
     (r"np\.ndindex\(\d+, 3, 4\)", "the last row of a pose, which is not read there"),
-    (r"memset\(tile, 1", "lanes of a tile beyond the samples, whose results are not kept"),
+    (
+        r"memset\(tile, (1,|0, [2-9] \+ sizeof tile\[0\])",
+        "lanes of a tile beyond the samples, whose results are not kept",
+    ),
+    (r"memset\(tile, 0, \d\*sizeof tile\[1\]\)", "every row of a tile has one size"),
+    (
+        r"beyond \? (9 - beyond|8 \+ beyond)",
+        "samples at a time: 1 to 15, of the 16 or more of a tile",
+    ),
+    (r"N = len\(states\[[12]\]\)", "states are of one shape, which `_states` checks before"),
     (r"for \(size_t t = 1; t < 8", "at most seven samples wait for their line of the cache"),
     (r"ready = -True", "what is not zero is true"),
     (r"= -(np\.zeros|ca\.SX\()", "minus zero, where every entry is written"),
-    (r"^    if N <= |every = int", "samples at a time"),
+    (r"     if N <= |every = int", "samples at a time"),
     (r"start && start \+ N >= TILE", "writes the same numbers again"),
     (r"VP242 = C5b", "cancels: N342 enters NE332 and NE322, whose difference A holds"),
 )
 # Survivors that are no such thing: they change the way to a solution, not what is accepted as one.
 WAYS = (
+    (
+        r"put\(\(size_t\)m, D, kept, 137, 158, tx40_entries",
+        "one row more than `kept` has waits, and is never read; sanitizers of test_c_target.py see it",
+    ),
     (r"-?xp\.zeros_like\(T\[|- zero,", "zeros and their opposites are the same numbers"),
     (
         r"-beyond \?|-how == 1|S \+ start, 1\)",
@@ -256,6 +269,19 @@ def equivalent(fault: Fault) -> str:
     text = texts(name)[1][fault.file][1]
     body = [line for f, _, line in code_lines(text, c == "c") if f == fault.function]
     if old[0] == new[0] and re.fullmatch(NAME, old[0]):
+        below = [
+            parts(line, c == "c")
+            for f, number, line in code_lines(text, c == "c")
+            if f == fault.function and number > fault.line
+        ]
+        again = [k for k, (left, _) in enumerate(below) if left == old[0]]  # the next loop's own
+        reads = " ".join(right for _, right in below[: (again or [None])[0]])
+        if (
+            c == "c"
+            and new[1] == f"-{old[1]}"
+            and not re.search(rf"\b{old[0]}\b", reads.replace(f"cos({old[0]})", ""))
+        ):
+            return f"{old[0]} is read by cosines alone"
         if not any(
             re.search(rf"\b{old[0]}\b", parts(line, fault.target == "c")[1]) for line in body
         ):

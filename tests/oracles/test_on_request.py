@@ -130,7 +130,8 @@ def test_a_wrong_function_on_request_is_refused() -> None:
         line = next(
             x for x in text[body:].splitlines() if " = " in x and "[" in x.partition(" = ")[0]
         )
-        changed = line.replace(" = ", " = 2*", 1)
+        names, _, value = line.rpartition(" = ")  # one line may fill several entries
+        changed = f"{names} = 2*{value}"
         wrong = text[:body] + text[body:].replace(line, changed, 1)
         assert certify(regrouping, {file: wrong}, OPTIONS).texts[file].wrong == [function]
 
