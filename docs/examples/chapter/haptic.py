@@ -82,7 +82,9 @@ def main(folder: Path, quick: bool) -> None:
 
     def resolution(drives: Drives | None = None, **settings: object) -> runtime.Cestac:
         changed = replace(study, cestac=replace(study.cestac, **settings))
-        return runtime.cestac(model, record, changed, columns=names, drives=drives)
+        motors = drives or record.origin.drives
+        driven = replace(record, origin=replace(record.origin, drives=motors))
+        return runtime.cestac(model, driven, changed, columns=names)
 
     deltas = (motion.DELTA[0], ONSET, *motion.DELTA[1:])
     roundings = {
