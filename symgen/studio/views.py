@@ -139,6 +139,8 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     from runtime.reading.formats import read_table
 
     opened = read_table(Path(path))
+    if not opened.names and opened.refused:
+        raise next(iter(opened.refused.values()))
     names = list(opened.names)[:NAMES_LISTED]
     asked = [n for n in request.get("columns", "").split(",") if n in names]
     chosen = opened.chosen(asked)
