@@ -136,11 +136,13 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     rows and thinned lines; rate and gaps by the column `t`.
     """
     from runtime.core.clock import time_stamps
+    from runtime.core.errors import InputError
     from runtime.reading.formats import read_table
 
     opened = read_table(Path(path))
-    if not opened.names and opened.refused:
-        raise next(iter(opened.refused.values()))
+    if not opened.names:
+        nothing = InputError("no columns of numbers", file=opened.file)
+        raise next(iter(opened.refused.values()), nothing)
     names = list(opened.names)[:NAMES_LISTED]
     asked = [n for n in request.get("columns", "").split(",") if n in names]
     chosen = opened.chosen(asked)
