@@ -136,7 +136,6 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     rows and thinned lines; rate and gaps by the column `t`.
     """
     from runtime.core.clock import time_stamps
-    from runtime.core.errors import InputError
     from runtime.reading.formats import read_table
 
     opened = read_table(Path(path))
