@@ -64,12 +64,13 @@ class InputError(ValueError):
         row: str | None = None,
         remedy: Mapping[str, Any] | None = None,
     ) -> None:
-        self.message, self.file, self.column, self.row = message, file, column, row
+        self.message = printable(message)
+        self.file, self.column, self.row = file, column, row
         self.remedy = remedy
         place = ", ".join(
             part for part in (file, None if column is None else f"column {column!r}", row) if part
         )
-        super().__init__(printable(f"{place}: {message}" if place else message))
+        super().__init__(printable(f"{place}: {self.message}" if place else self.message))
 
 
 class SettingsError(InputError):

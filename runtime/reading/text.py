@@ -24,14 +24,6 @@ CLOCK = re.compile(r"\d:\d\d|\d{4}-\d\d-\d\d")  # a time of day, a date
 UTF8 = "save it so (Excel: CSV UTF-8; elsewhere: iconv -f CP1252 -t UTF-8)"
 Lines = Iterator[tuple[int, str]]  # number of a line, from 1, and what stands there
 
-SHOWN = 20
-"""Names that a message lists."""
-
-
-def shorten(text: str, most: int = 200) -> str:
-    """The beginning of a text from a file, for a message."""
-    return text if len(text) <= most else f"{text[:most]} ..."
-
 
 def read_text(path: Path, options: Options) -> Table:
     """Table of a text file; without a header line the columns are called 1, 2, 3 ..."""
@@ -51,9 +43,7 @@ def read_text(path: Path, options: Options) -> Table:
     names = tuple(header) if has_header else tuple(str(k + 1) for k in range(len(header)))
     double = sorted(name for name, count in Counter(names).items() if count > 1)
     if double:
-        raise InputError(
-            f"header names {shorten(', '.join(double[:SHOWN]))} more than once", file=file
-        )
+        raise InputError(f"header names {', '.join(double)} more than once", file=file)
     refused: dict[str, InputError] = {}
     empty: dict[str, str] = {}
     values = _parsed(path, has_header, delimiter, decimal)
@@ -61,8 +51,7 @@ def read_text(path: Path, options: Options) -> Table:
         lines = islice(_lines(path), has_header, None)
         values = _by_fields(file, lines, names, delimiter, decimal, refused, empty)
     if not len(values):
-        shown = shorten(", ".join(names[:SHOWN]))
-        raise InputError(f"no line of numbers under the header {shown}", file=file)
+        raise InputError(f"no line of numbers under the header {', '.join(names)}", file=file)
     return Table(
         file=file,
         columns=dict(zip(names, values.T, strict=True)),
