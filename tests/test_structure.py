@@ -25,7 +25,7 @@ ROOMS = {
         "emit",
         "symbols",
         "certify",
-        "report",
+        "pages",
         "update",
         "demo",
         "studio",
@@ -69,7 +69,7 @@ EDGES = {  # of runtime: a feature imports core and itself; what else it uses, a
 ONLY_IN = {  # library: files and folders that may import it
     "jinja2": (
         "symgen/emit/render.py",
-        "symgen/report/page.py",
+        "symgen/pages/page.py",
         "symgen/studio/server.py",
         "runtime/reporting/page.py",
     ),

@@ -10,7 +10,7 @@ from reference import regrouped
 from sphinx.application import Sphinx
 
 from symgen.description import packaged_robots
-from symgen.report.page import robot_page
+from symgen.pages.page import robot_page
 
 
 def write_pages(app: Sphinx, failure: Exception | None) -> None:

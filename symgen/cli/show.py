@@ -126,8 +126,8 @@ def show(
         elif html:
             typer.echo(page_file(described, output))
         else:
+            from symgen.pages.formulas import printed
             from symgen.regroup.regrouping import regroup
-            from symgen.report.formulas import printed
 
             form = "recursive" if recursive else kind
             typer.echo(printed(regroup(described), form, only))
@@ -135,8 +135,8 @@ def show(
 
 def page_file(robot: Robot, output: Path | None) -> Path:
     """Path of the page of a robot, written to `output` or to <name>.html."""
+    from symgen.pages.page import robot_page
     from symgen.regroup.regrouping import regroup
-    from symgen.report.page import robot_page
 
     path = output or Path(f"{robot.name}.html")
     return write_all(path.parent, {path.name: robot_page(regroup(robot))})[0]

@@ -48,7 +48,7 @@ def application(server: Server, port: int, end: Callable[[], None]) -> Guard:
 
     mounts = [
         Mount(f"/{name}", StaticFiles(directory=str(files("symgen").joinpath(place))))
-        for name, place in {"static": "studio/static", "report": "report"}.items()
+        for name, place in {"static": "studio/static", "pages": "pages"}.items()
     ]
     inner = [Route("/events", events), *mounts, *Pages(server).routes()]
     app = Starlette(routes=[Mount(f"/{server.token}", routes=inner)], lifespan=lifespan)

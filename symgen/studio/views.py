@@ -25,7 +25,7 @@ from symgen.derive.doubts import doubts
 from symgen.derive.loops import close
 from symgen.description.files import write_robot
 from symgen.errors import SymgenError
-from symgen.report.figure import figure
+from symgen.pages.figure import figure
 
 INSTANTS_DRAWN = 800  # instants of a plot
 FIRST_ROWS = 5  # first ones that are shown
@@ -80,8 +80,8 @@ def formulas(path: str, before: str) -> dict[str, Any]:
     what the edit of the text `before` has changed.
     """
     from symgen.emit.spec import module_spec
-    from symgen.report.effects import effects
-    from symgen.report.page import printed
+    from symgen.pages.effects import effects
+    from symgen.pages.page import printed
     from symgen.symbols import expressions
     from symgen.symbols.printers import math, math_terms
 

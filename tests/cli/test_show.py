@@ -184,7 +184,7 @@ def test_show_emits_and_certifies_nothing(monkeypatch):
 
     for name in [n for n in sys.modules if n.startswith("symgen.certify")]:
         monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setattr("symgen.report.formulas.operations", None)
+    monkeypatch.setattr("symgen.pages.formulas.operations", None)
     assert run("tx40").exit_code == 0 and run("tx40", "--format", "latex").exit_code == 0
     model = run("planar_2r", "--model", "inertia_matrix", "--format", "latex")
     assert model.exit_code == 0

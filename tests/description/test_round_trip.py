@@ -91,7 +91,7 @@ def test_packaged_robots_are_written(name: str) -> None:
 def test_limits_as_numbers_are_to_either_side() -> None:
     """A robot made in Python: its limits in the module, the page, the URDF and the file."""
     from symgen.description.urdf_write import write_urdf
-    from symgen.report.page import robot_page
+    from symgen.pages.page import robot_page
 
     robot = replace(load_robot("planar_2r"), limits={"q": (1.5, (-0.5, 2)), "qd": (3.0, 3.0)})
     assert robot.limits["q"] == ((-1.5, 1.5), (-0.5, 2.0)) == written_again(robot).limits["q"]

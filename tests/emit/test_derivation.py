@@ -22,9 +22,9 @@ from symgen.derive.newton_euler import Motion
 from symgen.description import Robot, load_robot, packaged_robots
 from symgen.emit.generate import generate_files
 from symgen.emit.spec import module_spec, spec_of
+from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import _regrouped, regroup
 from symgen.regroup.residues import _acting
-from symgen.report.page import robot_page
 
 TARGETS = ("numpy", "casadi", "xp", "c")
 

@@ -29,8 +29,8 @@ from symgen.description.tree_robot import read_tree
 from symgen.description.urdf_write import write_urdf
 from symgen.emit.generate import generate_files
 from symgen.errors import SymgenError
+from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import regroup
-from symgen.report.page import robot_page
 
 TARGETS = ("numpy", "c")
 CONSTANT, FAMILY = "LA", "SPR"

@@ -7,7 +7,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import symgen
-from symgen.report.page import robot_page
+from symgen.pages.page import robot_page
 from symgen.symbols.documents import shown_models
 from symgen.symbols.symbolic import symbolic
 

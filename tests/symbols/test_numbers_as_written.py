@@ -9,8 +9,8 @@ import sympy
 
 import symgen
 from symgen.description.grammar import parse
-from symgen.report.formulas import printed
-from symgen.report.page import robot_page
+from symgen.pages.formulas import printed
+from symgen.pages.page import robot_page
 from symgen.symbols import expressions
 from symgen.symbols.printers import latex, math
 

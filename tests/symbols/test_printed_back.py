@@ -17,8 +17,8 @@ from symgen.certify.witness import Witness, ungrouped
 from symgen.derive.models import SYMBOLIC
 from symgen.description import load_robot, packaged_robots
 from symgen.errors import SymgenError
+from symgen.pages.formulas import printed
 from symgen.regroup.regrouping import regroup
-from symgen.report.formulas import printed
 from symgen.symbols.symbolic import symbolic
 
 ROBOTS = ("planar_2r", "scara", "emps", "emps_asymmetric", "haptic", "four_bar", "five_bar")

@@ -12,8 +12,8 @@ from campaign import sampled, some
 
 from runtime.core.model import load_model
 from symgen.description import load_robot
+from symgen.pages.page import robot_page
 from symgen.regroup.regrouping import regroup
-from symgen.report.page import robot_page
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 ROBOTS = sampled(("tx40", "haptic", "scara", "four_bar"), 0, always=("haptic", "scara", "four_bar"))

@@ -10,7 +10,7 @@ from html import unescape
 
 import numpy as np
 import pytest
-from report.strict_html import Strict
+from strict_html import Strict
 
 from runtime.core.markup import element, formula, symbol
 from runtime.core.table import Table

@@ -27,10 +27,10 @@ from symgen.description.expression import ONE, Expression
 from symgen.description.robot import Element, Robot
 from symgen.emit.header import informative_columns
 from symgen.emit.spec import ModuleSpec, module_spec
+from symgen.pages.effects import Effect, effects
+from symgen.pages.figure import figure, passive_text
 from symgen.regroup.reasons import Absorption, absorptions
 from symgen.regroup.regrouping import Regrouping
-from symgen.report.effects import Effect, effects
-from symgen.report.figure import figure, passive_text
 from symgen.symbols import expressions
 from symgen.symbols.documents import shown_models
 from symgen.symbols.printers import MathML, math, math_terms
@@ -103,7 +103,7 @@ def _hash(text: str) -> str:
 
 
 def _resource(name: str) -> str:
-    return files("symgen.report").joinpath(name).read_text(encoding="utf-8")
+    return files("symgen.pages").joinpath(name).read_text(encoding="utf-8")
 
 
 def _verdict(regrouping: Regrouping) -> str:
@@ -235,7 +235,7 @@ def _entry(
 @lru_cache(maxsize=1)
 def _template() -> Template:
     environment = Environment(
-        loader=PackageLoader("symgen.report", ""),
+        loader=PackageLoader("symgen.pages", ""),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from campaign import sampled, some
-from report.strict_html import Strict
+from strict_html import Strict
 from typer.testing import CliRunner
 
 from oracles.named_robots import planar_2r
@@ -24,10 +24,10 @@ from symgen.description.expression import Call, Expression
 from symgen.description.grammar import parse
 from symgen.emit.spec import module_spec
 from symgen.errors import SymgenError
+from symgen.pages.effects import effects
+from symgen.pages.page import embedded, robot_page
 from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import regroup
-from symgen.report.effects import effects
-from symgen.report.page import embedded, robot_page
 from symgen.symbols import expressions
 from symgen.symbols.printers import math, math_terms
 
