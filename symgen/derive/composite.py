@@ -50,8 +50,10 @@ class CompositeLinks:
         self.JP: dict[int, Tensor] = {}
         self.MSP: dict[int, Vector] = {}
         self.MP: dict[int, Scalar] = {}
+        self.own: dict[int, list[Scalar]] = {}  # XX .. M of the link alone
         for f in self.robot.frames:
             link = [chi[parameter(p, f.j)] if f.j in self.robot.links else 0 for p in INERTIAL]
+            self.own[f.j] = link
             XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = link
             self.JP[f.j] = (XX, XY, XZ, YY, YZ, ZZ)
             self.MSP[f.j] = (MX, MY, MZ)

@@ -1,5 +1,5 @@
 """What the recursions of `derive` do not give by themselves: velocities of links, energies,
-C(q, qd), and the columns of reference torques and of momentum.
+accelerations at reference rates, and the columns of reference torques and of momentum.
 
 Energies of link j, with its velocities v_j of the origin and w_j in its frame, gravity g and its
 origin P_0j in frame 0:
@@ -10,7 +10,7 @@ origin P_0j in frame 0:
 Both are linear in the parameters. Elements add E = 1/2 c sd**2 (inertia), U = 1/2 c s**2
 (stiffness), U = c s (offset), U = c energy (columns that give one).
 
-C by recursion. Per unit rate of joint k, a point r of link j has the velocity v_k + z_k x r. Its
+Accelerations at reference rates. Per unit rate of joint k, a point r of link j has the velocity v_k + z_k x r. Its
 rate of change in space is
 
     a_k + U_k r ,     U_k = skew(zd_k) + skew(z_k) skew(w_j) ,
@@ -189,15 +189,6 @@ def _link(z: Vector, zd: Vector, w: Vector, a: Vector, half: Scalar) -> LinkMoti
     DV = tuple(tuple(mul(half, add(U[k][m], U[m][k])) for m in range(3)) for k in range(3))
     DW = (sub(U[1][1], U[2][2]), sub(U[2][2], U[0][0]), sub(U[0][0], U[1][1]))
     return LinkMotion(w, turning, DV, DW, U, a)  # type: ignore[arg-type]
-
-
-def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:
-    """{(i, k): C_ik} of the actuated joints."""
-    return {
-        (i, k): c
-        for k in d.robot.joints
-        for i, c in d.actuated(joint_torques(AtRates(d.motion, {k: 1}, k), d.chi)).items()
-    }
 
 
 Columns = Mapping[str, Mapping[int, Scalar]]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from symgen.derive.coriolis import coriolis
 from symgen.derive.derivation import Derivation
 from symgen.derive.energies import (
     Columns,
     base_wrench,
-    coriolis,
     kinetic_energy,
     momentum_rate,
     origin_velocities,

@@ -162,8 +162,10 @@ def test_no_operation_is_computed_twice(name: str) -> None:
     for model, f in spec.functions.items():
         operations = [node for node in f.nodes if node.op in (ADD, MUL)]
         assert len(distinct_operations(f)) == len(operations), model
+    if name == "panda":
+        assert at_most(spec.functions["coriolis"].operations, (762, 646))
     if name == "tx40":
-        assert at_most(every_operation(spec.functions["coriolis"]), (735, 547))
+        assert at_most(spec.functions["coriolis"].operations, (507, 423))
         assert at_most(every_operation(spec.functions["momentum_rate_regressor"]), (384, 268))
         assert at_most(every_operation(spec.functions["base_wrench_regressor"]), (583, 429))
 

@@ -1,0 +1,185 @@
+"""C(q, qd) by composite links, with the Christoffel symbols of A: Ad - 2C is skew symmetric.
+
+A mass point at r in frame j has the velocity rd = w_j x r relative to its origin. Of a link, and of all that it carries, the
+recursion of `derive.composite` carries further
+
+    HP  = sum m rd         rate of the first moments
+    BP  = sum m r rd'      3x3; of one link by rows, BP_a = w_j x K_a, K = sum m r r' = tr(J)/2 E - J
+
+from the tips to the base, PP the velocity of O_j relative to O_i, all in frame i:
+
+    BP_i <- BP_i + iRj BP_j jRi + P (iRj HP_j)' + (AS + MP_j P) PP' ,   HP_i <- HP_i + iRj HP_j + MP_j PP ,   PP = w_i x P + qd_j z_j (prismatic)
+
+Per unit rate of joint k a point moves with z x r, revolute, or z, prismatic. Its rate of change is zd x r + z x rd, or zd, with zd = w_k x z.
+The wrench of composite link k at these rates, carried inward, is column k of C above the diagonal:
+
+    E = zd x MSP + z x HP ,   NE = JP zd + tr(BP) z - BP' z       revolute
+    E = MP zd ,               NE = MSP x zd                       prismatic
+
+Below it C_ki = x_k . (zd_i x r + z_i x rd) summed over the same points, x_k = z_k x r or z_k: with F = sum m x_k, N = sum m r x x_k of the unit
+acceleration and ND = sum m rd x x_k, carried inward by ND_i = iRj ND_j + PP x F_i,
+
+    C_ki = zd_i . N + z_i . ND (revolute) ,   zd_i . F (prismatic)
+
+S. Echeandia, P. M. Wensing, J. Dyn. Sys. Meas. Control 143, 2021.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from symgen.derive.composite import CompositeLinks
+from symgen.derive.derivation import Derivation, projected_twice
+from symgen.derive.geometry import Rotation
+from symgen.derive.scalar import (
+    E3,
+    Matrix,
+    Scalar,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    mul,
+    scale,
+    sub,
+    vadd,
+)
+from symgen.description.expression import Expression
+from symgen.description.robot import FIXED, PRISMATIC
+
+HALF = Expression.number(Fraction(1, 2))
+
+
+class CompositeRates(CompositeLinks):
+    """HP and BP of every composite link beside its parameters.
+
+    Parameters
+    ----------
+    d : Derivation
+        The derivation, with the motion of its links.
+    """
+
+    def __init__(self, d: Derivation) -> None:
+        super().__init__(d.geometry, d.chi)
+        self.motion = d.motion
+        self.HP: dict[int, Vector] = {}
+        self.BP: dict[int, Matrix] = {}
+        self.PP: dict[int, Vector] = {}
+        for f in self.robot.frames:
+            self._link(d, f.j)
+            PP = cross(self.motion.link[f.ant].w, self.geometry.P[f.j])
+            if f.sigma == PRISMATIC:
+                PP = vadd(PP, scale(self.motion.qd(f.j), self.geometry.rotation[f.j].up(E3)))
+            self.PP[f.j] = self._called("PP", PP, f.j)
+        for f in reversed(self.robot.frames):
+            self.algebra.section(f"Rates of composite link {f.j}")
+            self._called("HP", self.HP[f.j], f.j)
+            for a, row in enumerate(self.BP[f.j], start=1):
+                for b, x in enumerate(row, start=1):
+                    self.algebra.name(x, self.named("BP", a, b, f.j))
+            if f.ant:
+                self._take_rates(f.j, f.ant)
+
+    def _called(self, family: str, v: Vector, *indices: int) -> Vector:
+        for c, x in enumerate(v, start=1):
+            self.algebra.name(x, self.named(family, c, *indices))
+        return v
+
+    def _link(self, d: Derivation, j: int) -> None:
+        """HP and BP of link j alone."""
+        w, half = self.motion.link[j].w, self.algebra.constant(HALF)
+        XX, XY, XZ, YY, YZ, ZZ = self.own[j][:6]
+        K = (
+            (mul(half, sub(add(YY, ZZ), XX)), sub(0, XY), sub(0, XZ)),
+            (sub(0, XY), mul(half, sub(add(XX, ZZ), YY)), sub(0, YZ)),
+            (sub(0, XZ), sub(0, YZ), mul(half, sub(add(XX, YY), ZZ))),
+        )
+        self.HP[j] = cross(w, self.own[j][6:9])
+        self.BP[j] = (cross(w, K[0]), cross(w, K[1]), cross(w, K[2]))
+
+    def _take_rates(self, j: int, i: int) -> None:
+        """Add those of composite link j to the frame i that carries it."""
+        R, P, PP = self.geometry.rotation[j], self.geometry.P[j], self.PP[j]
+        ABA, AH = turned(R, self.BP[j]), R.up(self.HP[j])
+        moved = vadd(R.up(self.MSP[j]), scale(self.MP[j], P))
+        rows = (
+            vadd(self.BP[i][a], vadd(ABA[a], vadd(scale(P[a], AH), scale(moved[a], PP))))
+            for a in range(3)
+        )
+        self.BP[i] = tuple(rows)  # type: ignore[assignment]
+        self.HP[i] = vadd(self.HP[i], vadd(AH, scale(self.MP[j], PP)))
+
+    def coriolis(self) -> dict[tuple[int, int], Scalar]:
+        """{(i, k): C_ik} of all moving joints of the open tree."""
+        moving = self.robot.moving
+        C: dict[tuple[int, int], Scalar] = {(i, k): 0 for i in moving for k in moving}
+        for k in moving:
+            C |= self._joint(k)
+        return C
+
+    def _joint(self, k: int) -> dict[tuple[int, int], Scalar]:
+        """C_ik and C_ki of the joints i on the path to joint k."""
+        self.algebra.section(f"Unit rate of joint {k}")
+        x, y, _ = self.MSP[k]
+        B, H = self.BP[k], self.HP[k]
+        zd = self._axis_rate(k)
+        if self.robot.frame(k).sigma == PRISMATIC:
+            E, NE = scale(self.MP[k], zd), cross(self.MSP[k], zd)
+            F: Vector = (0, 0, self.MP[k])
+            N: Vector = (y, sub(0, x), 0)
+            ND: Vector = (H[1], sub(0, H[0]), 0)
+        else:
+            XX, XY, XZ, YY, YZ, ZZ = self.JP[k]
+            across = add(B[0][0], B[1][1])
+            E = vadd(cross(zd, self.MSP[k]), (sub(0, H[1]), H[0], 0))
+            NE = vadd(
+                apply(((XX, XY, XZ), (XY, YY, YZ), (XZ, YZ, ZZ)), zd),
+                (sub(0, B[2][0]), sub(0, B[2][1]), across),
+            )
+            F, N = (sub(0, y), x, 0), (XZ, YZ, ZZ)
+            ND = (sub(0, B[0][2]), sub(0, B[1][2]), across)
+        C: dict[tuple[int, int], Scalar] = {}
+        for i in reversed(self.robot.path(k)):
+            frame, R, P = self.robot.frame(i), self.geometry.rotation[i], self.geometry.P[i]
+            if frame.sigma != FIXED:
+                slides = frame.sigma == PRISMATIC
+                C[i, k] = E[2] if slides else NE[2]
+                if i != k:
+                    below = dot(self._axis_rate(i), F if slides else N)
+                    C[k, i] = below if slides else add(below, ND[2])
+            E, F = self._called("E", R.up(E), i, k), R.up(F)
+            NE, N = vadd(R.up(NE), cross(P, E)), vadd(R.up(N), cross(P, F))
+            ND = vadd(R.up(ND), cross(self.PP[i], F))
+        return C
+
+    def _axis_rate(self, k: int) -> Vector:
+        """zd_k = w_k x z_k."""
+        w = self.motion.link[k].w
+        return (w[1], sub(0, w[0]), 0)
+
+
+def turned(R: Rotation, B: Matrix) -> Matrix:
+    """iRj B jRi: about z by cos**2 and cos sin, then by the fixed part."""
+    cc, cs = mul(R.c, R.c), mul(R.c, R.s)
+    difference, sum_ = sub(B[0][0], B[1][1]), add(B[0][1], B[1][0])
+    x = sub(mul(cc, difference), mul(cs, sum_))
+    xy = add(mul(cc, sum_), mul(cs, difference))
+    rows: Matrix = (
+        (add(B[1][1], x), sub(xy, B[1][0]), sub(mul(R.c, B[0][2]), mul(R.s, B[1][2]))),
+        (sub(xy, B[0][1]), sub(B[0][0], x), add(mul(R.s, B[0][2]), mul(R.c, B[1][2]))),
+        (
+            sub(mul(R.c, B[2][0]), mul(R.s, B[2][1])),
+            add(mul(R.s, B[2][0]), mul(R.c, B[2][1])),
+            B[2][2],
+        ),
+    )
+    if R.A is None:
+        return rows
+    half = [[dot(axis, column) for column in zip(*rows, strict=True)] for axis in R.A]
+    return tuple(tuple(dot(a, axis) for axis in R.A) for a in half)  # type: ignore[return-value]
+
+
+def coriolis(d: Derivation) -> dict[tuple[int, int], Scalar]:
+    """{(i, k): C_ik} of the actuated joints: G' C G, G constant."""
+    return projected_twice(d.geometry.closure, d.algebra, CompositeRates(d).coriolis())
