@@ -20,11 +20,12 @@ def assert_equal_over_F_p(robot: Robot) -> None:
     d, request = derive(robot), Request({name: name for name in robot.parameters})
     rewrite = rewriting(d, request)
     composite = MODELS["coriolis"].values(d, request, rewrite)
-    found = {e.place: str(e.value) for e in composite.entries}
+    found = {e.place: e.value for e in composite.entries}
     for k, joint in enumerate(robot.joints):
         column = d.actuated(joint_torques(AtRates(d.motion, {joint: 1}, joint), d.chi))
         values = rewrite.copied(list(column.values()))
-        assert [found[i, k] for i in range(len(values))] == [str(x) for x in values], robot.name
+        for i, value in enumerate(values):
+            assert str(found[i, k]) == str(value), (robot.name, i, k)
 
 
 @pytest.mark.parametrize("name", packaged_robots())
