@@ -1,10 +1,7 @@
-"""Write the pages of docs/reference, docs/guide/examples.md and docs/api from the program: `python
-docs/write_reference.py`.
+"""Write the parts of the pages that are made from the program: `python docs/write_reference.py`.
 
-Text between `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->` of a page is made by the
-function NAME; pages of docs/api beside its index are made
-whole, one for each room. `--check` writes nothing, names the pages that are not current and ends
-with exit code 1 where there is one.
+The function NAME makes the text between `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->`.
+`--check` writes nothing. It names the pages that are not current and ends with exit code 1.
 """
 
 from __future__ import annotations
@@ -27,7 +24,6 @@ MARK = re.compile(
 )
 SOURCES: dict[str, Callable[..., str]] = {
     "commands": reference.commands,
-    "contents": api.contents,
     "examples": reference.examples,
     "names": api.names,
     "notebook": notebooks.notebook,
@@ -35,7 +31,6 @@ SOURCES: dict[str, Callable[..., str]] = {
     "robots": reference.robots,
     "study_file": reference.study_file,
 }
-WHOLE = "<!-- Written by docs/write_reference.py from the docstrings: edit those. -->\n\n"
 
 
 def filled(text: str) -> str:
@@ -69,26 +64,18 @@ def pages() -> Iterator[tuple[Path, str]]:
         text = path.read_text(encoding="utf-8")
         if MARK.search(text):
             yield path, filled(text)
-    for package in api.rooms():
-        yield DOCS / "api" / f"{api.page_of(package)}.md", WHOLE + tidy(api.room(package))
 
 
-def outdated() -> dict[Path, str | None]:
-    """{path: text it should have, None where it should not be} of pages that are not current."""
-    expected: dict[Path, str | None] = dict(pages())
-    expected |= {path: None for path in (DOCS / "api").glob("*.md") if path not in expected}
-    return {
-        path: text
-        for path, text in expected.items()
-        if text != (path.read_text(encoding="utf-8") if path.is_file() else None)
-    }
+def outdated() -> dict[Path, str]:
+    """{path: text it should have} of pages that are not current."""
+    return {path: text for path, text in pages() if text != path.read_text(encoding="utf-8")}
 
 
 def main() -> None:
     stale = outdated()
     for path, text in stale.items():
         if "--check" not in sys.argv:
-            path.write_text(text, encoding="utf-8") if text is not None else path.unlink()
+            path.write_text(text, encoding="utf-8")
         print(
             f"{path.relative_to(DOCS.parent)}{' is not current' if '--check' in sys.argv else ''}"
         )

@@ -115,5 +115,7 @@ def paragraph(lines: Sequence[str]) -> str:
     return "\n".join(found)
 
 
-def first_line(doc: str | None) -> str:
-    return text(cleandoc(doc or "").split("\n")[0])
+def first_sentence(doc: str | None) -> str:
+    """The first sentence of a docstring, on one line."""
+    paragraph = " ".join(cleandoc(doc or "").partition("\n\n")[0].split())
+    return text(re.split(r"(?<=[.])\s+(?=[A-Z`])", paragraph)[0])

@@ -20,8 +20,7 @@ SHOWN = (
     "theory/cestac.html",
     "reference/gallery.html",
     "reference/study_file.html",
-    "api/index.html",
-    "api/estimators.html",
+    "reference/python.html",
 )
 
 
