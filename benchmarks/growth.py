@@ -1,7 +1,7 @@
 """Growth of cost: time and memory against samples, joints, columns, runs and workers, as a log-log
 figure.
 
-    python benchmarks/growth.py [-o docs/growth.png] [--quick]
+    python benchmarks/growth.py [-o benchmarks/growth.png] [--quick]
 
 Samples: the TX40 regressor into a reused store and the distinct signals through the decimation; largest resident set of
 `symgen identify`. Joints, 2 to 30: revolute chains and binary trees with friction; generation
@@ -261,7 +261,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/growth.png"))
+    parser.add_argument("-o", "--output", type=Path, default=Path("benchmarks/growth.png"))
     parser.add_argument("--quick", action="store_true", help="few points, to see whether it runs")
     arguments = parser.parse_args()
     samples, joints, runs, columns = (

@@ -6,7 +6,7 @@ means over blocks of LIMIT.TORQUE_BLOCK,
 
     d = a tau + b qd + c sign(qd) + rest       taken = ||d - rest|| / ||tau||
 
-Spikes, for which a median is there, and noise go with no motion. Measured: docs/truth.md.
+Spikes, for which a median is there, and noise go with no motion. Measured: benchmarks/truth.md.
 """
 
 from __future__ import annotations

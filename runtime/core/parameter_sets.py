@@ -16,7 +16,7 @@ decide, hold for fits of parts of them.
 
 The essential set is an aid to reading: which parameters carry the model. Its deviations take the
 parameters that were removed as zero, and what they are in truth moves those that stay: 95 %
-intervals hold 67 to 74 % of the true values (docs/truth.md). With essential: {first: true}, the
+intervals hold 67 to 74 % of the true values (benchmarks/truth.md). With essential: {first: true}, the
 choice of the chapter, it stands for the robot where it predicts as well as all; the feasible set is
 then not asked.
 """

@@ -1,4 +1,4 @@
-"""The table of promises in docs/truth.md quotes sentences that stand where it says, and names
+"""The table of promises in benchmarks/truth.md quotes sentences that stand where it says, and names
 tests, benchmarks and questions that there are."""
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLE = (ROOT / "docs/truth.md").read_text().split("## Every promise")[1]
+TABLE = (ROOT / "benchmarks/truth.md").read_text().split("## Every promise")[1]
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
     for line in TABLE.splitlines()
@@ -24,7 +24,7 @@ def plain(text: str) -> str:
 
 def texts(place: str) -> str:
     """What stands on the pages, in the modules and in README that a cell names."""
-    paths = [ROOT / "docs" / link for link in re.findall(r"\]\(([^)#]+)", place)]
+    paths = [ROOT / "benchmarks" / link for link in re.findall(r"\]\(([^)#]+)", place)]
     for name in re.findall(r"`([\w/]+\.py)`", place):
         paths += [path for room in ("runtime", "symgen") for path in (ROOT / room).rglob(name)]
     paths += [ROOT / "README.md"] if "README" in place else []

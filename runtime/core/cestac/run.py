@@ -2,7 +2,7 @@
 (15)-(17): by the way of the identification, every method alike.
 
 What does not change from run to run is made once for each block of runs. Times:
-docs/performance.md, `benchmarks/cestac_run.py`.
+benchmarks/performance.md, `benchmarks/cestac_run.py`.
 """
 
 from __future__ import annotations

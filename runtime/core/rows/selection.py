@@ -133,7 +133,7 @@ def instants_of(t: Array, rate: float, signals: Signals, rows: Rows, file: str) 
     """Window and decimation of a record at the times t, shape (N,), s, at a rate, Hz.
 
     The regressor near an end of the record is that of a low-pass which starts there. Decimation
-    spreads it over 27 instants (docs/truth.md, Ends of records), so that rows.trim: auto leaves
+    spreads it over 27 instants (benchmarks/truth.md, Ends of records), so that rows.trim: auto leaves
     out END_PERIODS/cutoff ahead of the decimation, and TRIM instants after it.
     """
     auto, low = rows.trim == "auto", signals.lowpass

@@ -14,7 +14,7 @@ N is flat in the positions: the median of the spectrum in the upper band, and at
 steps that the positions show, step^2/12 over the band. The spectrum is one of second differences,
 so that little leaks from the motion to the noise; it counts as motion where its running mean is
 above LIMIT.MOTION times the noise. Positions read as counts have less noise: twice that cut-off.
-Measured: docs/counts.md.
+Measured: benchmarks/counts.md.
 """
 
 from __future__ import annotations
