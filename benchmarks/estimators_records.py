@@ -1,6 +1,6 @@
-"""Every estimator on the measured records: tables of docs/estimators.md.
+"""Every estimator on the measured records: tables of benchmarks/estimators_measured.md.
 
-    python benchmarks/estimators_records.py [-o docs/estimators.md]
+    python benchmarks/estimators_records.py [-o benchmarks/estimators_measured.md]
 
 EMPS: identified on one record, torque predicted on the other, and the position simulated with the
 parameters found, with and without the tick of delay
@@ -220,7 +220,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/estimators.md"))
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("benchmarks/estimators_measured.md")
+    )
     parser.add_argument("--methods", nargs="+", default=["ols", "wls", "irls", "iv", "feasible"])
     given = parser.parse_args()
     page = TEXT.read_text().format(

@@ -1,5 +1,5 @@
-"""Records without torques and joints with two encoders: tables of docs/guide/law.md; `calf`: the one of
-docs/answers/go2_calf.md.
+"""Records without torques and joints with two encoders: tables of law_records.md; `calf`:
+armature of the calves.
 
     SYMGEN_DATA=... python benchmarks/law_records.py [go2] [kr300] [calf]
 

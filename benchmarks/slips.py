@@ -1,7 +1,7 @@
 """Slips that the verdict has to name, and right studies that it has to leave alone: `python
 benchmarks/slips.py ["kr300 values" ...] [FIRST-LAST]`.
 
-Prints one line per slip, and the counts that docs/guide/plausibility.md gives. SYMGEN_DATA is the
+Prints one line per slip, and the counts of slips.md. SYMGEN_DATA is the
 folder of the records.
 """
 

@@ -15,7 +15,6 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent), str(DOCS / "_ext")]
 
 import api  # noqa: E402
-import notebooks  # noqa: E402
 import reference  # noqa: E402
 
 MARK = re.compile(
@@ -24,9 +23,7 @@ MARK = re.compile(
 )
 SOURCES: dict[str, Callable[..., str]] = {
     "commands": reference.commands,
-    "examples": reference.examples,
     "names": api.names,
-    "notebook": notebooks.notebook,
     "robot_file": reference.robot_file,
     "robots": reference.robots,
     "study_file": reference.study_file,

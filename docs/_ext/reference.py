@@ -4,7 +4,6 @@ schemas, robots and examples from their files.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
 from collections.abc import Iterator, Mapping
@@ -293,13 +292,3 @@ def robot(name: str) -> str:
             docstrings.text(" ".join((description.source or "").split())), "",
         ]
     )  # fmt: skip
-
-
-def examples() -> str:
-    """Every file of docs/examples: its first line as the title, its text."""
-    parts = []
-    for path in sorted((HERE / "examples").glob("[0-9]*.py")):
-        text = path.read_text(encoding="utf-8")
-        title = (ast.get_docstring(ast.parse(text)) or path.stem).split("\n")[0].rstrip(".")
-        parts.append(f"## {title}\n\n`docs/examples/{path.name}`\n\n```python\n{text}```\n")
-    return "\n".join(parts)

@@ -8,7 +8,7 @@ finding and its remedy read, and what it does to the samples and to the table of
     CAUSES     a sign, an order, a unit: one change each, some 10 n^2 of a robot of n joints
     NUMBERS    a factor, a zero, a length: one number xi each, zero in the study as given
 
-A new cause is a row (docs/contributing/finding.md). `runtime.plausible.trials` tries them.
+A new cause is a row (docs/contributing.md). `runtime.plausible.trials` tries them.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ for each question.
                  `variants`
                  is given, or where something else is doubtful
 
-A new check is a function of a `Case` and its line in CHECKS (docs/contributing/finding.md).
+A new check is a function of a `Case` and its line in CHECKS (docs/contributing.md).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The kinds of elements: the one table of what acts on joints besides links.
 
-A new kind is one entry here (docs/contributing/element_kind.md).
+A new kind is one entry here (docs/contributing.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A measured robot that logs no torque: the law is the torque. Figures of docs/guide/law.md."""
+"""A measured robot that logs no torque: the law is the torque. Figures of benchmarks/law_records.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A table of the public URDF files of docs/names.md: joints, base parameters, certificate, torques
+"""A table of the public URDF files of benchmarks/urdf_files.md: joints, base parameters, certificate, torques
 against pinocchio; run with `python -m oracles.urdf_table`.
 
 Of each file as it is read by default, angles snapped, against the same text with its angles
