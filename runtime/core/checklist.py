@@ -253,7 +253,7 @@ def explained_by_joint(
     are expected to be good (`expected`, %), a joint is no reason for a "no".
     """
     worst = fit.worst_joint
-    if len(fit.per_joint) < 2 or worst.is_axis:
+    if sum(joint.has_motor for joint in fit.per_joint) < 2 or worst.is_axis:
         return None
     state = state_of(worst.relative_error, *LIMIT.JOINT_ERROR)
     return Answer(
@@ -273,6 +273,8 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     joint of large forces rules it, such as a lift
     in N beside a wrist in N m.
     """
+    if len(fit.names) == len(estimate.names):
+        return ""
     whole = {joint.joint: joint.relative_error for joint in estimate.per_joint}
     lost = [
         joint

@@ -361,7 +361,9 @@ class Identification:
         """
         fit = self.model_estimate
         by_joint = ", ".join(
-            f"{one.joint} {one.relative_error:.1f} %" for one in fit.per_joint if one.rows
+            f"{one.joint} {one.relative_error:.1f} %" if one.has_motor else f"{one.joint} no motor"
+            for one in fit.per_joint
+            if one.rows
         )
         notes = [*self.observation.findings, *self.own_warnings, *self.missing]
         if len(notes) > LIMIT.NOTES_PRINTED:

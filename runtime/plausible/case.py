@@ -15,6 +15,7 @@ from runtime.core.model import GeneratedModel, joint_labels, joint_units
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared, stacked
+from runtime.core.signals.cutoff import noise_share
 from runtime.core.study import Study
 from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
@@ -122,6 +123,8 @@ class Case:
             return "the model has no standard parameters"
         if self.samples.constant().any():
             return "a torque never changes"
+        if (passive := self.samples.without_motor()).any():
+            return f"joint {self.joints(passive)} has no motor: its torque is zero throughout"
         few = int(rows.sum()) <= least or int(rows.min()) <= LIMIT.FEWEST_ROWS
         return "too few samples at which every joint moves" if few else ""
 
@@ -156,6 +159,20 @@ class Case:
         """Torque of the values of the robot file, where it has them."""
         baseline = self.baseline
         return known_values(baseline) if baseline and baseline.bodies.near_values else None
+
+    @cached_property
+    def noise_floor(self) -> Array:
+        """Error of each joint, %, that noise of the positions may make, shape (n,).
+
+        NOISE_MADE sqrt(a) std(tau)/rms(tau), a the largest share of an acceleration that is noise: as much of the torque that
+        changes may be lost in the columns, and a cause may find it again.
+        """
+        median = self.study.signals.median
+        shares = [noise_share(x.record.q, x.record.rate, x.low, median) for x in self.through]
+        tau = self.samples.tau
+        size = np.sqrt((tau**2).mean(axis=0)).clip(1e-300)
+        made = LIMIT.NOISE_MADE * np.sqrt(np.max(shares))
+        return np.asarray(100 * made * tau.std(axis=0) / size)
 
     @cached_property
     def late(self) -> Delay | None:

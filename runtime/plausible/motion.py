@@ -71,7 +71,7 @@ def rest(case: Case) -> Answer:
 def standing_share(samples: Samples, study: Study) -> Array:
     """Share of the rows of each joint at which it stands, shape (n,)."""
     speed = np.where(
-        samples.still(), np.inf, np.abs(samples.qd)
+        samples.still, np.inf, np.abs(samples.qd)
     )  # a joint that never moves is told as such
     used = speed >= per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
     standing = used & (speed <= samples.standing())
@@ -87,7 +87,7 @@ def low_speed_of_rest(samples: Samples, study: Study) -> float | tuple[float, ..
     low = per_joint(study.rows.low_speed, samples.n, "rows.low_speed")
     wanted = tuple(
         _rounded_up(max(v, x))
-        for v, x in zip(np.where(samples.still(), 0.0, samples.standing()), low, strict=True)
+        for v, x in zip(np.where(samples.still, 0.0, samples.standing()), low, strict=True)
     )
     return max(wanted) if max(wanted) <= 3 * min(wanted) else wanted
 
@@ -111,8 +111,8 @@ def _rounded_up(x: float) -> float:
     "a motion), or leave them out (estimate.columns)",
 )
 def motion_excites(case: Case) -> Answer | None:
-    """Parameters that the motion cannot tell; None where the study has no rows."""
-    if case.observation is None:
+    """Parameters that the motion cannot tell; None where the study has no rows, or a joint stands."""
+    if case.observation is None or case.samples.still.any():
         return None
     return excited(case.observation, case.given[0].study.signals, case.records[0].rate)
 

@@ -49,12 +49,14 @@ from runtime.plausible.sizes import (
     lengths,
     positions,
     speeds,
+    standing,
     times,
     torques,
 )
 from runtime.plausible.trials import Trial, decisive, regressor, tried
 
 CHECKS: tuple[Callable[[Case], Check | None], ...] = (
+    standing,
     jumps,
     positions,
     speeds,
@@ -213,7 +215,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = [t for t in decisive(trials, case.baseline) if explained(case, t) > late_gain(case)]
+    named = [t for t in decisive(trials, case.baseline, case.noise_floor) if explained(case, t) > late_gain(case)]
     wrong = [t for t in named if named[0].cause.kind != "friction"]
     asked = EXPLAINED if trials else EXPLAINED[:-1]
     checks += [found for check in asked if (found := check(case, named)) is not None]

@@ -17,6 +17,7 @@ from runtime.core.limits import LIMIT
 from runtime.core.record import Record
 from runtime.core.rows.prepared import Prepared
 from runtime.core.rows.selection import window_of
+from runtime.core.signals.cutoff import stands
 from runtime.core.signals.filters import (
     States,
     filtered_states,
@@ -49,6 +50,8 @@ class Samples:
         Number of the record of each instant.
     cutoff : float, Hz
         Of the low-pass.
+    still : ndarray of bool, shape (n,)
+        Whether the joint stands still in the whole record.
     """
 
     t: Array
@@ -60,6 +63,7 @@ class Samples:
     steady: Array
     record: Array
     cutoff: float
+    still: Array
 
     @property
     def n(self) -> int:
@@ -75,16 +79,16 @@ class Samples:
 
     def moving(self) -> Array:
         """Whether each joint moves at each instant, and keeps its direction, bool (K, n)."""
-        return np.asarray(moving(self.qd) & self.steady)
+        return np.asarray(moving(self.qd) & self.steady & ~self.still)
 
-    def still(self) -> Array:
-        """Whether each joint stands still in the whole record, (n,)."""
-        return np.asarray(np.ptp(self.q, axis=0) < LIMIT.STILL)
+    def without_motor(self) -> Array:
+        """Whether the torque of each joint is zero throughout, (n,)."""
+        return np.asarray(~self.tau.any(axis=0))
 
     def constant(self) -> Array:
-        """Whether the torque of each joint never changes, (n,)."""
-        size = np.maximum(np.abs(self.tau).max(axis=0), 1e-12)
-        return np.asarray(np.ptp(self.tau, axis=0) <= 1e-9 * size)
+        """Whether the torque of each joint that has a motor never changes, (n,)."""
+        size = np.abs(self.tau).max(axis=0)
+        return np.asarray((np.ptp(self.tau, axis=0) <= 1e-9 * size) & ~self.without_motor())
 
     def thinned(self, most: int) -> Samples:
         """At most `most` instants, evenly drawn."""
@@ -167,7 +171,8 @@ def samples_of(records: Sequence[Prepared | Filtered], study: Study) -> Samples:
     through = [x if isinstance(x, Filtered) else filtered(x, study) for x in records]
     parts = [_instants(record, number) for number, record in enumerate(through)]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SIGNALS}
-    every = Samples(**joined, cutoff=min(part.cutoff for part in parts))
+    still = np.all([part.still for part in parts], axis=0)
+    every = Samples(**joined, cutoff=min(part.cutoff for part in parts), still=still)
     return every.thinned(LIMIT.INSTANTS_KEPT)
 
 
@@ -213,7 +218,9 @@ def _instants(through: Filtered, number: int) -> Samples:
     motion = (record.t, states.q, states.qd, states.qdd)
     signals = (*motion, through.torque(record.tau), through.torque(known), steady)
     used = {name: x[kept] for name, x in zip(SIGNALS, signals, strict=False)}
-    return Samples(**used, record=np.full(len(kept), number), cutoff=cutoff)
+    number_of_each = np.full(len(kept), number)
+    still = stands(record.q, record.rate, through.study.signals.median)
+    return Samples(**used, record=number_of_each, cutoff=cutoff, still=still)
 
 
 def _steady(qd: Array, reach: float) -> Array:

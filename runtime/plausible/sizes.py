@@ -35,6 +35,34 @@ def times(records: Sequence[Record]) -> Answer:
 
 
 @Question(
+    "Do the joints move?",
+    "every joint, in some part of the record",
+)
+def standing(case: Case) -> Answer | None:
+    """Joints that stand still in every record; None where all move."""
+    still = case.samples.still
+    if not still.any():
+        return None
+    q = np.concatenate([record.q for record in case.records])
+    rms = q.std(axis=0)[still].max()
+    one = still.sum() == 1
+    where = q.mean(axis=0)
+    held = " ".join(f"--lock {name}={where[j]:.4g}" for j, name in _held(case, still))
+    return Answer(
+        "doubtful",
+        f"Joint{'s' * (not one)} {case.joints(still)} {'does' if one else 'do'} not move ({rms:.1g} {case.units[int(np.argmax(still))]} rms)",
+        f"hold {'it' if one else 'them'}: symgen convert ROBOT held.yaml {held}",
+    )
+
+
+def _held(case: Case, still: Array) -> list[tuple[int, str]]:
+    """Number and name of each joint of a mask, as --lock takes it."""
+    names = getattr(case.model, "LABELS", {})
+    joints = case.model.JOINTS
+    return [(int(j), names.get(joints[j], f"q{joints[j]}")) for j in np.flatnonzero(still)]
+
+
+@Question(
     "Are the positions those of this robot?",
     remedy="look at zero and sign of these joints (theta, drives.offset, ratio), the order of "
     "the columns, the unit and the side of the positions",
@@ -54,13 +82,6 @@ def positions(case: Case) -> Answer:
         angle, travel = LIMIT.LARGEST_ANGLE, LIMIT.LARGEST_TRAVEL
         out, far = (largest > np.where(turning, *pair) for pair in zip(angle, travel, strict=True))
         limit = f"{angle[0]:.3g} rad, {travel[0]:g} m (no limits.q in the robot file)"
-    rests = case.samples.still()
-    if not out.any() and rests.any() and len(rests) > 1:
-        stand = f"Joint {case.joints(rests)} stands"
-        if np.count_nonzero(rests) > 1:
-            stand = f"Joints {case.joints(rests)} stand"
-        remedy = "look at the columns of these positions; their parameters cannot be identified"
-        return Answer("doubtful", f"{stand} still in the whole record", remedy, limit)
     text = case.reaching(largest, case.units, out)
     if not out.any():
         return Answer("good", text, "", limit)

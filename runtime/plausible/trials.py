@@ -512,16 +512,18 @@ def slow_friction(baseline: Baseline) -> Array | None:
     return size * xi * certain if certain.any() else None
 
 
-def decisive(trials: Sequence[Trial], baseline: Baseline) -> list[Trial]:
+def decisive(trials: Sequence[Trial], baseline: Baseline, floor: Array) -> list[Trial]:
     """Those that explain the record decisively better than the study as given, rows too that did
     not give their parameters: the best, and those like it.
+
+    floor : error of each joint, %, that noise of the positions may make. A joint with a smaller error tells no cause.
     """
     given, better = baseline.given, []
     for trial in trials:
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
             fewer = given.errors - trial.fit.errors
             ratio = given.errors / trial.fit.errors.clip(0.1)
-            visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2)).any()
+            visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2) & (given.errors > floor)).any()
             if visible or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
                 better.append(trial)
     if not better:

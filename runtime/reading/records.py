@@ -154,10 +154,10 @@ def _signals(
         "q_r": (first, columns.q_ref),
         "qd": (first, columns.qd),
         "qd_ref": (first, columns.qd_ref),
-        "q_link": (first, tuple(name for name in columns.q_link if name != NONE)),
-        "tau": (last, columns.tau),
+        "q_link": (first, _named(columns.q_link)),
+        "tau": (last, _named(columns.tau)),
         "tau_ff": (last, columns.tau_ff),
-        "tau_known": (other, tuple(name for name in columns.tau_known if name != NONE)),
+        "tau_known": (other, _named(columns.tau_known)),
         **{key: (first, names) for key, names in columns.further.items()},
     }
     asked = {key: place for key, place in places.items() if place[1]}
@@ -179,7 +179,9 @@ def _require_shapes(
 ) -> None:
     """Raise InputError where the columns are not of one record of n joints."""
     N, n = signals["q"].values.shape
-    require_alike(columns, first, last, (N, n), signals.get("tau", signals["q"]).values.shape)
+    rows, width = signals.get("tau", signals["q"]).values.shape
+    width += columns.tau.count(NONE) if "tau" in signals else 0
+    require_alike(columns, first, last, (N, n), (rows, width))
     absent = {
         "q_link": columns.q_link.count(NONE),
         "tau_known": columns.tau_known.count(NONE),
@@ -230,7 +232,9 @@ def _joint_side(
             values = side.position(values)
         elif key in ("qd", "qd_ref"):
             values = side.velocity(values)
-        elif key in ("tau", "tau_ff"):
+        elif key == "tau":
+            values = side.torque(_spread(values, columns.tau, 0.0))
+        elif key == "tau_ff":
             values = side.torque(values)
         elif key == "tau_known":
             values = _spread(values, columns.tau_known, 0.0)
@@ -242,6 +246,11 @@ def _joint_side(
         signal.finite(held, largest=LIMIT.LARGEST_NUMBER)
         samples[key] = values
     return samples
+
+
+def _named(names: Sequence[str]) -> tuple[str, ...]:
+    """The columns of the joints that have one."""
+    return tuple(name for name in names if name != NONE)
 
 
 def _spread(values: Array, names: Sequence[str], absent: float) -> Array:
@@ -303,8 +312,8 @@ def _places(settings: RecordSettings, tables: Sequence[Table]) -> tuple[Table, T
     columns = settings.columns
     if len(tables) == 3 or not columns.tau_known:
         return first, tables[min(1, len(tables) - 1)], last
-    known = {name for name in columns.tau_known if name != NONE}
-    torques = {*columns.tau} or {"tau1"}
+    known = {*_named(columns.tau_known)}
+    torques = {*_named(columns.tau)} or {"tau1"}
     in_first = known <= {*first.names}
     apart = not in_first and torques <= {*first.names}
     return first, first if apart else last, first if in_first else last

@@ -78,7 +78,7 @@ class Columns(Settings):
     q : tuple of str
         Positions.
     tau : tuple of str
-        Torques.
+        Torques. 0 in place of a name: this joint has no motor, its torque is zero.
     q_ref : tuple of str
         Reference positions, where the file of the positions holds them; unit and side are those of
         q.

@@ -365,7 +365,16 @@ def test_the_speed_of_the_remedy_leaves_out_what_stands() -> None:
     qd = np.where(t < 3, 0.013, 0.72 * np.sin(t)) + 1e-6 * np.sin(40 * t)
     zero = np.zeros((len(t), 1))
     samples = Samples(
-        t, zero + t[:, None], qd[:, None], zero, zero, zero, qd[:, None] != 0, zero[:, 0], 10.0
+        t,
+        zero + t[:, None],
+        qd[:, None],
+        zero,
+        zero,
+        zero,
+        qd[:, None] != 0,
+        zero[:, 0],
+        10.0,
+        np.array([False]),
     )
     low = low_speed_of_rest(samples, Study())
     assert low == 0.015

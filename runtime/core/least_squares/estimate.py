@@ -58,7 +58,7 @@ class JointFit:
     residual_norm : float, N m or N
         ||Y_j - W_j X||.
     relative_error : float, %
-        100 ||Y_j - W_j X|| / ||Y_j||.
+        100 ||Y_j - W_j X|| / ||Y_j||; nan where Y_j is zero: a joint without a motor.
     sigma_rho : float
         ||Y_j - W_j X|| / sqrt(N_j (1 - b/r)), the share of joint j in eq. (9).
     scale : float, N m or N
@@ -71,6 +71,11 @@ class JointFit:
     relative_error: NanIfNull
     sigma_rho: NanIfNull
     scale: NanIfNull = 1.0
+
+    @property
+    def has_motor(self) -> bool:
+        """Whether a torque was measured that is not zero throughout."""
+        return self.rows > 0 and not np.isnan(self.relative_error)
 
     @property
     def is_axis(self) -> bool:
@@ -178,11 +183,11 @@ class Estimate:
 
     @property
     def worst_joint(self) -> JointFit:
-        """The joint with the largest relative error, of those that have rows; an axis of a force
-        sensor, which may measure its noise alone, where there are no joints.
+        """The joint with the largest relative error, of those that have rows and a motor; an axis of a
+        force sensor, which may measure its noise alone, where there are no joints.
         """
         return max(
-            self.per_joint, key=lambda fit: (fit.rows > 0, not fit.is_axis, fit.relative_error)
+            self.per_joint, key=lambda fit: (fit.has_motor, not fit.is_axis, fit.relative_error)
         )
 
     def __getitem__(self, name: str) -> float:

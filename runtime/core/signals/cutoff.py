@@ -55,8 +55,8 @@ def cutoff(
     for q, rate in positions:
         f, motion, noise = spectra(q, rate, signals.median)
         noise = noise / (1 + (f[:, None] / crossing) ** 2)
-        ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * grid / rate)[:, None]
-        G = (1 + ratio ** (2 * low.order)) ** -float(max(len(set(low.on)), 1))
+        motion[:, stands(q, rate, signals.median)] = 0.0
+        G = _gain(f, rate, low, grid)
         parts.append((G * (1 - G) @ motion, G**2 @ noise, motion.sum(axis=0)))
     distorted, noisy, power = (np.sum(part, axis=0) for part in zip(*parts, strict=True))
     moving = np.flatnonzero(power > 0)
@@ -70,6 +70,33 @@ def cutoff(
     if counts:
         hertz, why = min(2 * hertz, CHAPTER_CUTOFF, highest), f"counts, twice that of {why}"
     return float(f"{hertz:.2g}"), why
+
+
+def stands(q: Array, rate: float, median: int = 1) -> Array:
+    """Whether each joint stands still in the whole record, bool (n,): its range is below LIMIT.STILL, or its
+    deviation below LIMIT.STILL_NOISE times that of its white noise.
+    """
+    noise = np.sqrt(white_noise(q, rate, median))
+    return np.asarray(
+        (np.ptp(q, axis=0) < LIMIT.STILL) | (q.std(axis=0) < LIMIT.STILL_NOISE * noise)
+    )
+
+
+def noise_share(q: Array, rate: float, low: Lowpass, median: int = 1) -> Array:
+    """Share of the power of a filtered acceleration that is noise of the positions, shape (n,).
+
+    q : shape (N, n), rad or m. rate : Hz. low : with its cut-off as a number.
+    """
+    f, motion, noise = spectra(q, rate, median)
+    power = _gain(f, rate, low, np.array([low.hertz]))[0] ** 2
+    whole = power @ (motion + noise)
+    return np.asarray(power @ noise / np.where(whole > 0, whole, 1.0))
+
+
+def _gain(f: Array, rate: float, low: Lowpass, cutoffs: Array) -> Array:
+    """Gain G of the low-pass on the acceleration, shape (cut-offs, frequencies)."""
+    ratio = np.tan(np.pi * f / rate) / np.tan(np.pi * cutoffs / rate)[:, None]
+    return np.asarray((1 + ratio ** (2 * low.order)) ** -float(max(len(set(low.on)), 1)))
 
 
 def spectra(q: Array, rate: float, median: int = 1) -> tuple[Array, Array, Array]:
