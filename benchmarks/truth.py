@@ -5,7 +5,8 @@ known bodies by simulators of another make (`benchmarks/truth_simulator.py`).
 
 prints one table as Markdown and writes truth_NAME_SEEDS.json. Record k of a question always has the
 seed BASE[seeds] + k, whatever the number of records: `first` is for tuning; `second`,
-`third` and `fourth` have other robots each and are run once, at the end of the work of their time. The code that is judged is called by its public interface alone.
+`third` and `fourth` have other robots each and are run once, at the end of the work of their time; `final` has all
+of them, and was run once for docs/reliability.md. The code that is judged is called by its public interface alone.
 
     coverage       intervals of the sets of parameters against the truth; their errors on unseen motion
     ends           records without noise: what the ends of the filters leave
@@ -14,6 +15,7 @@ seed BASE[seeds] + k, whatever the number of records: `first` is for tuning; `se
     causes         causes told of right studies; wrong studies told by name
     counts         the reader of counts beside the best low-pass of a grid, and with faults
     counts_random  random readings: which contradict their counts, which are refused
+    classes        right studies of seven classes: causes, intervals, expected error, verdict
     physics        feasibility of right records, and what bounds by reach cut off
 
 Truth of base parameters: least squares of pinocchio's torques in random states on the emitted
@@ -38,6 +40,7 @@ from typing import Any
 import numpy as np
 import truth_simulator as world
 from scipy.stats import spearmanr
+from truth_classes import classes, classes_table, stribeck
 from truth_counts import counts, counts_random, counts_random_table, counts_table
 from truth_shared import (
     LEVEL,
@@ -59,7 +62,13 @@ from truth_simulator import Encoder, Motion, Robot, Truth, encoded, noise
 
 import runtime
 
-BASE = {"first": 1_000_000, "second": 2_000_000, "third": 3_000_000, "fourth": 4_000_000}
+BASE = {
+    "first": 1_000_000,
+    "second": 2_000_000,
+    "third": 3_000_000,
+    "fourth": 4_000_000,
+    "final": 6_000_000,
+}
 """Seeds: record k has BASE + k."""
 SAVED = 30.0
 """Time between two writings of the rows, s."""
@@ -213,7 +222,7 @@ def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
     assert agree is not None
     tested = len(agree.records) > 1
     return [{"noise": kind, "robot": robot.name, "motion": motion, "different": different, "tested": tested,
-             "said": bool(tested and not agree.agree), "largest": float(agree.largest) if tested else None}]  # fmt: skip
+             "said": bool(tested and not agree.agree), "largest": max((d.difference for d in agree.disagreements), default=0.0)}]  # fmt: skip
 
 
 def homogeneity_table(rows: list[Row]) -> str:
@@ -504,12 +513,6 @@ def causes(k: int, seed: int, seeds: str) -> list[Row]:
     ]
 
 
-def stribeck(truth: Truth, move: Motion) -> Array:
-    """What friction has above Coulomb's at low speed: half of it again, over a tenth of the speed."""
-    slow = np.array([0.1 * joint.speed for joint in truth.robot.joints])
-    return np.asarray(0.5 * truth.bodies.dry * np.sign(move.qd) * np.exp(-((move.qd / slow) ** 2)))
-
-
 def causes_table(rows: list[Row]) -> str:
     lines = []
     hidden = [
@@ -668,6 +671,7 @@ QUESTIONS: dict[
     "counts": (counts, counts_table, 600),
     "counts_random": (counts_random, counts_random_table, 10_000),
     "physics": (physics, physics_table, 60),
+    "classes": (classes, classes_table, 700),
 }
 
 

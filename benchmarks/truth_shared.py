@@ -38,6 +38,7 @@ def robots_of(seeds: str) -> tuple[Robot, ...]:
         "second": world.SECOND,
         "third": world.THIRD,
         "fourth": world.FOURTH,
+        "final": (*world.FIRST, *world.SECOND, *world.THIRD, *world.FOURTH),
     }[seeds]
 
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from campaign import campaign
 from scipy.signal import butter, lfilter
-from scipy.stats import f as fisher
 
 import runtime
 import symgen
-from runtime.agreement import _fit, _holm, _in_all, homogeneity
+from runtime.agreement import homogeneity
 from runtime.study import study_from_mapping
 
 STUDY = study_from_mapping({"signals": {"median": 1, "lowpass": {"cutoff": 20}}})
@@ -65,18 +64,29 @@ def rates(found):
     )
 
 
-def test_ten_pairs(arm):
+def test_pairs(arm):
+    """Of one robot none differs; a parameter off by 10 % is found where its deviation allows it."""
     size, power, named = rates(pairs(arm, 10))
-    assert size <= 0.2 and power >= 0.9 and named >= 0.5
+    assert size == 0 and named == power >= 0.5
 
 
 @campaign
-def test_size_and_power(arm):
-    """200 pairs: 5 % stated, between 2 and 9 % at 99 %; a parameter off by 10 % is found in nine of
-    ten, and named in two of three.
-    """
-    size, power, named = rates(pairs(arm, 200))
-    assert size <= 0.09 and power >= 0.9 and named >= 0.66
+def test_many_pairs(arm):
+    size, power, _ = rates(pairs(arm, 200))
+    assert size <= 0.01 and power >= 0.5
+
+
+def test_values_are_those_of_the_record_alone(arm):
+    X = np.asarray(arm.base_parameters(arm.VALUES))
+    other = X * np.where(np.array(arm.BASE_PARAMETERS) == "MX1R", 1.3, 1.0)
+    rng = np.random.default_rng(3)
+    a, b = (record(arm, x, rng) for x in (X, other))
+    found = runtime.identify(arm, [a, b], STUDY).part("homogeneity").disagreements[0]
+    alone = runtime.identify(arm, b, STUDY).estimate
+    k = alone.names.index("MX1R")
+    np.testing.assert_allclose(
+        (found.value, found.deviation), (alone.X[k], alone.sigma_corrected[k]), rtol=1e-9
+    )
 
 
 def test_names_the_record_of_three(arm):
@@ -92,7 +102,7 @@ def test_names_the_record_of_three(arm):
         found.disagreements[0].record,
         found.disagreements[0].parameter,
     ) == ("tuesday", "MX1R")
-    assert "tuesday: MX1R" in found.text() and "do NOT agree" in found.text()
+    assert "tuesday: MX1R" in found.text() and "differ" in found.text()
 
 
 def test_a_record_at_rest_is_left_out_and_told(arm):
@@ -111,21 +121,4 @@ def test_a_record_at_rest_is_left_out_and_told(arm):
         "still, which alone does not determine"
     )
     alone = homogeneity({"a": parts["a"], "still": parts["still"]}, arm.BASE_PARAMETERS, model=arm)
-    assert "cannot be told" in alone.text() and np.isnan(alone.p)
-
-
-def test_holm():
-    """By hand: 0.01 x 3, 0.02 x 2, 0.9; probabilities never decrease."""
-    np.testing.assert_allclose(_holm(np.array([0.9, 0.01, 0.02])), [0.9, 0.03, 0.04])
-
-
-def test_blocks_that_excite_one_parameter_each():
-    """The test in all rejects at most 8 % of 200 right pairs for a nominal 5."""
-    rng, b, B, said = np.random.default_rng(8), 8, 48, 0
-    for _ in range(200):
-        blocks = [np.column_stack([np.zeros((6, b)), rng.standard_normal(6)]) for _ in range(B)]
-        for k, rows in enumerate(blocks):
-            rows[:, k % b] = 1 + rng.random(6)
-        (x, N, C), (y, M, D) = _fit(blocks[:24]), _fit(blocks[24:])
-        said += fisher.sf(_in_all(x - y, N + M, C + D), b, B - 2) < 0.05
-    assert 1 <= said <= 16
+    assert "cannot be compared" in alone.text()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,8 +21,8 @@ from runtime.physical.inertia import PhysicalModel, physical_model
 from runtime.plausible.bodies import Grams
 from runtime.plausible.delay import Delay, delay_of
 from runtime.plausible.known import KnownValues, known_values
-from runtime.plausible.samples import Filtered, Samples
-from runtime.plausible.trials import Baseline, baseline_of
+from runtime.plausible.samples import Filtered, Samples, excerpts, samples_of
+from runtime.plausible.trials import Baseline, baseline_of, regressor
 
 Array = np.ndarray
 
@@ -47,6 +47,8 @@ class Case:
         Regressor at the samples.
     variants : GeneratedModel or None
         The module of `symgen.variants`.
+    unseen : sequence of Prepared
+        Validation records of the study.
     """
 
     model: GeneratedModel
@@ -57,6 +59,7 @@ class Case:
     samples: Samples
     D: Array
     variants: GeneratedModel | None
+    unseen: Sequence[Prepared] = ()
 
     @property
     def records(self) -> list[Record]:
@@ -138,6 +141,20 @@ class Case:
     def baseline(self) -> Baseline | None:
         """The study as it is, fitted; None where nothing is fitted."""
         return None if self.silent else self._baseline(values=True)
+
+    @cached_property
+    def validation(self) -> Baseline | None:
+        """The rows of the validation records, for the fits of `baseline`; None where there are none."""
+        if self.baseline is None or not self.unseen:
+            return None
+        try:
+            samples = samples_of(
+                [part for one in self.unseen for part in excerpts(one)], self.study
+            )
+            D = regressor(self.model, (samples.q, samples.qd, samples.qdd))
+        except (InputError, ValueError):  # too short, or a loop that does not close
+            return None
+        return replace(self.baseline, samples=samples, D=D)
 
     @cached_property
     def alone(self) -> Baseline | None:

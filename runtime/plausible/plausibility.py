@@ -215,7 +215,11 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
             text = "Not asked: the loops of the robot file would not close with others"
             question = "Are angles and lengths of the table of frames right?"
             checks.append(Check(question, "open", text))
-    named = [t for t in decisive(trials, case.baseline, case.noise_floor) if explained(case, t) > late_gain(case)]
+    named = [
+        t
+        for t in decisive(trials, case.baseline, case.noise_floor, case.validation)
+        if explained(case, t) > late_gain(case)
+    ]
     wrong = [t for t in named if named[0].cause.kind != "friction"]
     asked = EXPLAINED if trials else EXPLAINED[:-1]
     checks += [found for check in asked if (found := check(case, named)) is not None]
@@ -257,7 +261,8 @@ def _case(problem: Problem, variants: GeneratedModel | None) -> Case | Check:
             "look at sign, zero and order of the positions, at their unit, and at the lengths and "
             "the start of the loop",
         )
-    return Case(model, own, straight, study, through, samples, D, variants)
+    unseen = problem.prepared_unseen
+    return Case(model, own, straight, study, through, samples, D, variants, unseen)
 
 
 __all__ = ["Plausibility", "plausibility"]

@@ -512,11 +512,15 @@ def slow_friction(baseline: Baseline) -> Array | None:
     return size * xi * certain if certain.any() else None
 
 
-def decisive(trials: Sequence[Trial], baseline: Baseline, floor: Array) -> list[Trial]:
+def decisive(
+    trials: Sequence[Trial], baseline: Baseline, floor: Array, other: Baseline | None = None
+) -> list[Trial]:
     """Those that explain the record decisively better than the study as given, rows too that did
     not give their parameters: the best, and those like it.
 
-    floor : error of each joint, %, that noise of the positions may make. A joint with a smaller error tells no cause.
+    floor : error of each joint, %, that noise of the positions may make; a joint with a smaller error
+        shows no cause.
+    other : rows of validation records, which a cause has to explain better too.
     """
     given, better = baseline.given, []
     for trial in trials:
@@ -535,12 +539,33 @@ def decisive(trials: Sequence[Trial], baseline: Baseline, floor: Array) -> list[
         trial
         for trial in alike[: LIMIT.ALTERNATIVES_NAMED]
         if before - baseline.unseen(trial.cause) > np.log(len(trials))
+        and (other is None or helps(trial, baseline, other))
     ]
     if not named or named[0].fit is None or (given.errors - named[0].fit.errors > 0.2).any():
         return named
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
     named += [trial for trial in loads(baseline) if trial.gain > least]
     return sorted(named, key=lambda trial: -trial.gain)
+
+
+def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
+    """Whether the parameters of a cause explain another record better than those of the study, read
+    as the study says or as the cause says.
+    """
+
+    def misfit(cause: Cause, X: Array) -> float:
+        rows = other.rows(cause)
+        return np.inf if rows is None else _misfit(other.standard(Grams.of(*rows, other.tau)), X)
+
+    assert trial.fit is not None
+    given = unchanged(other.samples.n)
+    after = min(misfit(cause, trial.fit.X) for cause in (given, trial.cause))
+    return misfit(given, baseline.given.X) - after > np.log(LIMIT.VISIBLE) / 2
+
+
+def _misfit(grams: Grams, X: Array) -> float:
+    """Sum of the logarithms of the residuals of the joints."""
+    return fit_of(grams, X, 1.0).score
 
 
 def loads(baseline: Baseline) -> list[Trial]:
