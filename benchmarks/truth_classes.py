@@ -5,7 +5,7 @@ Class k % 7; every class has all robots by turns. docs/reliability.md has its ta
 
     ordinary            Fourier or chirp motion of 10 s, white torque noise of 1 or 2 %
     slow                a quarter of the speed, 16 s
-    coarse encoder      500 to 2000 counts per turn at the joint, positions as counted
+    coarse encoder      500 to 2000 counts per turn at the joint, positions as counted; half of them slow
     short               3 s
     rests               point to point, 25 % of the time at rest
     AR(0.99)            noise that a first-order recursion with 0.99 makes, point to point
@@ -49,6 +49,8 @@ def classes(k: int, seed: int, seeds: str) -> list[Row]:
         kind, str(rng.choice(["fourier", "chirp"]))
     )
     seconds = {"short": 3.0, "slow": 16.0}.get(kind, 10.0)
+    if kind == "coarse encoder" and rng.uniform() < 0.5:
+        motion, seconds = "slow", float(rng.choice([3.0, 10.0]))
     move = world.MOTIONS[motion](robot, seed, seconds=seconds)
     tau = truth.torque(move)
     if kind == "friction left out":

@@ -60,6 +60,8 @@ class Expected(NamedTuple):
     error: float
     low: float
     high: float
+    motions: str = ""
+    """Which motions it speaks of."""
 
 
 @Question(
@@ -75,8 +77,9 @@ def expected_off(likely: Expected) -> Answer | None:
     limit = LIMIT.EXPECTED_ERROR
     return Answer(
         "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
-        f"{likely.error:.2g} % of the torques are expected to be off over the range of the robot"
-        + (f", {likely.low:.2g} to {likely.high:.2g} % likely" if likely.low < likely.high else ""),
+        f"{likely.error:.2g} % of the torques are expected to be off"
+        + (f", {likely.low:.2g} to {likely.high:.2g} % likely," if likely.low < likely.high else "")
+        + f" in {likely.motions}",
     )
 
 
@@ -92,7 +95,7 @@ class ExpectedError(Part):
 
     @property
     def expected_error(self) -> float:
-        """Of all motions over the range of the robot, %."""
+        """Of motions over the range of the robot at up to half of its speed, %."""
         return self.expected.error
 
     @cached_property
@@ -178,7 +181,12 @@ def expected_error(
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
     errors = 100 * np.sqrt(open_part * times + (steps / (1 + steps)) ** 2)
-    return Expected(*np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist())
+    motions = (
+        "motions over limits.q of the robot file at up to half of limits.qd"
+        if limits_of(model)
+        else "motions over the range of this record at its speeds (the robot file has no limits)"
+    )
+    return Expected(*np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist(), motions)
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:
@@ -203,16 +211,24 @@ def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[
     return known + V @ g, V
 
 
+def limits_of(model: GeneratedModel) -> tuple[Array, Array] | None:
+    """Ranges, shape (n, 2), and largest speeds, shape (n,), of the robot file; None where one is not finite."""
+    limits = dict(getattr(model, "LIMITS", {}) or {})
+    n = len(model.JOINTS)
+    span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
+    known = span.shape == (n, 2) and speed.shape == (n,) and np.isfinite([*span.T, speed]).all()
+    return (span, speed) if known else None
+
+
 def reference_states(
     model: GeneratedModel, records: Sequence[Prepared]
 ) -> tuple[Array, Array, Array] | None:
     """q, qd, qdd of a motion over the range of the robot, shape (K, n) each; None where no range is
     known.
     """
-    limits = dict(getattr(model, "LIMITS", {}) or {})
     n = len(model.JOINTS)
-    span, speed = (np.asarray(limits.get(key, ()), dtype=float) for key in ("q", "qd"))
-    if span.shape != (n, 2) or speed.shape != (n,) or not np.isfinite([*span.T, speed]).all():
+    limits = limits_of(model)
+    if limits is None:
         if not records:
             return None
         q = np.concatenate([record.states.q for record in records])
@@ -227,6 +243,7 @@ def reference_states(
         middle = (q.max(axis=0) + q.min(axis=0)) / 2
         half, speed = half / LIMIT.REFERENCE_RANGE[1], speed / LIMIT.REFERENCE_SPEED[1]
     else:
+        span, speed = limits
         middle, half = span.mean(axis=1), np.ptp(span, axis=1) / 2
     rng, shape = np.random.default_rng(0), (LIMIT.REFERENCE_STATES, n)
     (least, most), (slow, fast) = LIMIT.REFERENCE_RANGE, LIMIT.REFERENCE_SPEED

@@ -55,7 +55,7 @@ def test_range_not_known_and_not_determined(arm):
     result = runtime.identify(arm, record(arm, (1, 1)))
     bare = type("Bare", (), {**{k: getattr(arm, k) for k in dir(arm) if k[0] != "_"}, "LIMITS": {}})
     fit = result.model_estimate
-    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ())).all()
+    assert np.isnan(expected_error(bare, result.observation, result.study.estimate, fit, ()).error)
     lost = replace(result, estimate=replace(result.estimate, status="rank-deficient"))
     assert lost.expected_error == 999
 

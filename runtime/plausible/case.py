@@ -178,18 +178,14 @@ class Case:
         return known_values(baseline) if baseline and baseline.bodies.near_values else None
 
     @cached_property
-    def noise_floor(self) -> Array:
-        """Error of each joint, %, that noise of the positions may make, shape (n,).
-
-        NOISE_MADE sqrt(a) std(tau)/rms(tau), a the largest share of an acceleration that is noise: as much of the torque that
-        changes may be lost in the columns, and a cause may find it again.
+    def noise_floor(self) -> float:
+        """Error of a joint, %, that noise of the positions may make: NOISE_MADE sqrt(a), a the largest
+        share of an acceleration that is noise. As much of a torque may be lost in the columns, and
+        a cause may find it again.
         """
         median = self.study.signals.median
         shares = [noise_share(x.record.q, x.record.rate, x.low, median) for x in self.through]
-        tau = self.samples.tau
-        size = np.sqrt((tau**2).mean(axis=0)).clip(1e-300)
-        made = LIMIT.NOISE_MADE * np.sqrt(np.max(shares))
-        return np.asarray(100 * made * tau.std(axis=0) / size)
+        return 100 * LIMIT.NOISE_MADE * float(np.sqrt(np.max(shares)))
 
     @cached_property
     def late(self) -> Delay | None:

@@ -513,13 +513,13 @@ def slow_friction(baseline: Baseline) -> Array | None:
 
 
 def decisive(
-    trials: Sequence[Trial], baseline: Baseline, floor: Array, other: Baseline | None = None
+    trials: Sequence[Trial], baseline: Baseline, floor: float, other: Baseline | None = None
 ) -> list[Trial]:
     """Those that explain the record decisively better than the study as given, rows too that did
     not give their parameters: the best, and those like it.
 
-    floor : error of each joint, %, that noise of the positions may make; a joint with a smaller error
-        shows no cause.
+    floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
+        nor does the distance from the values where this is more than LIMIT.NOISY.
     other : rows of validation records, which a cause has to explain better too.
     """
     given, better = baseline.given, []
@@ -528,7 +528,8 @@ def decisive(
             fewer = given.errors - trial.fit.errors
             ratio = given.errors / trial.fit.errors.clip(0.1)
             visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2) & (given.errors > floor)).any()
-            if visible or given.penalty - trial.fit.penalty > LIMIT.DECISIVE:
+            nearer = given.penalty - trial.fit.penalty > LIMIT.DECISIVE and floor < LIMIT.NOISY
+            if visible or nearer:
                 better.append(trial)
     if not better:
         return []

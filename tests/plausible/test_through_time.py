@@ -131,6 +131,6 @@ def test_an_encoder_that_froze_and_came_back_is_told(right: runtime.Record) -> N
 def test_a_torque_that_never_changes_ends_the_questions(
     right: runtime.Record, recwarn: pytest.WarningsRecorder
 ) -> None:
-    found = judged(replace(right, tau=right.tau * [1.0, 0.0]))
+    found = judged(replace(right, tau=right.tau * [1.0, 0.0] + [0.0, 3.0]))
     assert found.worst is not None and found.worst.finding == "The torque of joint 2 is constant"
     assert found.checks()[-1].finding == "Not asked: a torque never changes" and not recwarn.list
