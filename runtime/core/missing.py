@@ -64,6 +64,29 @@ class Missing:
         return near
 
 
+def held_samples(q: Array) -> Array:
+    """Samples at which a controller repeated the positions of the sample before, bool, shape (N,).
+
+    All joints hold, while one of them moves before and after, and the step that follows makes up
+    for it: it is that of the neighbours times the samples that it spans, to 0.4. A joint between
+    two counts of a coarse encoder, or at rest, makes up for nothing.
+    """
+    steps = np.abs(np.diff(q, axis=0))
+    same = ~steps.any(axis=1)
+    ends = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+    count = np.where(steps > 0, steps, np.inf).min(axis=0)  # of an encoder
+    held = np.zeros(len(q), dtype=bool)
+    for a, b in ends:  # steps a to b - 1 are none
+        if a < 2 or b + 2 >= len(steps):
+            continue
+        beside = np.concatenate([steps[a - 2 : a], steps[b + 1 : b + 3]])
+        usual = beside.mean(axis=0) * beside.all(axis=0)
+        j = int(np.argmax(usual))
+        if usual[j] > 2.5 * count[j] and abs(steps[b, j] / usual[j] / (b - a + 1) - 1) < 0.4:
+            held[a + 1 : b + 1] = True
+    return held
+
+
 def bridged(q: Array, missing: Array) -> Array:
     """q, shape (N, n), with straight lines where samples are missing: between their neighbours, and
     held at the ends.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from runtime.core.drives import Drives, encoder_drives, encoder_root
-from runtime.core.missing import Missing
+from runtime.core.missing import Missing, held_samples
 from runtime.core.record import Record
 from runtime.core.signals.filters import SpeedErrors, States, filtered_states
 from runtime.core.study import Signals
@@ -27,6 +27,7 @@ def counted(record: Record, signals: Signals) -> States:
     """
     drives = encoder_drives(signals.side, record.origin.drives)
     position = encoder_position(record.q, drives, record.missing)
+    position[held_samples(record.q)] = np.nan
     reading = read_counts(position, record.rate, signals.step, name=record.name)
     q, deviation = reading.motion
     q = q if drives is None else drives.joint_position(q)
@@ -53,5 +54,5 @@ def unwrapped(record: Record, signals: Signals, drives: Drives | None = None) ->
 
 def encoder_position(q: Array, drives: Drives | None, missing: Missing | None = None) -> Array:
     """Positions at the encoders, shape (N, n), of joint positions q; nan where they are missing."""
-    x = q if drives is None else drives.motor_position(q)
+    x = q.copy() if drives is None else drives.motor_position(q)
     return x if missing is None else np.where(missing.at_encoders(drives), np.nan, x)

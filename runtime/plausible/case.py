@@ -133,9 +133,10 @@ class Case:
 
     @cached_property
     def sides(self) -> tuple[str, str]:
-        """Sides of positions and torques in the files."""
+        """Sides of positions and torques in the files; law for torques that a controller's law gives."""
         settings: Any = self.study
-        return settings.record[0].sides if settings.record else ("joint", "joint")
+        q, tau = settings.record[0].sides if settings.record else ("joint", "joint")
+        return q, "law" if any(record.origin.by_law for record in self.records) else tau
 
     @cached_property
     def baseline(self) -> Baseline | None:

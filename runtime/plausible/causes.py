@@ -308,7 +308,8 @@ def orders(robot: Robot) -> Iterator[Item]:
 
 def torque_units(robot: Robot) -> Iterator[Item]:
     """Units of torques of turning joints."""
-    for unit, factor in TORQUE_UNITS.items() if robot.turning.all() else ():
+    measured = robot.sides[1] != "law"
+    for unit, factor in TORQUE_UNITS.items() if measured and robot.turning.all() else ():
         yield {"unit": unit, "factor": factor}
 
 

@@ -19,6 +19,7 @@ from scipy.ndimage import median_filter
 from runtime.core.check import Answer, Question
 from runtime.core.errors import instant
 from runtime.core.limits import LIMIT
+from runtime.core.missing import held_samples
 from runtime.core.model import drives_of
 from runtime.core.signals.filters import median_filtered
 from runtime.plausible.bodies import least_squares
@@ -58,6 +59,18 @@ def jumps(case: Case) -> Answer:
         high = apart > np.maximum(LIMIT.JUMP * _usual(apart), least)
         changes = np.abs(np.diff(q, 2, axis=0))
         sharp = changes > np.maximum(LIMIT.JUMP * _usual(changes), good / record.rate**2)
+        held = held_samples(record.q)
+        near = LIMIT.JUMP_STEPS + median
+        runs = zip(*_runs(high.any(axis=1), median), strict=True) if high.any() else ()
+        if held.any() and all(held[max(a - near, 0) : b + near].any() for a, b in runs):
+            packets = int(np.count_nonzero(np.diff(held, prepend=False) & held))
+            return Answer(
+                "good" if held.mean() < LIMIT.HELD_SHARE else "doubtful",
+                f"The controller held the positions at {packets} instants, {int(held.sum())} samples "
+                f"of {len(held)}, and caught up",
+                "log without lost packets, or leave these times out (rows.window); signals: "
+                "{reader: counts} takes held samples as missing",
+            )
         frozen = np.array([_frozen(x, own) for x, own in zip(steps.T, sharp.T, strict=True)])
         if frozen.any():
             still = np.asarray(frozen.any(axis=1))

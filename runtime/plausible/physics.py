@@ -165,7 +165,9 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
             late.before[j],
             late.after[j],
         ),
-        f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
+        "find the time from the log to the torque: controller.law.delay: fit"
+        if case.sides[1] == "law"
+        else f"shift the torques by {', '.join(f'{-1e3 * x:+.1f}' for x in shift)} ms against the "
         "positions before reading the record, or mend the logger",
     )
 
