@@ -117,19 +117,29 @@ class Case:
         except InputError:
             return None
 
-    @cached_property
+    @property
     def silent(self) -> str:
-        """Why nothing is fitted; "" where the samples allow it."""
+        """Why no cause is tried; "" where the samples allow it."""
+        return self.unfit or self.few
+
+    @cached_property
+    def few(self) -> str:
+        """Why the samples are too few to try causes; gravity of the values needs no motion."""
         rows = self.samples.moving().sum(axis=0)
         least = LIMIT.ROWS_PER_PARAMETER * len(self.model.BASE_PARAMETERS)
+        few = int(rows.sum()) <= least or int(rows.min()) <= LIMIT.FEWEST_ROWS
+        return "too few samples at which every joint moves" if few else ""
+
+    @cached_property
+    def unfit(self) -> str:
+        """Why nothing can be fitted, however many samples there are."""
         if self.physical is None:
             return "the model has no standard parameters"
         if self.samples.constant().any():
             return "a torque never changes"
         if (passive := self.samples.without_motor()).any():
             return f"joint {self.joints(passive)} has no motor: its torque is zero throughout"
-        few = int(rows.sum()) <= least or int(rows.min()) <= LIMIT.FEWEST_ROWS
-        return "too few samples at which every joint moves" if few else ""
+        return ""
 
     @cached_property
     def sides(self) -> tuple[str, str]:
@@ -160,7 +170,9 @@ class Case:
     @cached_property
     def alone(self) -> Baseline | None:
         """The same without the values of the robot file."""
-        return self.baseline if self.robot_values is None else self._baseline(values=False)
+        if self.baseline is None or self.robot_values is None:
+            return self.baseline
+        return self._baseline(values=False)
 
     def _baseline(self, *, values: bool) -> Baseline:
         return baseline_of(
@@ -175,7 +187,9 @@ class Case:
     @cached_property
     def robot_values(self) -> KnownValues | None:
         """Torque of the values of the robot file, where it has them."""
-        baseline = self.baseline
+        if self.unfit:
+            return None
+        baseline = self.baseline or self._baseline(values=True)
         return known_values(baseline) if baseline and baseline.bodies.near_values else None
 
     @cached_property

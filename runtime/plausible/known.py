@@ -133,7 +133,7 @@ def known_values(baseline: Baseline) -> KnownValues | None:
     ]
     ratios, errors = np.full((s.n, 2), np.nan), np.full(s.n, np.nan)
     for j in range(s.n):
-        rows = mask[:, j]
+        rows = mask[:, j] if mask[:, j].sum() >= 20 else np.ones(len(Y), dtype=bool)
         y = Y[rows, j]
         if len(y) < 20:
             continue

@@ -198,7 +198,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
     answers = {check: check(case) for check in CHECKS}
     checks = [first, *(found for found in answers.values() if found is not None)]
     if case.baseline is None:
-        return Plausibility(tuple(checks))
+        return Plausibility(tuple(checks), robot_values=case.robot_values)
     question = "Is the study the best explanation of the record?"
     for check, text in ((jumps, "the positions jump"), (cut_torques, "torques are cut off")):
         # what explains a broken record better is no cause

@@ -51,7 +51,8 @@ def standing(case: Case) -> Answer | None:
     return Answer(
         "doubtful",
         f"Joint{'s' * (not one)} {case.joints(still)} {'does' if one else 'do'} not move ({rms:.1g} {case.units[int(np.argmax(still))]} rms)",
-        f"hold {'it' if one else 'them'}: symgen convert ROBOT held.yaml {held}",
+        f"hold {'it' if one else 'them'}: symgen convert ROBOT held.yaml {held}; where "
+        f"{'it does' if one else 'they do'} move, look at record.columns.q",
     )
 
 

@@ -100,3 +100,17 @@ def test_a_word_of_the_record(tmp_path, monkeypatch) -> None:
     )
     record = runtime.read_record(study.record[0], arm)
     np.testing.assert_allclose(record.tau, tau * [1, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("seconds", [1.5, 20.0])
+def test_gravity_of_the_values_is_always_asked(seconds) -> None:
+    """All torques with the wrong sign, in a record that is too short for causes and in one that is not."""
+    arm = symgen.model("planar_2r")
+    q, qd, qdd = (x[:, :2][: int(500 * seconds)] for x in motion([0, 1]))
+    small = {name: 0.02 * x for name, x in arm.VALUES.items() if name[:2] in ("FV", "FS")}
+    tau = -arm.inverse_dynamics(q, qd, qdd, arm.base_parameters(arm.VALUES | small))
+    tau += 0.01 * np.random.default_rng(4).standard_normal(tau.shape)
+    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 25}}})
+    found = runtime.plausibility(arm, runtime.Record(T[: len(q)], q, tau), study)
+    check = next(c for c in found.checks() if c.question.startswith("Do the values"))
+    assert check.state == "doubtful" and "No: " in check.finding

@@ -424,7 +424,7 @@ KR300 = (
     Slip(
         17,
         "secondary encoders: axes 4 to 6 zero",
-        r"4, 5, 6 stand still",
+        r"4, 5, 6 do not move",
         lambda c: replace(c, q=c.q * [1, 1, 1, 0, 0, 0]),
     ),
     Slip(
