@@ -66,7 +66,8 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
         "family": e.family,
         "kind": e.kind,
         "when": e.when,
-        **({"laws": [str(e.law(j) + e.potential(j)) for j in e.along]} if e.is_own else {}),
+        **({"laws": [str(e.law(j)) for j in e.along]} if e.is_own else {}),
+        **({"energies": [str(e.potential(j)) for j in e.along]} if _has_energy(e) else {}),
         "along": {str(j): {str(i): str(c) for i, c in row.items()} for j, row in e.along.items()},
         "form": {
             str(j): {f"{i},{k}": str(c) for (i, k), c in form.items()} for j, form in e.form.items()
@@ -76,3 +77,8 @@ def _element(robot: Robot, e: Element) -> dict[str, Any]:
             for j, row in active.items()
         },
     }
+
+
+def _has_energy(e: Element) -> bool:
+    """Whether a column of the file's own is an energy."""
+    return e.is_own and any(str(e.potential(j)) != "0" for j in e.along)
