@@ -123,8 +123,7 @@ def other_frame(claim: dict, rng: random.Random) -> str:
 
 
 def other_gravity(claim: dict, rng: random.Random) -> str:
-    claim["constants"]["g"] = 9.81
-    claim["gravity"] = ["g", "g", "g"]
+    claim["gravity"] = ["0", "0", "0"]
     return "refuted"
 
 
