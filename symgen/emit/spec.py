@@ -167,7 +167,7 @@ class ModuleSpec:
         """Passive joints that only the closure equations tie to the actuated ones."""
         return self.derivation.closure.tied
 
-    @property
+    @cached_property
     def structure(self) -> tuple[tuple[bool, ...], ...]:
         """[k][row]: whether base parameter k acts on a joint: D is not identically zero there."""
         b, n = self.functions["regressor"].shape
