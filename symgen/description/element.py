@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import partial
+from itertools import product
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -257,9 +258,9 @@ def check_law(e: Element, robot: Any) -> None:
             path=(*where, key),
         )
     for j in e.along:
-        for speed in (0.0, 1.0):
+        for position, speed in product(_positions(robot, e.along[j]), (0.0, 1.0)):
             reason = ""
-            values = {name: speed if name.startswith("qd") else 0.7 for name in states}
+            values = {name: speed if name.startswith("qd") else position for name in states}
             try:
                 along, others = e.laws(j)
                 values |= {**robot.constants, **channels}
@@ -269,10 +270,19 @@ def check_law(e: Element, robot: Any) -> None:
                 finite, reason = False, f" ({error})"
             if not finite:
                 raise DescriptionError(
-                    f"{e.family}: {law} is not finite at q = 0.7, qd = {speed:g} with the "
+                    f"{e.family}: {law} is not finite at q = {position:g}, qd = {speed:g} with the "
                     f"constants of the file; a law is finite at rest and in motion{reason}",
                     path=(*where, key),
                 )
+
+
+def _positions(robot: Any, row: Any) -> tuple[float, float]:
+    """Two positions at which a law is a number: within limits.q of its one joint, else on either side of zero."""
+    (j, *others), limits = row, robot.limits.get("q")
+    if others or limits is None or j not in robot.joints:
+        return -0.4, 0.7
+    low, high = limits[robot.joints.index(j)]
+    return low + 0.3 * (high - low), low + 0.9 * (high - low)
 
 
 def check_channels(robot: Any) -> None:

@@ -20,7 +20,10 @@ from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
+from symgen.errors import DescriptionError
+
 LONGEST_SLOPE = 2000  # terms of a derivative
+MOST_PRODUCTS = 50_000  # of terms, where two expressions are multiplied
 LARGEST_PRIME = 1000  # of the trial division under square roots
 PLACES, LARGEST_RATIO = 40, 360  # of a decimal; denominator of a ratio written as one
 
@@ -116,8 +119,14 @@ class Expression:
 
     def __mul__(self, other: Expression | int | Fraction) -> Expression:
         terms: dict[Monomial, Fraction] = {}
+        other = Expression.of(other)
+        if len(self.terms) * len(other.terms) > MOST_PRODUCTS:
+            raise DescriptionError(
+                f"expressions of {len(self.terms)} and {len(other.terms)} terms are multiplied, more "
+                f"than {MOST_PRODUCTS:,} products; name a long sum as one constant"
+            )
         for m1, c1 in self.terms.items():
-            for m2, c2 in Expression.of(other).terms.items():
+            for m2, c2 in other.terms.items():
                 m, c = _with_simple_roots(_product(m1, m2))
                 terms[m] = terms.get(m, Fraction(0)) + c * c1 * c2
         return Expression(terms)
