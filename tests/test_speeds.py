@@ -60,7 +60,9 @@ def test_the_quieter_of_both_at_every_frequency():
 
 
 def test_parameters_are_nearer_to_the_truth():
-    study, off = Study(), Study(signals=Signals(velocity="differences"))
+    low = Lowpass(cutoff=40)
+    study = Study(signals=Signals(lowpass=low))
+    off = Study(signals=Signals(lowpass=low, velocity="differences"))
     errors = []
     for settings in (study, off):
         X = [

@@ -1,5 +1,7 @@
 """Semidefinite programs of one `identify`: each at most once, and only for the set that is printed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,11 +54,11 @@ def test_each_program_once_where_the_physical_parameters_are_printed(programs) -
     X = model.base_parameters(model.VALUES)
     tau = model.inverse_dynamics(q, qd, qdd, X) + 0.05 * rng.standard_normal(q.shape)
     record = runtime.Record(t, q, tau)
-    result = runtime.identify(model, record)
+    study = runtime.Study(signals={"lowpass": {"cutoff": 10}})
+    result = runtime.identify(model, record, study)
     assert result.model_columns == "feasible"
     assert len(set(programs)) == len(programs) <= 5 * 11 + 6
     programs.clear()
-    chapter = runtime.identify(
-        model, record, runtime.Study(essential=EssentialSettings(first=True))
-    )
+    first = replace(study, essential=EssentialSettings(first=True))
+    chapter = runtime.identify(model, record, first)
     assert chapter.model_columns == "essential" and programs == []
