@@ -32,7 +32,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import pi, sqrt
+from math import pi
 from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 import truth_simulator as world
 from scipy.stats import spearmanr
-from truth_classes import classes, classes_table, stribeck
+from truth_classes import classes, classes_table, share, stribeck
 from truth_counts import counts, counts_random, counts_random_table, counts_table
 from truth_shared import (
     LEVEL,
@@ -205,15 +205,17 @@ def ends_table(rows: list[Row]) -> str:
 
 
 def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
-    """One pair of records of one robot; every fourth pair one link of the second is 3 % heavier."""
+    """One pair of records of one robot, of 3 or 8 s; every fourth pair one link of the second is 3 %
+    heavier.
+    """
     kind, different = NOISES[:3][k % 3], (k // 3) % 4 == 3
     robots = robots_of(seeds)[:3]
     robot = robots[(k // 3) % len(robots)]
-    motion = MOVES[(k // 9) % 3]
+    motion, seconds = MOVES[(k // 9) % 3], (8.0, 3.0)[(k // 27) % 2]
     truth, records = Truth(robot, seed), []
     for i in range(2):
         own = truth.changed(0.03, seed) if different and i else truth
-        move = world.MOTIONS[motion](robot, seed + 250_000 * i)
+        move = world.MOTIONS[motion](robot, seed + 250_000 * i, seconds=seconds)
         tau = own.torque(move)
         records.append(record_of(move, tau + noise(tau, world.NOISES[kind], SHARE, seed + i)))
     agree = runtime.identify(emitted(robot.name)[0], records, study(robot, motion)).part(
@@ -221,34 +223,25 @@ def homogeneity(k: int, seed: int, seeds: str) -> list[Row]:
     )
     assert agree is not None
     tested = len(agree.records) > 1
-    return [{"noise": kind, "robot": robot.name, "motion": motion, "different": different, "tested": tested,
-             "said": bool(tested and not agree.agree), "largest": max((d.difference for d in agree.disagreements), default=0.0)}]  # fmt: skip
+    return [{"noise": kind, "robot": robot.name, "motion": motion, "seconds": seconds, "different": different, "tested": tested,
+             "said": bool(tested and not agree.agree), "doubted": bool(tested and agree.records_differ), "largest": max((d.difference for d in agree.disagreements), default=0.0)}]  # fmt: skip
 
 
 def homogeneity_table(rows: list[Row]) -> str:
     lines = []
-    for kind in (*NOISES[:3], "all"):
+    for label, fields in (
+        *((f"noise {kind}", {"noise": kind}) for kind in NOISES[:3]),
+        *((f"motion {motion}", {"motion": motion}) for motion in MOVES),
+        *((f"{seconds:g} s", {"seconds": seconds}) for seconds in (8.0, 3.0)),
+        ("all", {}),
+    ):
         for different in (False, True):
-            own = [
-                r
-                for r in rows
-                if kind in (r["noise"], "all") and r["different"] == different and r["tested"]
-            ]
-            said, N = sum(r["said"] for r in own), len(own)
-            p = said / N if N else 0.0
-            lines.append(
-                (
-                    kind,
-                    "3 % on one link" if different else "one robot",
-                    N,
-                    said,
-                    percent(said, N),
-                    f"{100 * sqrt(p * (1 - p) / max(N, 1)):.0f}",
-                )
-            )
-    return markdown(
-        ("noise", "pairs of", "pairs", "said to differ", "%", "its deviation, %"), lines
-    )
+            own = among(rows, tested=True, different=different, **fields)
+            said, doubted = sum(r["said"] for r in own), sum(r["doubted"] for r in own)
+            pairs = "3 % on one link" if different else "one robot"
+            lines.append((label, pairs, len(own), share(said, len(own)), share(doubted, len(own))))
+    head = ("class", "pairs of", "pairs", "said to differ, %", "verdict With care for it, %")
+    return markdown(head, lines)
 
 
 # (4) Verdict --------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from runtime import robust as irls
-from runtime.advisor.advice import no_advice
+from runtime.advisor.advice import NoAdvice
 from runtime.agreement import agreement
 from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import estimation
@@ -142,7 +142,7 @@ EXTRAS: list[Extra] = [
     OnRequest("friction", "friction", later("runtime.friction.curves", "friction")),
     OnRequest("physical", "physical consistency", consistency, as_fitted),
     OnRequest(
-        "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), no_advice
+        "advice", "resolution advice", later("runtime.advisor.advisor", "advice_of"), NoAdvice
     ),
     OnRequest(
         "resolution",

@@ -21,6 +21,7 @@ from runtime.core.limits import LIMIT
 from runtime.core.part import BLACK, BLUE, DOTTED, GREY, ORANGE, Figure, Part
 from runtime.core.result import Identification
 from runtime.core.table import Table
+from runtime.counts.encoder_advice import visible_steps
 
 Array = np.ndarray
 
@@ -509,10 +510,25 @@ def _panel(ax: Any, reader: str, encoder: EncoderAdvice, line: str, points: str,
     "Does the encoder resolve enough?",
     f"bias below {LIMIT.NEGLIGIBLE:g} % (usable to {LIMIT.BIASED:g} %)",
 )
-def resolved(advice: Advice | None) -> Answer:
-    """The answer of the advisor, and of the step in use where it is given."""
+def resolved(advice: Advice | None, steps: str = "", share: float = 0.0) -> Answer:
+    """The answer of the advisor, and of the step in use where it is given.
+
+    steps, share : where no advice was asked for, the steps that the positions show, in words, and the
+    share of an acceleration that they make.
+    """
     if advice is None:
-        return Answer("open", "Not asked", "ask with symgen report, or symgen cestac --advise")
+        ask = "ask with symgen report, or symgen cestac --advise"
+        if not steps:
+            return Answer("open", "Not asked", ask)
+        text = f"{steps}, which make {100 * share:.2g} % of the mean square of an acceleration"
+        if 100 * share <= LIMIT.NEGLIGIBLE:
+            return Answer("open", f"{text}; what that does to each value was not asked", ask)
+        return Answer(
+            "doubtful",
+            f"{text}, and inertias too small",
+            "finer positions, or signals: {reader: counts}; symgen cestac --advise says how far "
+            "each value moves",
+        )
     steps = ", ".join(
         f"{one.percent:g} % up to "
         f"{step_text(one.delta, advice.unit) if np.isfinite(one.delta) else 'any step'}"
@@ -535,20 +551,19 @@ def resolved(advice: Advice | None) -> Answer:
     )
 
 
+@dataclass(frozen=True, eq=False)
 class NoAdvice(Part):
-    """The question that stays open where no advice was asked for."""
+    """What the positions alone show where no advice was asked for."""
+
+    result: Identification
 
     name = "advice"
     title = "Resolution advice"
 
     def checks(self) -> tuple[Check, ...]:
         """Whether the encoder resolves enough."""
-        return (resolved(None),)
-
-
-def no_advice(result: Identification) -> NoAdvice:
-    """The open question."""
-    return NoAdvice()
+        simulated = self.result.study.estimate.method in ("iv", "didim")
+        return (resolved(None, *(("", 0.0) if simulated else visible_steps(self.result))),)
 
 
 def _summary(advice: EncoderAdvice) -> dict[str, Any]:

@@ -34,6 +34,8 @@ class Check:
         What a good answer keeps to.
     remedy : str
         What to do where the answer is not good.
+    ahead : bool
+        Whether its finding is printed ahead of the values, most of which mean nothing then.
     """
 
     question: str
@@ -41,6 +43,7 @@ class Check:
     finding: str
     limit: str = ""
     remedy: str = ""
+    ahead: bool = False
 
     @property
     def sentence(self) -> str:
@@ -67,6 +70,7 @@ class Question:
     question: str
     limit: str = ""
     remedy: str = ""
+    ahead: bool = False
 
     def __call__(self, judge: Callable[P, Answer | None]) -> Callable[P, Any]:
         @wraps(judge)
@@ -76,7 +80,7 @@ class Question:
                 return None
             limit = self.limit if answer.limit is None else answer.limit
             remedy = self.remedy if answer.remedy is None else answer.remedy
-            return Check(self.question, answer.state, answer.finding, limit, remedy)
+            return Check(self.question, answer.state, answer.finding, limit, remedy, self.ahead)
 
         return check
 

@@ -375,17 +375,23 @@ class Identification:
             self.checklist.to_text(),
         ]
         text = "\n\n".join(part for part in others if part)
+        first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
         if not (self.determined and self.usable):
-            return text
+            return "\n\n".join([*first, text])
         values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
-        room = max(LIMIT.LINES_PRINTED - above - len(text.splitlines()) - 3, LIMIT.LINES_OF_VALUES)
+        room = max(
+            LIMIT.LINES_PRINTED - above - len([*first, *text.splitlines()]) - 3,
+            LIMIT.LINES_OF_VALUES,
+        )
         more = len(fit.names) - IN_LINE * room
         head = (
             f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
             f"{fit.method}, SI units, +- 95 %"
         )
         head += f"; {more} more by --verbose" if more > 0 else ""
-        return "\n".join([head, *values[:room], f"Unexplained by joint: {by_joint}", "", text])
+        return "\n".join(
+            [*first, head, *values[:room], f"Unexplained by joint: {by_joint}", "", text]
+        )
 
     def _repr_html_(self) -> str:
         parameters, joints = (self.model_estimate if self.determined else self.estimate).tables()

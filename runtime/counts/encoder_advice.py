@@ -52,6 +52,20 @@ class EncoderSteps(Part):
         return "\n".join(sentences)
 
 
+def visible_steps(result: Identification) -> tuple[str, float]:
+    """The steps of the positions that are taken as they are, in words, and the largest share of the mean
+    square of an acceleration that they make; "" where none are seen.
+    """
+    said, most = "", -1.0
+    for one in result.prepared:
+        if one.study.signals.reader == "lowpass":
+            found = _steps(one.record, one.states, one.study.signals, one.drives)
+            if found is not None and float(found[1].max()) > most:
+                most, joint = float(found[1].max()), int(np.argmax(found[1]))
+                said = f"Positions change in steps of {found[0][joint]:.3g} ({found[2]} side)"
+    return said, max(most, 0.0)
+
+
 def encoder_sentences(
     record: Record, states: States, signals: Signals, drives: Drives | None
 ) -> tuple[str, ...]:

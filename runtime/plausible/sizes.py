@@ -37,6 +37,7 @@ def times(records: Sequence[Record]) -> Answer:
 @Question(
     "Do the joints move?",
     "every joint, in some part of the record",
+    ahead=True,
 )
 def standing(case: Case) -> Answer | None:
     """Joints that stand still in every record; None where all move."""
@@ -46,17 +47,25 @@ def standing(case: Case) -> Answer | None:
     q = np.concatenate([record.q for record in case.records])
     rms = q.std(axis=0)[still].max()
     one = still.sum() == 1
-    where = q.mean(axis=0)
-    held = " ".join(f"--lock {name}={where[j]:.4g}" for j, name in _held(case, still))
+    digits = max(0, -int(np.floor(np.log10(max(rms, 1e-6)))))  # the noise is no angle
+    where = np.round(q.mean(axis=0), digits) + 0.0
+    held = " ".join(f"--lock {name}={where[j]:g}" for j, name in _named(case, still))
+    them, it, move = ("it", "it", "does") if one else ("them", "they", "do")
+    moving = [case.model.JOINTS[j] for j in np.flatnonzero(~still)]
+    columns = ", ".join(
+        f"{key}: [{', '.join(f'{key}{j}' for j in moving)}]" for key in ("q", "tau")
+    )
     return Answer(
         "doubtful",
-        f"Joint{'s' * (not one)} {case.joints(still)} {'does' if one else 'do'} not move ({rms:.1g} {case.units[int(np.argmax(still))]} rms)",
-        f"hold {'it' if one else 'them'}: symgen convert ROBOT held.yaml {held}; where "
-        f"{'it does' if one else 'they do'} move, look at record.columns.q",
+        f"Joint{'s' * (not one)} {case.joints(still)} {move} not move ({rms:.1g} "
+        f"{case.units[int(np.argmax(still))]} rms): hold {them} with --lock",
+        f"symgen convert ROBOT held.yaml {held}, with a study that reads the columns of "
+        f"the others (record.columns: {{{columns}}}); where {it} {move} move, "
+        "look at record.columns.q",
     )
 
 
-def _held(case: Case, still: Array) -> list[tuple[int, str]]:
+def _named(case: Case, still: Array) -> list[tuple[int, str]]:
     """Number and name of each joint of a mask, as --lock takes it."""
     names = getattr(case.model, "LABELS", {})
     joints = case.model.JOINTS

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime.advisor.advice import NoAdvice, resolved
+from runtime.advisor.advice import resolved
 from runtime.core.check import state_of
 from runtime.core.checklist import checklist_of, lost_joints, separate
 from runtime.core.least_squares.estimate import Estimate, JointFit
@@ -148,7 +148,7 @@ class Asking(Part):
 
 
 def checked(estimate, unseen=5.0, *, every=None, **asked):
-    asked = {"parts": [Consistency(estimate, estimate), NoAdvice()], **asked}
+    asked = {"parts": [Consistency(estimate, estimate), Asking("values", resolved(None))], **asked}
     deviations = dict(zip(estimate.names, 2.5 * estimate.sigma, strict=True))
     return checklist_of(
         every or estimate,
