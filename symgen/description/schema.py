@@ -8,11 +8,13 @@ import difflib
 import json
 import pathlib
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from symgen.description.distal_values import khalil_values
 from symgen.description.fields import Declared, Given, Path, dotted
 from symgen.description.naming import check_identifier
 from symgen.description.robot import Robot
@@ -55,7 +57,8 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
         )
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)
     try:
-        return TypeAdapter(Robot).validate_python(data, context=declared)
+        robot = TypeAdapter(Robot).validate_python(data, context=declared)
+        return replace(robot, values=khalil_values(robot)) if distal and robot.values else robot
     except (ValidationError, DescriptionError) as error:
         wrong = explained(error) if isinstance(error, ValidationError) else error
         if wrong.path[:1] == ("elements",) and wrong.path[1:2] and wrong.path[1] in columns:

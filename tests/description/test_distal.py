@@ -5,6 +5,7 @@ torques that go with them.
 import numpy as np
 import pytest
 
+import symgen
 from oracles.pinocchio_model import PinocchioModel
 from oracles.random_robots import random_parameters
 from symgen.derive.lagrange import Lagrange
@@ -137,3 +138,66 @@ def test_branches_start_at_the_far_end():
 def test_faults(old, new, words):
     with pytest.raises(DescriptionError, match=words):
         parse_robot(table(PUMA).replace(old, new, 1).encode(), "arm.yaml")
+
+
+def energies(rows, values, q, gravity):
+    """Inertia matrix and gravity torques of link data in the frames of the table, by products of
+    its matrices alone: A_ij = sum tr(dT/dq_i H dT'/dq_j), H the pseudo-inertia.
+    """
+    h, n = 1e-6, len(rows)
+    H = []
+    for j in range(1, n + 1):
+        xx, xy, xz, yy, yz, zz, mx, my, mz, m = (
+            values[f"{f}{j}"] for f in ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+        )
+        J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        ms = np.array([[mx], [my], [mz]])
+        H.append(np.block([[np.trace(J) / 2 * np.eye(3) - J, ms], [ms.T, np.array([[m]])]]))
+
+    def poses(x):
+        return [product(rows[: j + 1], (), x[: j + 1]) for j in range(n)]
+
+    steps = [
+        [(a - b) / (2 * h) for a, b in zip(poses(q + h * e), poses(q - h * e), strict=True)]
+        for e in np.eye(n)
+    ]
+    A = [
+        [sum(np.trace(s @ M @ t.T) for s, M, t in zip(u, H, v, strict=True)) for v in steps]
+        for u in steps
+    ]
+    Q = [
+        -sum(np.append(gravity, 0) @ s @ M[:, 3] for s, M in zip(u, H, strict=True)) for u in steps
+    ]
+    return np.array(A), np.array(Q)
+
+
+@pytest.mark.parametrize("rows", [PUMA[:3], ((0, 0.4, 0), (0, 0.3, 0)), PUMA], ids=len)
+def test_values_are_read_in_the_frames_of_the_table(rows):
+    """Torques of link data given in the classic frames, against matrices that know nothing of Khalil's."""
+    n = len(rows)
+    rng = np.random.default_rng(n)
+    names = [
+        f"{f}{j}"
+        for j in range(1, n + 1)
+        for f in ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+    ]
+    values = dict(zip(names, rng.uniform(0.5, 2, len(names)).tolist(), strict=True))
+    text = table(rows) + f"\nvalues: {values}\n"
+    model = symgen.model(parse_robot(text.encode(), "arm.yaml"))
+    standard = dict.fromkeys(model.STANDARD_PARAMETERS, 0.0) | model.VALUES
+    X = model.base_parameters(standard)
+    for q in rng.uniform(-2, 2, (3, n)):
+        A, Q = energies(rows, values, q, np.array([0, 0, -9.81]))
+        np.testing.assert_allclose(model.gravity(q, X), Q, atol=1e-7 * np.abs(Q).max())
+        np.testing.assert_allclose(model.inertia_matrix(q, X), A, atol=1e-7 * np.abs(A).max())
+
+
+def test_values_without_those_that_enter_are_refused():
+    text = table(((0, 0.4, 0), (0, 0.3, 0))) + "\nvalues: {ZZ1: 0.2, M2: 1.0}\n"
+    with pytest.raises(
+        DescriptionError, match=r"values of link 1 .* with ZZ1 expected MX1, M1 too"
+    ):
+        parse_robot(text.encode(), "arm.yaml")
+    some = table(((0, 0.4, 0), (0, 0.3, 0))) + "\nvalues: {M1: 3.0, MX1: -0.6, ZZ1: 0.16}\n"
+    moved = parse_robot(some.encode(), "arm.yaml").values
+    assert moved == pytest.approx({"M1": 3.0, "MX1": 0.6, "ZZ1": 0.16 - 2 * 0.4 * 0.6 + 3 * 0.16})
