@@ -18,10 +18,18 @@ from runtime.plausible.trials import Trial, reach
 Array = np.ndarray
 
 
-@Question("Does physics agree?")
+@Question(
+    "Does physics agree?", "", "record a longer motion, or give a higher signals.lowpass.cutoff"
+)
 def not_asked(case: Case) -> Answer | None:
-    """Why nothing is fitted; None where it is."""
-    return Answer("open", f"Not asked: {case.silent}") if case.silent else None
+    """Why no cause is tried; None where they are. Too few samples are a doubt: a wrong sign or unit
+    would not be told.
+    """
+    if not case.silent:
+        return None
+    state: State = "open" if case.unfit else "doubtful"
+    text = "" if case.unfit else ", so wrong signs, units and columns are not looked for"
+    return Answer(state, f"Not asked: {case.silent}{text}")
 
 
 @Question(
@@ -161,7 +169,7 @@ def delayed(case: Case, named: Sequence[Trial] = ()) -> Answer | None:
         state,
         f"{which} {sense} by {each} ms, deviation {1e3 * sigma:.1f} ms{beyond}"
         + _from_to(
-            f"correcting the delays changes the error of joint {late.joints[j]}",
+            f"correcting the delays changes the error that free parameters leave of joint {late.joints[j]}",
             late.before[j],
             late.after[j],
         ),
@@ -242,7 +250,9 @@ def better(case: Case, named: Sequence[Trial]) -> Answer:
     text = f"{'Friction alone' if friction else 'No'}: {cause}" + (
         f" (or: {'; '.join(others)})" if others else ""
     )
-    text += _from_to(f"the error of joint {case.labels[j]} goes", before[j], after[j]) or (
+    fit = f"the error that a physical robot leaves of joint {case.labels[j]}"
+    fit += f" through a low-pass of {case.samples.cutoff:.2g} Hz goes"
+    text += _from_to(fit, before[j], after[j]) or (
         "; the errors stay, the parameters come nearer to the values of the robot file"
     )
     return Answer("good" if friction else "no", text, named[0].cause.remedy)

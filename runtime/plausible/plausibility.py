@@ -217,7 +217,7 @@ def plausibility(problem: Problem, *, variants: GeneratedModel | None = None) ->
             checks.append(Check(question, "open", text))
     named = [
         t
-        for t in decisive(trials, case.baseline, case.noise_floor, case.validation)
+        for t in decisive(trials, case.baseline, case.noise_floor, case.validation, case.alone)
         if explained(case, t) > late_gain(case)
     ]
     wrong = [t for t in named if named[0].cause.kind != "friction"]

@@ -205,13 +205,17 @@ def usable(record: Record, study: Study, before: int, after: int) -> Array:
 
 
 def _instants(through: Filtered, number: int) -> Samples:
-    """One record, one sample in about 0.8 rate/(2 cutoff), without 2/cutoff at each end."""
+    """One record, one sample in about 0.8 rate/(2 cutoff), two where these are fewer than
+    LIMIT.INSTANTS_LEAST in a long record; without 2/cutoff at each end.
+    """
     record, states, cutoff = through.record, through.states, through.low.hertz
     known = np.zeros_like(record.tau) if record.tau_known is None else record.tau_known
     step = max(1, int(0.8 * record.rate / (2 * cutoff)))
-    kept = np.flatnonzero(usable(record, through.study, step, 3 * step))[
-        5 * step : -5 * step : step
-    ]
+    inside = np.flatnonzero(usable(record, through.study, step, 3 * step))[5 * step : -5 * step]
+    seconds = len(inside) / record.rate
+    few = len(inside) < LIMIT.INSTANTS_LEAST * step and seconds > LIMIT.SLOW_RECORD
+    finer = 2 if few else 1
+    kept = inside[:: max(1, step // finer)]
     if len(kept) < 2:
         raise InputError("no sample in the window", file=record.name)
     steady = np.stack([_steady(qd, record.rate / cutoff) for qd in states.qd.T], axis=1)

@@ -513,7 +513,11 @@ def slow_friction(baseline: Baseline) -> Array | None:
 
 
 def decisive(
-    trials: Sequence[Trial], baseline: Baseline, floor: float, other: Baseline | None = None
+    trials: Sequence[Trial],
+    baseline: Baseline,
+    floor: float,
+    other: Baseline | None = None,
+    alone: Baseline | None = None,
 ) -> list[Trial]:
     """Those that explain the record decisively better than the study as given, rows too that did
     not give their parameters: the best, and those like it.
@@ -521,15 +525,22 @@ def decisive(
     floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
         nor does the distance from the values where this is more than LIMIT.NOISY.
     other : rows of validation records, which a cause has to explain better too.
+    alone : the study without the values of the robot file. A cause whose bodies are not those of the
+        file, such as a unit that makes torques small, has to gain there too.
     """
     given, better = baseline.given, []
     for trial in trials:
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
-            fewer = given.errors - trial.fit.errors
-            ratio = given.errors / trial.fit.errors.clip(0.1)
-            visible = ((ratio > LIMIT.VISIBLE) & (fewer > 0.2) & (given.errors > floor)).any()
+            slower = trial.cause.kind == "rate"  # small accelerations undo what noise makes
+            noise = floor if slower else min(floor, LIMIT.NOISE_MADE_MOST)
+            visible = (takes_away(given, trial.fit) & (given.errors > noise)).any()
             nearer = given.penalty - trial.fit.penalty > LIMIT.DECISIVE and floor < LIMIT.NOISY
-            if visible or nearer:
+            if alone is not None and leaves_values(trial.fit, baseline):
+                fit = alone.trial(trial.cause).fit
+                visible = visible and fit is not None and takes_away(alone.given, fit).any()
+                nearer = False
+            lost = trial.fit.errors - given.errors > LIMIT.LOST
+            if (visible or nearer) and not lost.any():
                 better.append(trial)
     if not better:
         return []
@@ -547,6 +558,26 @@ def decisive(
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain
     named += [trial for trial in loads(baseline) if trial.gain > least]
     return sorted(named, key=lambda trial: -trial.gain)
+
+
+def takes_away(given: Fit, fit: Fit) -> Array:
+    """Of which joints a fit takes away a good part of the error, (n,)."""
+    ratio = given.errors / fit.errors.clip(0.1)
+    return np.asarray((ratio > LIMIT.VISIBLE) & (given.errors - fit.errors > 0.2))
+
+
+def leaves_values(fit: Fit, baseline: Baseline) -> bool:
+    """Whether bodies need more or less torque in the motion of the study than those of the robot
+    file by more than LIMIT.CAD_RATIOS; False where the file lacks a body.
+    """
+    bodies, physical = baseline.bodies, baseline.physical
+    if not bodies.near_values or not bodies.known_links.all():
+        return False
+    numbers = [k for link in bodies.links for k in link.numbers]
+    W = baseline.normal[0][:, :, numbers]
+    values = np.array([physical.values[physical.standard[k]] for k in numbers])
+    ratio = float(np.linalg.norm(W @ fit.X[numbers]) / np.linalg.norm(W @ values))
+    return not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1]
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:

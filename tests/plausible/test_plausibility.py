@@ -232,9 +232,9 @@ def test_loops_that_do_not_close_in_the_record_are_the_finding() -> None:
 def test_too_few_samples_are_not_judged(right: slip_cases.Case) -> None:
     short = replace(right, t=right.t[:400], q=right.q[:400], tau=right.tau[:400])
     found = short.judged()
-    assert not found.named and any(
-        check.state == "open" and "Not asked" in check.finding for check in found.checks()
-    ), found.to_text()
+    assert not found.named and any("Not asked" in check.finding for check in found.checks()), (
+        found.to_text()
+    )
 
 
 def random_record(seed: int) -> tuple[object, object, runtime.Record]:
