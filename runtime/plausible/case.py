@@ -200,7 +200,7 @@ class Case:
         """
         median = self.study.signals.median
         shares = [noise_share(x.record.q, x.record.rate, x.low, median) for x in self.through]
-        return 100 * LIMIT.NOISE_MADE * float(np.sqrt(np.max(shares)))
+        return float(100 * LIMIT.NOISE_MADE * np.sqrt(np.max(shares)))
 
     @cached_property
     def late(self) -> Delay | None:

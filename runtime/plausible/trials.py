@@ -533,11 +533,11 @@ def decisive(
         if trial.fit is not None and trial.gain >= LIMIT.DECISIVE:
             slower = trial.cause.kind == "rate"  # small accelerations undo what noise makes
             noise = floor if slower else min(floor, LIMIT.NOISE_MADE_MOST)
-            visible = (takes_away(given, trial.fit) & (given.errors > noise)).any()
+            visible = bool((takes_away(given, trial.fit) & (given.errors > noise)).any())
             nearer = given.penalty - trial.fit.penalty > LIMIT.DECISIVE and floor < LIMIT.NOISY
             if alone is not None and leaves_values(trial.fit, baseline):
                 fit = alone.trial(trial.cause).fit
-                visible = visible and fit is not None and takes_away(alone.given, fit).any()
+                visible &= fit is not None and bool(takes_away(alone.given, fit).any())
                 nearer = False
             lost = trial.fit.errors - given.errors > LIMIT.LOST
             if (visible or nearer) and not lost.any():
@@ -577,7 +577,7 @@ def leaves_values(fit: Fit, baseline: Baseline) -> bool:
     W = baseline.normal[0][:, :, numbers]
     values = np.array([physical.values[physical.standard[k]] for k in numbers])
     ratio = float(np.linalg.norm(W @ fit.X[numbers]) / np.linalg.norm(W @ values))
-    return not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1]
+    return bool(not LIMIT.CAD_RATIOS[0] <= ratio <= LIMIT.CAD_RATIOS[1])
 
 
 def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
