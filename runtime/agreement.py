@@ -5,8 +5,13 @@ deviations s_k. It is compared with the mean of the others, weighted by their de
 
     X_-k = s_-k^2 sum X_m/s_m^2,     s_-k^-2 = sum 1/s_m^2,     d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
 
-A parameter differs where |d| exceeds LIMIT.DIFFERS. That is a word, no test: deviations of short
-records with slow noise are too small for a probability (benchmarks/truth.md). Differences up to
+Corrected deviations take residuals as independent from block to block. Where these remember for
+m = 2 tau seconds, exp(-t/tau), and blocks last L, the variance is larger by
+
+    c = 1/(1 - (tau/L) (1 - exp(-L/tau)))
+
+s_k^2 is the corrected one times c, m that of the middle joint. A parameter differs where |d| exceeds
+LIMIT.DIFFERS. That is a word, no test (benchmarks/truth.md). Differences up to
 LIMIT.RELEVANT_DIFFERENCE of the value do not change the verdict.
 
 Records differ where the robot changed (load, temperature, wear), where something in one record is
@@ -29,10 +34,12 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.part import Part
 from runtime.core.provenance import record_names
+from runtime.core.residuals import whiteness
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
+from runtime.core.validation import JointComparison
 
 Array = np.ndarray
 
@@ -49,7 +56,7 @@ class Disagreement:
     others : float, SI
         By the other records.
     z : float
-        Their difference in deviations.
+        Their difference in deviations s.
     """
 
     record: str
@@ -201,7 +208,7 @@ def homogeneity(
         Gives joint numbers.
     """
     linear = linear_companion(settings or EstimateSettings())
-    fits: dict[str, Estimate] = {}
+    fits: dict[str, tuple[Estimate, Array]] = {}
     untested = []
     for record, part in parts.items():
         alike = EstimateSettings(linear.method, linear.weights, tuple(names), linear.options)
@@ -217,7 +224,7 @@ def homogeneity(
                 f"{lost or 'the parameters and their deviations'}"
             )
             continue
-        fits[record] = fit
+        fits[record] = fit, deviations(part, fit)
     found = [
         d
         for record in list(fits)[len(fits) == 2 :]  # of two, the second against the first
@@ -228,17 +235,34 @@ def homogeneity(
     return Homogeneity(tuple(fits), tuple(names), tuple(found), tuple(untested))
 
 
-def _apart(record: str, fits: Mapping[str, Estimate]) -> list[Disagreement]:
+def deviations(part: Observation, fit: Estimate) -> Array:
+    """s_k of the parameters of one record, shape (b,), SI."""
+    predicted = part.columns(fit.names).W @ fit.X
+    joints = [
+        JointComparison(str(j), part.t[rows], part.Y[rows], predicted[rows])
+        for j, rows in enumerate(map(part.joint, range(part.n)))
+    ]
+    remembered = [one.rows / one.effective_rows for one in whiteness(joints, part.rate)]
+    memory = float(np.median(remembered)) / part.rate / (2 * part.residual_block)  # tau/L
+    return np.asarray(fit.sigma_corrected / np.sqrt(1 + memory * np.expm1(-1 / memory)))
+
+
+def _apart(record: str, fits: Mapping[str, tuple[Estimate, Array]]) -> list[Disagreement]:
     """The parameters of a record against the mean of the other records."""
     others = [fit for name, fit in fits.items() if name != record]
     if not others:
         return []
-    own = fits[record]
-    precision = np.array([fit.sigma_corrected**-2.0 for fit in others])
+    own, s = fits[record]
+    precision = np.array([deviation**-2.0 for _, deviation in others])
     variance = 1 / precision.sum(axis=0)
-    mean = variance * sum(w * fit.X for w, fit in zip(precision, others, strict=True))
-    z = (own.X - mean) / np.sqrt(own.sigma_corrected**2 + variance)
-    columns = (own.names, own.X, own.sigma_corrected, mean, z)
+    mean = variance * sum(w * fit.X for w, (fit, _) in zip(precision, others, strict=True))
+    columns = (
+        own.names,
+        own.X,
+        own.sigma_corrected,
+        mean,
+        (own.X - mean) / np.sqrt(s**2 + variance),
+    )
     return [
         Disagreement(record, name, *map(float, numbers))
         for name, *numbers in zip(*columns, strict=True)

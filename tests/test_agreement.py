@@ -89,6 +89,22 @@ def test_values_are_those_of_the_record_alone(arm):
     )
 
 
+@pytest.mark.parametrize("duration", [3.0, 20.0])
+def test_slow_noise_of_one_robot_does_not_differ(arm, duration):
+    """Noise that remembers for longer than a block: three of twenty differ by the corrected deviations alone."""
+    X = np.asarray(arm.base_parameters(arm.VALUES))
+    differ = 0
+    for k in range(20):
+        rng, parts = np.random.default_rng([11, k]), {}
+        for name in "ab":
+            one = record(arm, X, rng, duration=duration)
+            slow = lfilter([1], [1, -0.99], rng.standard_normal(one.tau.shape), axis=0)
+            tau = one.tau + 0.05 * one.tau.std(axis=0) * slow / slow.std(axis=0)
+            parts[name] = runtime.observe(arm, runtime.Record(one.t, one.q, tau), STUDY)
+        differ += not homogeneity(parts, arm.BASE_PARAMETERS, model=arm).agree
+    assert differ <= 1
+
+
 def test_names_the_record_of_three(arm):
     X = np.asarray(arm.base_parameters(arm.VALUES))
     other = X * np.where(np.array(arm.BASE_PARAMETERS) == "MX1R", 1.2, 1.0)
