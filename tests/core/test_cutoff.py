@@ -117,3 +117,39 @@ def test_a_median_of_torques_is_none_where_a_controller_answers_every_count():
     assert resolved(Study(), [runtime.Record(T, q, torque)])[0].signals.window_of_torques == 5
     asked = Study(signals=Signals(torque_median=3))
     assert resolved(asked, [record])[0].signals.window_of_torques == 3
+
+
+def bench(vs, step, speed, rate=500.0):
+    """One axis that starts, stops and reverses: torque 0.02 qdd + 0.57 tanh(qd/vs) + 0.522 qd + 0.012."""
+    t = np.arange(0, 30, 1 / rate)
+    w, phase = 2 * np.pi * speed * np.array([0.3, 0.83, 1.9]), np.array([0.0, 1.0, 2.0])
+    a, angle = np.array([1.0, 0.5, 0.2]) / speed, w * t[:, None] + phase
+    q, qd, qdd = np.sin(angle) @ a, np.cos(angle) @ (a * w), -np.sin(angle) @ (a * w**2)
+    tau = 0.02 * qdd + 0.57 * np.tanh(qd / vs) + 0.522 * qd + 0.012
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(t))
+    return runtime.Record(t, np.round(q / step)[:, None] * step, (tau + noise)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("vs", "step", "speed"),
+    [(0.125, 2 * np.pi / 16384, 1.0), (0.02, 2 * np.pi / 65536, 1.0), (0.05, 1e-5, 0.5)],
+    ids=["soft", "steep", "slow"],
+)
+def test_steps_of_friction_keep_their_parameters(tmp_path, vs, step, speed):
+    """A low cut-off bends friction where a joint reverses: intervals of friction hold the true values."""
+    file = tmp_path / "bench.yaml"
+    file.write_text(
+        "symgen: 1\nname: bench\ngravity: [0, 0, -g]\nconstants: {g: 9.81}\n"
+        "frames:\n  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}\n"
+        "elements:\n  Ia: {kind: inertia, along: all}\n  FV: {kind: viscous, along: all}\n"
+        "  OFFSET: {kind: offset, along: all}\ncolumns:\n"
+        "  FC: {kind: tanh, along: all, fit: {vs: {bounds: [0.0005, 1]}}}\n"
+    )
+    result = runtime.identify(symgen.model(file), bench(vs, step, speed))
+    assert result.study.signals.lowpass.cutoff >= 15
+    fit = result.estimate
+    true = {"ZZ1R": 0.02, "FV1": 0.522, "OFFSET1": 0.012, "FC1": 0.57}
+    off = np.abs([fit[name] - x for name, x in true.items()])
+    assert fit.names == tuple(true)
+    assert (off[1:] < 2.6 * fit.sigma_corrected[1:]).all()
+    assert off[0] < 0.002 * true["ZZ1R"]  # steps shrink an inertia, beyond its deviation
