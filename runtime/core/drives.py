@@ -37,12 +37,15 @@ class Drives:
         Motor torque per unit of u; 1 where u is a torque.
     coupling : "both", "position", "torque" or "none"
         Where the off-diagonal elements of R count.
+    declared : bool
+        Whether the robot file states torque constants; currents need them.
     """
 
     ratio: Array
     offset: Array
     torque_constant: Array
     coupling: Coupling = "both"
+    declared: bool = True
 
     def __post_init__(self) -> None:
         ratio = np.array(self.ratio, dtype=float)
@@ -76,8 +79,12 @@ class Drives:
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> Drives:
         """Drives of the DRIVES constant of an emitted module."""
+        constant = mapping.get("torque_constant")
         return cls(
-            mapping["ratio"], mapping.get("offset", 0.0), mapping.get("torque_constant", 1.0)
+            mapping["ratio"],
+            mapping.get("offset", 0.0),
+            1.0 if constant is None else constant,
+            declared=constant is not None,
         )
 
     @property

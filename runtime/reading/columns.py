@@ -296,6 +296,10 @@ def _torque_constant(
     if settings.torque_constant is not None:
         constant = _per_joint(settings.torque_constant, n, "torque_constant")
     elif drives is not None and settings.sides[1] == "motor":
+        if not drives.declared:
+            raise InputError(
+                f"tau is in {', '.join(dict.fromkeys(names))} but the robot file has no drives.torque_constant (N*m/A); set it there or as record.torque_constant, from the data sheet of the motors. 1 fits in amperes: values are then per A"
+            )
         constant = drives.torque_constant
     else:
         raise InputError(

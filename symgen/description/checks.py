@@ -346,7 +346,7 @@ def _check_drives(robot: Any) -> None:
             path=("drives", "ratio"),
         )
     for name, row in (("offset", drives.offset), ("torque_constant", drives.torque_constant)):
-        if len(row) != n:
+        if row is not None and len(row) != n:
             raise DescriptionError(
                 f"drives: {name} has {len(row)} entries; expected {n}", path=("drives", name)
             )

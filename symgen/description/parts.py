@@ -203,6 +203,11 @@ def _of_motors(value: list[float] | float | None, declared: Declared) -> tuple[f
     return tuple(value or 0.0 for f in declared.frames if f.mu)
 
 
+def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | None:
+    """One number for each actuated joint; None where none is given: currents are then refused."""
+    return None if value is None else _of_motors(value, declared)
+
+
 @dataclass(frozen=True, config=CONFIG)
 class Drives:
     """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
@@ -224,13 +229,9 @@ class Drives:
         ),
     ]
     torque_constant: Annotated[
-        tuple[float, ...],
-        Written(list[Numeric] | Numeric, _of_motors),
-        Field(
-            default=1.0,
-            validate_default=True,
-            description="N m/A; a number, or one per motor",
-        ),
+        tuple[float, ...] | None,
+        Written(list[Numeric] | Numeric | None, _of_motors_if_given),
+        Field(default=None, description="N m/A; a number, or one per motor"),
     ]
 
 

@@ -14,7 +14,6 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from symgen.description.distal_values import khalil_values
 from symgen.description.fields import Declared, Given, Path, dotted
 from symgen.description.naming import check_identifier
 from symgen.description.robot import Robot
@@ -58,7 +57,11 @@ def robot_of(data: Mapping[str, Any], file: str, sha256: str) -> Robot:
     declared = Declared(frozenset(constants), frozenset(joints.union(constants)), len(rows), distal)
     try:
         robot = TypeAdapter(Robot).validate_python(data, context=declared)
-        return replace(robot, values=khalil_values(robot)) if distal and robot.values else robot
+        if distal and robot.values:
+            from symgen.description.distal_values import khalil_values
+
+            return replace(robot, values=khalil_values(robot))
+        return robot
     except (ValidationError, DescriptionError) as error:
         wrong = explained(error) if isinstance(error, ValidationError) else error
         if wrong.path[:1] == ("elements",) and wrong.path[1:2] and wrong.path[1] in columns:

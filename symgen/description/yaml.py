@@ -181,7 +181,11 @@ def tables_of(robot: Robot) -> dict[str, Any]:
         "constraints": {f"q{j}": e for j, e in robot.constraints.items()},
         "massless": sorted(robot.massless),
         "elements": {e.family: _element(robot, e) for e in robot.elements},
-        "drives": {} if drives is None else {key: getattr(drives, key) for key in DRIVES},
+        "drives": {
+            key: x
+            for key in DRIVES
+            if drives is not None and (x := getattr(drives, key)) is not None
+        },
         "limits": robot.limits,
         "values": robot.values,
         "assume": dict.fromkeys(sorted(robot.assume), 0),

@@ -291,7 +291,7 @@ def _drives(robot: Robot) -> list[str]:
         *rows,
         "    ),",
         f"    'offset': {d.offset!r},",
-        f"    'torque_constant': {d.torque_constant!r},",
+        *([] if d.torque_constant is None else [f"    'torque_constant': {d.torque_constant!r},"]),
         "}",
     ]
 

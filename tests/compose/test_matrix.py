@@ -263,7 +263,7 @@ def test_the_features_change_what_is_fitted() -> None:
         4e-3, abs=2e-4
     )
     assert changed["missing samples"].problem.records[0].missing is not None
-    assert changed["automatic cut-off"].study.signals.lowpass.cutoff == pytest.approx(48, rel=0.1)
+    assert changed["automatic cut-off"].study.signals.lowpass.cutoff == pytest.approx(23, rel=0.1)
     assert changed["torque median"].study.signals.torque_median == 1
     assert not isinstance(changed["recorded speeds"].study.signals.velocity, str)
     assert changed["different rates"].observation.rates[:2] == (50.0, 62.5)

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+import runtime
+import symgen
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
+from runtime.study import study_from_mapping
 
 RATIO = np.array([[32.0, 0, 0], [0, -48, 0], [0, 32, 45]])
 OFFSET = [0, -np.pi / 2, 0.3]
@@ -88,3 +91,28 @@ def test_bad_drives(arguments, said):
 def test_wrong_number_of_joints(drives):
     with pytest.raises(InputError, match=r"3 joints given an array of shape \(5, 2\)"):
         drives.joint_position(np.zeros((5, 2)))
+
+
+def test_currents_ask_for_a_torque_constant_that_is_declared(tmp_path):
+    """A constant of 1 that nobody stated fits in amperes and prints SI units."""
+    text = (
+        "symgen: 1\nname: one\ngravity: [0, 0, -g]\nconstants: {g: 9.81}\nframes:\n"
+        "  1: {ant: 0, sigma: 0, alpha: 0, d: 0, theta: q1, r: 0}\ndrives: {ratio: [[100]]%s}\n"
+    )
+    t = np.arange(400) / 100
+    table = np.column_stack([t, np.sin(t), np.cos(t)])
+    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header="t,q1,tau1", comments="")
+    settings = {"files": "run.csv", "torque_side": "motor", "units": {"tau": "A"}}
+    for constant, refused in (("", True), (", torque_constant: 1", False)):
+        (tmp_path / "one.yaml").write_text(text % constant)
+        model = symgen.model(tmp_path / "one.yaml")
+        record = study_from_mapping({"record": settings}).record[0]
+        if refused:
+            with pytest.raises(InputError, match=r"no drives.torque_constant \(N\*m/A\)"):
+                runtime.read_record(record, model, folder=tmp_path)
+            stated = study_from_mapping({"record": {**settings, "torque_constant": 0.5}}).record[0]
+            tau = runtime.read_record(stated, model, folder=tmp_path).tau
+            np.testing.assert_allclose(tau[:, 0], 50 * np.cos(t), rtol=1e-6)
+        else:
+            tau = runtime.read_record(record, model, folder=tmp_path).tau
+            np.testing.assert_allclose(tau[:, 0], 100 * np.cos(t), rtol=1e-6)

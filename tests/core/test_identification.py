@@ -313,7 +313,7 @@ def test_a_number_in_the_name_of_a_record_is_kept(model):
     assert [text.split(":")[0] for text in result.time_stamps] == [
         "Time stamps of run (1 of 2)",
         "Time stamps of gap",
-        "Low-pass at 48 Hz (cutoff",
+        "Low-pass at 11 Hz (cutoff",
     ]
 
 

@@ -479,7 +479,7 @@ def test_a_yes_is_followed_by_what_to_do_with_the_values() -> None:
     wrong = runtime.Record(*motion(model, noise=0.0, values=20.0), name="run")
     said_so = runtime.identify(model, wrong, plausible=True).checklist
     assert said_so.answer == "No" and "A small error alone says little" in said_so.use
-    assert "15.9 times the limits" in said_so.doubt
+    assert "16 times the limits" in said_so.doubt
 
 
 def test_names_of_joints_stand_in_limits_and_advice() -> None:

@@ -327,7 +327,8 @@ def test_resampled_record_identifies_as_the_regular_one(tmp_path):
                     "rate": 1000,
                     "columns": {"t": "t"},
                     "resample": {},
-                }
+                },
+                "signals": {"lowpass": {"cutoff": 20}},
             }
         )
         found.append(observe(planar, read_records(asked.record, planar, folder=tmp_path)[0], asked))

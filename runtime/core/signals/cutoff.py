@@ -9,8 +9,8 @@ is the share by which least squares misjudges the acceleration: what the low-pas
 columns but not from the torques, and the power of noise in the columns. fc minimises that of the
 worst joint. One pass forward and backward has the gain 1/(1 + (w/wc)^(2 order)), with
 w = tan(pi f/rate); the acceleration goes through one for each of `lowpass.on`. Friction switches
-where a joint reverses, and a low cut-off bends that: of cut-offs whose bias is alike the highest
-is taken, up to that of the chapter.
+where a joint reverses, and a low cut-off bends that: the highest is taken at which noise alone makes
+less than LIMIT.QUIET of the least bias, up to that of the chapter.
 
 N is flat in the positions: the median of the spectrum in the upper band, and at least that of the
 steps that the positions show, step^2/12 over the band. The spectrum is one of second differences,
@@ -64,11 +64,14 @@ def cutoff(
     moving = np.flatnonzero(power > 0)
     if not len(moving):
         return min(CHAPTER_CUTOFF, highest), "no joint moves above the noise of its position"
-    bias = ((distorted + noisy) / np.where(power > 0, power, np.inf))[:, moving]
+    bias, noise = (
+        (x / np.where(power > 0, power, np.inf))[:, moving] for x in (distorted + noisy, noisy)
+    )
     worst = bias.max(axis=1)
     least = int(np.flatnonzero(worst <= max(worst.min(), LIMIT.NO_BIAS))[0])
-    alike = (worst <= worst[least] + LIMIT.BIAS_ALIKE) & (grid <= max(grid[least], CHAPTER_CUTOFF))
-    best = least if counts else int(np.flatnonzero(alike)[-1])
+    quiet = noise.max(axis=1) <= LIMIT.QUIET * max(worst[least], LIMIT.NO_BIAS)
+    quiet &= (grid >= grid[least]) & (grid <= CHAPTER_CUTOFF)
+    best = least if counts else max(least, int(np.flatnonzero(quiet)[-1:].sum()))
     hertz, joint = grid[best], 1 + int(moving[np.argmax(bias[best])])
     why = f"least bias by motion and noise, joint {joint} decides"
     if counts:
