@@ -52,7 +52,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 26daf6d39eb95c6202cd4c6a8c756e20cf477c910f1d1611116952bb51492015
+sha256 of all but these lines: b0da799c0fab3cc645d5ab16e6372c1ca1547a82fd593646b429ea85ad488528
 """
 
 import numpy as np
@@ -101,11 +101,25 @@ def _constant(D):
 
 
 # Arrays and their packages
+def _real(x, name):
+    """x as float64; ValueError, in one sentence, unless it holds real numbers alone: a cast would
+    drop dates, imaginary parts and masks in silence.
+    """
+    try:
+        array = np.asarray(x)
+    except Exception as error:
+        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
+        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+        raise ValueError(f"{name}: {kind}; expected real numbers")
+    return array.astype(float, copy=False)
+
+
 def _states(*arrays):
     """The states as rows of samples, shape (N, 1) each; ValueError unless all have shape
     (N, 1), or all (1,).
     """
-    states = [np.asarray(x, dtype=float) for x in arrays]
+    states = [_real(x, "states") for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (1,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
         raise ValueError(f"states of shape {shapes}; expected (N, 1) each, or (1,) each")
@@ -142,7 +156,7 @@ def _evaluated(block, shape, states, X, constants):
     xp = _package(*states, *X)
     if xp is not np:
         return _gathered(xp, {}, block, shape, states, X, constants)
-    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     result = np.zeros((*shape, len(rows[0])))
     _filled(block, result, rows, (*X, *constants))
     result = result.transpose(-1, *range(len(shape)))
@@ -425,7 +439,9 @@ def bias(q: "Array", qd: "Array", X: "Array", *, g: float = 9.81) -> "Array":
 
     Shape (N, 1).
     """
-    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, g=g)
+    xp = _package(qd)
+    rest = xp.zeros_like(_real(qd, "qd") if xp is np else qd)
+    return inverse_dynamics(q, qd, rest, X, g=g)
 
 
 def gravity(q: "Array", X: "Array", *, g: float = 9.81) -> "Array":
@@ -451,7 +467,7 @@ def forward_dynamics(
     xp = _package(q, qd, tau, X)
     if xp is np:
         _states(q, qd, tau)
-        tau = np.asarray(tau, dtype=float)
+        tau = _real(tau, "tau")
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, g=g)

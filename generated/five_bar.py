@@ -76,7 +76,7 @@ with probability below 8e-15; base_parameters, regressor, observation_matrix, in
 inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian, passive_joints, elements
 at random states, parameters and random constants agree with Lagrange's equations and products of
 frames to 1e-09, on NumPy's arrays.
-sha256 of all but these lines: c018b44d28abbe0d84394243ea6a0819a00c7cc5882dad355c752054b0f8d7e2
+sha256 of all but these lines: 2babde241544e4322be30fb4ead1a069fededff9c781d2a87020595c16a25f8f
 """
 
 import numpy as np
@@ -145,11 +145,25 @@ def _constant(D):
 
 
 # Arrays and their packages
+def _real(x, name):
+    """x as float64; ValueError, in one sentence, unless it holds real numbers alone: a cast would
+    drop dates, imaginary parts and masks in silence.
+    """
+    try:
+        array = np.asarray(x)
+    except Exception as error:
+        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
+        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+        raise ValueError(f"{name}: {kind}; expected real numbers")
+    return array.astype(float, copy=False)
+
+
 def _states(*arrays):
     """The states as rows of samples, shape (N, 2) each; ValueError unless all have shape
     (N, 2), or all (2,).
     """
-    states = [np.asarray(x, dtype=float) for x in arrays]
+    states = [_real(x, "states") for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (2,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
         raise ValueError(f"states of shape {shapes}; expected (N, 2) each, or (2,) each")
@@ -183,7 +197,7 @@ def _evaluated(block, shape, states, X, constants, closing=None):
     """The result of `block`, samples first: NumPy's is filled in place, that of another package
     gathered from a table. X is empty where no parameter is read.
     """
-    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     rows = _closed(rows, closing)
     result = np.zeros((*shape, len(rows[0])))
     _filled(block, result, rows, (*X, *constants))
@@ -304,7 +318,8 @@ def bias(
 
     Shape (N, 2).
     """
-    return inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    return inverse_dynamics(q, qd, np.zeros_like(_real(qd, "qd")), X, L0=L0, L1=L1, L2=L2, L3=L3,
+        L4=L4, g=g)
 
 
 def gravity(
@@ -337,8 +352,8 @@ def forward_dynamics(
 ) -> "Array":
     """qdd = A(q)**-1 (tau - bias). Shape (N, 2)."""
     _states(q, qd, tau)
-    rest = np.asarray(tau, dtype=float) - inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0,
-        L1=L1, L2=L2, L3=L3, L4=L4, g=g)
+    rest = _real(tau, "tau") - inverse_dynamics(q, qd, np.zeros_like(qd), X, L0=L0, L1=L1, L2=L2,
+        L3=L3, L4=L4, g=g)
     inertia = inertia_matrix(q, X, L0=L0, L1=L1, L2=L2, L3=L3, L4=L4, g=g)
     return np.linalg.solve(inertia, rest[..., None])[..., 0]
 

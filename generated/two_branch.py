@@ -85,7 +85,7 @@ inertia_matrix, bias, gravity, forward_dynamics, frame_poses, jacobian,
 inverse_dynamics_derivatives, elements at random states, parameters and random constants agree
 with Lagrange's equations and products of frames to 1e-09, on NumPy's arrays, stacked as for other
 packages, by CasADi.
-sha256 of all but these lines: 0da70b51961dca2342b065233ffa245266a82e13aac5d3e19c5b1bb3dd0eb0d3
+sha256 of all but these lines: 86561f84b3583a2ea6fe53d081b39ccf60a790c5e77b3812f12f93e14c63ac88
 """
 
 import numpy as np
@@ -188,11 +188,25 @@ def _constant(D):
 
 
 # Arrays and their packages
+def _real(x, name):
+    """x as float64; ValueError, in one sentence, unless it holds real numbers alone: a cast would
+    drop dates, imaginary parts and masks in silence.
+    """
+    try:
+        array = np.asarray(x)
+    except Exception as error:
+        raise ValueError(f"{name}: {type(x).__name__} with rows of several lengths") from error
+    if array.dtype.kind not in "iuf" or np.ma.is_masked(x):
+        kind = "a masked array" if np.ma.is_masked(x) else f"{type(x).__name__} of {array.dtype}"
+        raise ValueError(f"{name}: {kind}; expected real numbers")
+    return array.astype(float, copy=False)
+
+
 def _states(*arrays):
     """The states as rows of samples, shape (N, 7) each; ValueError unless all have shape
     (N, 7), or all (7,).
     """
-    states = [np.asarray(x, dtype=float) for x in arrays]
+    states = [_real(x, "states") for x in arrays]
     shapes = [x.shape for x in states]
     if shapes[0][-1:] != (7,) or len(shapes[0]) > 2 or shapes != [shapes[0]] * len(shapes):
         raise ValueError(f"states of shape {shapes}; expected (N, 7) each, or (7,) each")
@@ -229,7 +243,7 @@ def _evaluated(block, shape, states, X, constants):
     xp = _package(*states, *X)
     if xp is not np:
         return _gathered(xp, {}, block, shape, states, X, constants)
-    rows, X = _states(*states), [_parameters(np.asarray(x, dtype=float)) for x in X]
+    rows, X = _states(*states), [_parameters(_real(x, "X")) for x in X]
     result = np.zeros((*shape, len(rows[0])))
     _filled(block, result, rows, (*X, *constants))
     result = result.transpose(-1, *range(len(shape)))
@@ -586,8 +600,10 @@ def bias(
 
     Shape (N, 7).
     """
-    return inverse_dynamics(q, qd, _package(qd).zeros_like(qd), X, D2=D2, RL2=RL2, D4=D4, D5=D5,
-        RL5=RL5, B6=B6, D6=D6, D7=D7, RL8=RL8, GX=GX, GZ=GZ)
+    xp = _package(qd)
+    rest = xp.zeros_like(_real(qd, "qd") if xp is np else qd)
+    return inverse_dynamics(q, qd, rest, X, D2=D2, RL2=RL2, D4=D4, D5=D5, RL5=RL5, B6=B6, D6=D6,
+        D7=D7, RL8=RL8, GX=GX, GZ=GZ)
 
 
 def gravity(
@@ -624,7 +640,7 @@ def forward_dynamics(
     xp = _package(q, qd, tau, X)
     if xp is np:
         _states(q, qd, tau)
-        tau = np.asarray(tau, dtype=float)
+        tau = _real(tau, "tau")
     elif tau.shape != q.shape:
         raise ValueError(f"tau of shape {tau.shape}; expected that of q, {q.shape}")
     rest = tau - inverse_dynamics(q, qd, xp.zeros_like(qd), X, D2=D2, RL2=RL2, D4=D4, D5=D5,

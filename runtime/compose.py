@@ -23,6 +23,7 @@ from runtime.agreement import agreement
 from runtime.controller.fitted import doubt_of_gains, law_of_controller
 from runtime.core import estimation
 from runtime.core import identify as identification
+from runtime.core.arrays import kind_of, require_kind
 from runtime.core.automatic import automatic_cutoff
 from runtime.core.errors import InputError, SettingsError
 from runtime.core.essential import Essential
@@ -32,8 +33,8 @@ from runtime.core.least_squares.estimate import Estimate
 from runtime.core.least_squares.linear import ordinary
 from runtime.core.least_squares.method import LINEAR, Method
 from runtime.core.least_squares.wls import by_weights, weighted
-from runtime.core.model import GeneratedModel
-from runtime.core.problem import Note, Problem, Step, prepared
+from runtime.core.model import GeneratedModel, require_emitted
+from runtime.core.problem import RECORD_EXPECTED, Note, Problem, Step, prepared
 from runtime.core.record import Record
 from runtime.core.rows.observation import Observation
 from runtime.core.signals.states import SignalReader, lowpassed
@@ -158,6 +159,23 @@ EXTRAS: list[Extra] = [
 Records = Record | Sequence[Record]
 
 
+def given(study: Study | None) -> Study:
+    """The study, by default Study(); InputError for anything else."""
+    study = Study() if study is None else study
+    require_kind(
+        study, Study, "study", "a Study: runtime.Study(), runtime.load_study('study.yaml')"
+    )
+    return study
+
+
+def listed(records: Records) -> tuple[Record, ...]:
+    """One record or several as several; InputError for anything else."""
+    if isinstance(records, Record):
+        return (records,)
+    require_kind(records, Sequence, "records", RECORD_EXPECTED)
+    return tuple(records)
+
+
 def known(study: Study) -> Study:
     """The study with all options of its reader; SettingsError where its method or reader is not in the lists."""
     signals = study.signals
@@ -183,7 +201,7 @@ def stated(
     simulator: Simulator | None = None,
 ) -> Problem:
     """The problem of model, records and study as it is stated, before any step."""
-    study = known(study or Study())
+    study = known(given(study))
     methods: Mapping[str, Method] = METHODS
     if simulator is not None:
         observe = partial(observed_loop, simulator=simulator)
@@ -191,9 +209,8 @@ def stated(
             name: method if method.observe is None else replace(method, observe=observe)
             for name, method in METHODS.items()
         }
-    several = (records,) if isinstance(records, Record) else tuple(records)
     return Problem(
-        model, several, tuple(unseen), study, READERS[study.signals.reader].states, methods
+        model, listed(records), listed(unseen), study, READERS[study.signals.reader].states, methods
     )
 
 
@@ -232,6 +249,7 @@ def recorded(
     settings: Sequence[RecordSettings], model: GeneratedModel, study: Study
 ) -> list[Record]:
     """Records of a study, read from their files."""
+    require_emitted(model)
     return read_records(settings, model, missing=study.signals.admits_missing)
 
 
@@ -591,6 +609,8 @@ def simulate(
     """
     from runtime.loop import simulation
 
+    require_emitted(model)
+    study = given(study)
     if study.controller is None:
         raise InputError(
             "the study has no section `controller`; it says law, rate and reference of the closed loop"
@@ -626,13 +646,14 @@ def _with_loaded(
     simulator: Simulator | None,
 ) -> Problem:
     """The prepared problem, with a note of the records with the load of study.payload, prepared by the same steps."""
-    study = study or Study()
+    study = given(study)
     if unseen is None:
         unseen = recorded(study.validate.record, model, study)
     if loaded is None:
         loaded = () if study.payload is None else recorded(study.payload.record, model, study)
+    unseen = listed(unseen)
     count = len(unseen)
-    whole = problem(model, records, study, unseen=(*unseen, *loaded), simulator=simulator)
+    whole = problem(model, records, study, unseen=(*unseen, *listed(loaded)), simulator=simulator)
     note = Note(LOADED, "", result=whole.unseen[count:])
     return whole.changed(note, unseen=whole.unseen[:count])
 
@@ -643,9 +664,12 @@ def _candidate(model: GeneratedModel, candidate: Study | tuple[Study, Records, R
         fitted = recorded(candidate.record, model, candidate)
         predicted = recorded(candidate.validate.record, model, candidate)
         return stated(model, fitted, candidate, predicted)
+    if not (isinstance(candidate, tuple) and len(candidate) == 3):
+        raise InputError(
+            f"a candidate is {kind_of(candidate)}; expected a Study, or (study, records, validation records)"
+        )
     study, records, unseen = candidate
-    several = (unseen,) if isinstance(unseen, Record) else tuple(unseen)
-    return stated(model, records, study, several)
+    return stated(model, records, study, listed(unseen))
 
 
 __all__ = [

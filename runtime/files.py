@@ -13,8 +13,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from runtime.advisor.advice import Advice
+from runtime.core.arrays import require_kind
 from runtime.core.cestac.result import Cestac
 from runtime.core.documents import json_text
+from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
 from runtime.core.model import joint_labels
 from runtime.core.part import Part
@@ -66,6 +68,7 @@ def report(
     OutputError
         The folder cannot be written.
     """
+    require_kind(folder, (str, Path, Results), "folder", "the name of a folder")
     place = folder.folder if isinstance(folder, Results) else Path(folder)
     files = files_of(result, place, study or Study())
     return folder.write_all(files) if isinstance(folder, Results) else write_all(place, files)
@@ -73,8 +76,8 @@ def report(
 
 @singledispatch
 def files_of(result: object, folder: Path, study: Study) -> Files:
-    """Contents of `folder` by file name; TypeError for a result without files."""
-    raise TypeError(
+    """Contents of `folder` by file name; InputError for a result without files."""
+    raise InputError(
         f"{type(result).__name__} is no result that is written; expected an Identification, "
         "Ranking, Cestac, Advice, Simulation, Excitation or StaticPoses"
     )

@@ -9,7 +9,7 @@ order forward and backward.
 
 A drive's velocity may be filtered, late, or in another unit. On the motion itself,
 
-    v = gain dq/dt - lag d2q/dt2 + rest,
+    v = gain (dq/dt - lag d2q/dt2) + rest,
 
 and v of a joint is left alone where gain and lag take more than LIMIT.SPEED_DISAGREES of it.
 """

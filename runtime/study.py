@@ -18,6 +18,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, TypeAdapter
 
 from runtime.core import study as chapter
+from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError
 from runtime.core.model import GeneratedModel
 from runtime.core.record import Record
@@ -121,6 +122,7 @@ def study_from_mapping(mapping: Mapping[str, Any]) -> Study:
     Numbers may be texts such as "2*pi/10000"; one value stands for a list of one (files, delta,
     record).
     """
+    require_kind(mapping, Mapping, "study", "a mapping, as read from a study file")
     return structure(Study, mapping)
 
 
@@ -131,6 +133,7 @@ def study_schema() -> dict[str, Any]:
 
 def load_study(path: str | Path) -> Study:
     """The Study of a study file; raises SettingsError with file, line and key."""
+    require_kind(path, (str, Path), "study", "the name of a study file")
     return study_from_text(text_of(path), file=Path(path).name)
 
 
@@ -147,6 +150,9 @@ def study_of(record: str | Path) -> tuple[Study, Path]:
     record : str or Path
         A dataset, a study file (.yaml, .yml), or a measured file whose columns are called t, q1 ..., tau1 ... (SI, joint side).
     """
+    require_kind(
+        record, (str, Path), "record", "the name of a dataset, a study file or a measured file"
+    )
     path = Path(record)
     if str(record) in DATASETS:
         return study_from_mapping(dataset_study(str(record))), Path()
@@ -187,6 +193,7 @@ def read_record(
     if isinstance(path, RecordSettings):
         settings: tuple[RecordSettings, ...] = (path,)
     else:
+        require_kind(path, (str, Path), "path", "the name of a file, or RecordSettings")
         named = Path(folder) / path
         study, folder = study_of(named if named.exists() else path)
         settings = study.record

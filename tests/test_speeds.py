@@ -16,6 +16,7 @@ from runtime import identify
 from runtime.compose import observe, plausibility
 from runtime.core.record import Record
 from runtime.core.signals.filters import filtered_states
+from runtime.core.signals.velocities import agreement
 from runtime.core.study import Lowpass, Signals
 from runtime.study import Study
 
@@ -83,6 +84,14 @@ def test_what_disagrees_is_told_and_not_used(gain, lag):
     assert "of joint 1, 2 disagree" in text and study.signals.velocity == (RATE / 2, RATE / 2)
     X, Y = (observe(planar, x, study) for x in (given, replace(given, qd=None)))
     np.testing.assert_array_equal(X.W, Y.W)
+
+
+@pytest.mark.parametrize("gain", [180 / np.pi, -1.0, 0.5])
+def test_a_delay_is_in_seconds_whatever_the_unit_of_the_velocity(gain):
+    given = record(gain=gain, lag=0.025)
+    found = agreement(given.q, given.channels["qd"], given.rate, STUDY.signals)
+    np.testing.assert_allclose(found.lag, 0.025, atol=2e-3)
+    np.testing.assert_allclose(found.gain, gain, rtol=0.04)
 
 
 def test_good_velocities_are_told_so():

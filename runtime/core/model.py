@@ -18,6 +18,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
+from runtime.core.arrays import kind_of, require_kind
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, ModelError, SettingsError
 from runtime.core.loading import module_of, run
@@ -102,6 +103,9 @@ def load_model(
     """
     if isinstance(model, ModuleType):
         return checked_model(model)
+    require_kind(
+        model, (str, Path), "model", "the name or path of an emitted module, or the module"
+    )
     path = Path(model)
     if isinstance(model, str) and re.fullmatch(r"\w+", model):
         path = Path(folder or FOLDER) / f"{model}.py"
@@ -116,6 +120,15 @@ def load_model(
             f"with `symgen generate {path.stem}`"
         )
     return checked_model(module_of(path, trust=trust))
+
+
+def require_emitted(model: Any) -> None:
+    """InputError unless `model` is an emitted model, or behaves as one."""
+    if not all(hasattr(model, name) for name in ("NAME", "JOINTS", "DRIVES")):
+        raise InputError(
+            f"model is {kind_of(model)}; expected an emitted model, such as symgen.model('arm.urdf') "
+            "or runtime.load_model('arm.py')"
+        )
 
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:

@@ -12,15 +12,19 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
+from runtime.core.arrays import require_kind
 from runtime.core.errors import InputError
 from runtime.core.least_squares.method import Method
-from runtime.core.model import GeneratedModel, drives_of
+from runtime.core.model import GeneratedModel, drives_of, require_emitted
 from runtime.core.provenance import origin
 from runtime.core.record import Record
 from runtime.core.rows.prepared import Prepared
 from runtime.core.signals.states import Reader
 from runtime.core.study import Study
 
+RECORD_EXPECTED = (
+    "a Record, or a list of them: runtime.Record(t, q, tau), runtime.read_record(file)"
+)
 SIGNALS = "signals"
 """Kind of the notes on settings of signals that were automatic."""
 
@@ -77,8 +81,10 @@ class Problem:
     notes: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
+        require_emitted(self.model)
         n = len(self.model.JOINTS)
         for record in (*self.records, *self.unseen):
+            require_kind(record, Record, "record", RECORD_EXPECTED)
             if record.n != n:
                 raise InputError(
                     f"{record.n} joints; {self.model.NAME} has {n}: a record of another robot, or of some of its joints",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from runtime.core.arrays import real, real_number, require_kind
 from runtime.core.clock import JITTER, Stamps, rate_of, sample
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError
@@ -138,10 +139,17 @@ class Record:
     ) -> None:
         if unknown := sorted(named.keys() - {*JOINT_CHANNELS}):
             raise TypeError(f"{unknown[0]}; a record is given {', '.join(JOINT_CHANNELS)} by name")
+        require_kind(name, str, "name", "a text")
+        require_kind(channels, (Mapping, type(None)), "channels", "a mapping of names to arrays")
+        require_kind(origin, (Origin, type(None)), "origin", "an Origin")
         origin = origin or Origin()
         file = ", ".join(origin.files) or name
         signals = {"t": t, "q": q, "tau": tau, "tau_known": tau_known}
-        given = {label: _array(x) for label, x in signals.items() if x is not None}
+        given = {
+            label: _array(x, label, file)
+            for label, x in signals.items()
+            if x is not None or label != "tau_known"
+        }
         shapes = {label: x.shape for label, x in given.items()}
         given |= {label: x[:, None] for label, x in given.items() if label != "t" and x.ndim == 1}
         N = len(given["t"]) if given["t"].ndim == 1 else -1
@@ -177,6 +185,7 @@ class Record:
                 largest=FINITE if label == "t" else LIMIT.LARGEST_NUMBER,
             )
             x.setflags(write=False)
+        rate = None if rate is None else real_number(rate, "rate", file)
         if rate is not None and not (np.isfinite(rate) and rate > 0):
             raise InputError(f"rate {rate} Hz; expected a positive number", file=file)
         rate = rate_of(Stamps(file, rate=rate, jitter=origin.jitter), given["t"])
@@ -240,15 +249,16 @@ class Record:
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
 
 
-def _array(x: ArrayLike) -> Array:
+def _array(x: ArrayLike, label: str, file: str) -> Array:
     """The numbers of x: a copy, or x itself where it cannot be written."""
-    array = np.asarray(x, dtype=float)
+    array = real(x, label, file)
     return array.copy() if array.flags.writeable else array
 
 
 def _channel(label: str, x: ArrayLike, shape: tuple[int, ...], file: str) -> Array:
     """A channel of a record of positions of that shape, read-only."""
-    array = _array(x)
+    require_kind(label, str, "a name of channels", "a text")
+    array = _array(x, label, file)
     array = array[:, None] if array.ndim == 1 else array
     expected = shape if label in JOINT_CHANNELS else (shape[0], *array.shape[1:2])
     if array.shape != expected:
@@ -266,7 +276,7 @@ def _missing(
     if missing is None:
         return None
     if not isinstance(missing, Missing):
-        samples = np.array(missing)
+        samples = _marks(missing, file)
         missing = Missing(samples[:, None] if samples.ndim == 1 else samples)
     if missing.samples.shape != shape or missing.samples.dtype != np.bool_:
         raise InputError(
@@ -274,6 +284,14 @@ def _missing(
             file=file,
         )
     return missing if missing.samples.any() else None
+
+
+def _marks(missing: Any, file: str) -> Array:
+    """Marks of samples as an array, of whatever dtype."""
+    try:
+        return np.array(missing)
+    except Exception as e:  # ragged
+        raise InputError("missing is ragged; expected marks in the shape of q", file=file) from e
 
 
 def known_text(largest: Array | None, joints: Sequence[str]) -> str:

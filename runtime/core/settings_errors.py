@@ -34,8 +34,8 @@ EXPECTED = {  # by the type of an error of pydantic
 
 
 def shown(value: Any) -> str:
-    """The first 80 characters of a value as Python writes it."""
-    return repr(value)[:80]
+    """The first 80 characters of a value as Python writes it, on one line."""
+    return " ".join(repr(value).split())[:80]
 
 
 def settings_error(error: ValidationError, given: Any, path: Path = ()) -> SettingsError:

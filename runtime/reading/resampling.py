@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from runtime.core.arrays import real
 from runtime.core.clock import GAP, TimeStamps, remedy_text, time_stamps
 from runtime.core.errors import InputError
 from runtime.core.limits import LIMIT
@@ -86,7 +87,7 @@ def resample(
         Time that goes back, a longer gap, a rate below that of the record, or numbers that are not
         finite.
     """
-    t, x = np.asarray(t, dtype=float), np.asarray(x, dtype=float)
+    t, x = real(t, "t"), real(x, "x")
     if t.ndim != 1 or x.ndim not in (1, 2) or len(x) != len(t) or len(t) < LIMIT.FEWEST_SAMPLES:
         raise InputError(
             f"t {t.shape}, x {x.shape}; expected (N,) and (N,) or (N, n), N at "
@@ -102,7 +103,7 @@ def resample(
         raise InputError(f"method {method!r}; expected cubic or linear")
     if stamps.gaps or stamps.resets:
         raise InputError(
-            f"time has gaps of more than {longest:g} periods, or goes back. "
+            f"time has gaps of more than {settings.longest:g} periods, or goes back. "
             f"{remedy_text(t, time_stamps(t), arrays=True)}"
         )
     ((stretch,), _, _) = resampled(

@@ -92,6 +92,11 @@ def read_robot(
         As by `load_robot`; `lock` or `chain` of another format, or of a joint or link that the file
         does not have.
     """
+    if not isinstance(source, str | Path):
+        raise DescriptionError(
+            f"robot is {source!r:.40} ({type(source).__name__}); expected the name of a packaged "
+            "robot, or the path of a robot file"
+        )
     suffix = "" if source in packaged_robots() else Path(source).suffix.lower()
     if (lock or chain) and suffix not in TREES:
         raise DescriptionError(

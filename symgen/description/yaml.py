@@ -48,6 +48,11 @@ BY_ROW = ("frames", "elements", "limits", "values", "labels")
 
 def parse_robot(content: bytes, file: str) -> Robot:
     """The robot described by the bytes of a file called `file`."""
+    if not isinstance(content, bytes):
+        raise DescriptionError(
+            f"content is of type {type(content).__name__}; expected the bytes of a robot file "
+            "(of a text: text.encode()), or its path to load_robot"
+        )
     lines: dict[Path, int] = {}
 
     def line(path: Path) -> int:

@@ -1,6 +1,6 @@
 """Velocities that were recorded beside differences of the positions: how they differ on the motion itself.
 
-v = gain dq/dt - lag d2q/dt2 + rest
+v = gain (dq/dt - lag d2q/dt2) + rest
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class SpeedAgreement:
     gain : ndarray
         Of the differences in the recorded velocity.
     lag : ndarray, s
-        By which the recorded velocity is late.
+        By which the recorded velocity is late, whatever its gain; nan where that is zero.
     share : ndarray
         What gain and lag take, of the rms of the velocity.
     crossing : ndarray, Hz
@@ -58,9 +58,10 @@ def agreement(q: Array, v: Array, rate: float, signals: Signals) -> SpeedAgreeme
             for s, a, y in zip(states.qd[inner].T, states.qdd[inner].T, v_f[inner].T, strict=True)
         ]
     )
-    gain, lag = found.T
+    gain, product = found.T
     speed, rise = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (states.qd, states.qdd))
-    share = np.hypot(gain - 1, lag * rise / np.where(speed > 0, speed, 1.0))
+    share = np.hypot(gain - 1, product * rise / np.where(speed > 0, speed, 1.0))
+    lag = product / np.where(gain == 0, np.nan, gain)
     noise_q, noise_v = (np.sqrt(white_noise(x, rate, signals.median)) for x in (q, v))
     crossing = noise_v / (2 * np.pi * np.where(noise_q > 0, noise_q, np.inf))
     return SpeedAgreement(gain, lag, np.where(speed > 0, share, np.inf), crossing)

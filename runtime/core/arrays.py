@@ -1,0 +1,102 @@
+"""Arrays that callers give: real numbers, or one sentence on what they are instead.
+
+    real(t, "t")        float64; InputError for dates, texts, complex or masked numbers, None, ragged lists
+
+Every array from outside passes here, so that NumPy never casts in silence: a datetime64 would
+become nanoseconds, a complex number lose its imaginary part, a masked one its mask.
+"""
+
+from __future__ import annotations
+
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from runtime.core.errors import InputError, first_line
+
+Array = np.ndarray
+
+CURES = {
+    "M": "dates; give seconds, (t - t[0]) / np.timedelta64(1, 's')",
+    "m": "time spans; give seconds, t / np.timedelta64(1, 's')",
+    "c": "complex numbers; give their real part",
+    "U": "texts; read them as numbers first",
+    "S": "texts; read them as numbers first",
+    "T": "texts; read them as numbers first",
+    "V": "records of several fields; give one array for each signal",
+}
+"""What arrays of a kind hold that are no real numbers, and what to do, by the kind of their
+dtype."""
+
+
+def real(x: Any, label: str, file: str | None = None) -> Array:
+    """The numbers of x, float64: x itself where it is such an array.
+
+    Parameters
+    ----------
+    x : array_like
+        Real numbers, any shape.
+    label : str
+        What messages call it.
+    file : str, optional
+        Of the record that it belongs to.
+
+    Raises
+    ------
+    InputError
+        x is no array of real numbers; the message says its type or dtype.
+    """
+    if x is None or isinstance(x, str | bytes | dict | set | frozenset):
+        raise InputError(f"{label} is {kind_of(x)}; expected an array of numbers", file=file)
+    if isinstance(x, np.ma.MaskedArray) and np.ma.is_masked(x):
+        count = int(np.ma.getmaskarray(x).sum())
+        raise InputError(
+            f"{label} masks {count} of its values; a record has all of them: cut it, or fill them "
+            "(x.filled(np.nan) and missing=np.isnan(q) where q is read as counts)",
+            file=file,
+        )
+    try:
+        array = np.asarray(x)
+        kind = array.dtype.kind
+        if kind in CURES:
+            raise InputError(f"{label} has dtype {array.dtype}, {CURES[kind]}", file=file)
+        if kind == "O" and (wrong := [v for v in array.flat if not _is_real(v)]):
+            raise InputError(f"{label} holds {kind_of(wrong[0])}; expected numbers", file=file)
+        return np.asarray(array, dtype=float)
+    except InputError:
+        raise
+    except Exception as e:  # whatever an array of another package raises becomes one kind of error
+        raise InputError(
+            f"{label}, {kind_of(x)}, is no array of real numbers: {first_line(e)}; expected rows of "
+            "one length",
+            file=file,
+        ) from e
+
+
+def real_number(x: Any, label: str, file: str | None = None) -> float:
+    """One real number; InputError for anything else."""
+    if not _is_real(x):
+        raise InputError(f"{label} is {kind_of(x)}; expected a number", file=file)
+    return float(x)
+
+
+def _is_real(x: Any) -> bool:
+    """Whether x is a real number; neither True nor False is."""
+    return isinstance(x, Real) and not isinstance(x, bool | np.bool_)
+
+
+def kind_of(x: Any) -> str:
+    """A value in words: None, '250' (str), a list, a dict."""
+    if x is None:
+        return "None"
+    if isinstance(x, str | bytes | int | float | complex):
+        return f"{x!r:.40} ({type(x).__name__})"
+    article = "an" if type(x).__name__[0] in "aeiouAEIOU" else "a"
+    return f"{article} {type(x).__name__}"
+
+
+def require_kind(x: Any, kinds: type | tuple[type, ...], label: str, hint: str) -> None:
+    """InputError unless x is of one of the kinds; hint : what was expected, and how to get it."""
+    if not isinstance(x, kinds):
+        raise InputError(f"{label} is {kind_of(x)}; expected {hint}")
