@@ -83,6 +83,12 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
 
 
+def _not_tiny(value: float) -> float:
+    if 0 < value < 1 / LARGEST:
+        raise SettingsError(f"{value:g}; expected at least {1 / LARGEST:g}")
+    return value
+
+
 def _text(value: Any) -> Any:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
@@ -94,17 +100,22 @@ def _list(value: Any) -> Any:
     return value if several else (value,)
 
 
+LARGEST = 1e12
+"""Largest number of a setting, SI, and one over the smallest positive one: what lies beyond is a
+slip of units or keys, and its powers overflow."""
+MOST = 1_000_000
+"""Largest count."""
 Real = Annotated[
     float,
-    Field(strict=True, allow_inf_nan=False),
+    Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST),
     BeforeValidator(_number),
     Written(lambda s: {**s, "type": ["number", "string"]}),
 ]
-Positive = Annotated[Real, Field(gt=0)]
+Positive = Annotated[Real, Field(gt=0), AfterValidator(_not_tiny)]
 NotNegative = Annotated[Real, Field(ge=0)]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
-Count = Annotated[Whole, Field(ge=1)]
-Seed = Annotated[Whole, Field(ge=0)]
+Count = Annotated[Whole, Field(ge=1, le=MOST)]
+Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 Flag = Annotated[bool, Field(strict=True)]
 Text = Annotated[
     str, BeforeValidator(_text), Written(lambda s: {**s, "type": ["string", "integer"]})
@@ -136,7 +147,7 @@ def _in_order(window: tuple[float | None, float | None]) -> tuple[float | None, 
     return window
 
 
-OddWindow = Annotated[Count, AfterValidator(_odd)]
+OddWindow = Annotated[Whole, Field(ge=1, le=9999), AfterValidator(_odd)]
 Interval = Annotated[tuple[Real | None, Real | None], AfterValidator(_in_order)]
 """[t0, t1] in s; null leaves an end open."""
 

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from runtime.core.settings import (
+    MOST,
     Count,
     Flag,
     Interval,
@@ -46,6 +47,8 @@ def version(number: int) -> int:
 
 
 Version = Annotated[Whole, AfterValidator(version)]
+Step = Annotated[Real, Field(ge=1e-12, le=1000)]
+"""A step of an encoder, rad or m."""
 CHAPTER_CUTOFF = 50.0
 """Cut-off of the low-pass in the chapter, Hz."""
 
@@ -67,7 +70,7 @@ class Lowpass(Settings):
         Samples added at each end: matlab, 3*order, or scipy, 3*(order + 1) for an even order.
     """
 
-    cutoff: Positive | Literal["auto"] = "auto"
+    cutoff: Annotated[Positive, Field(ge=1e-4)] | Literal["auto"] = "auto"
     order: Annotated[Whole, Field(ge=1, le=20)] = 4
     on: Many[Literal["q", "qd"]] = ("q", "qd")
     padding: Literal["matlab", "scipy"] = "matlab"
@@ -285,8 +288,8 @@ class CestacSettings(Settings):
     rounding: Literal["two-point", "uniform", "gaussian", "quantise", "phase"] = "two-point"
     uneven: Annotated[Real, Field(ge=0, le=0.5)] = 0.0
     place: Literal["record", "loop"] = "record"
-    delta: Many[Positive] = (2 * pi / 10000, 2 * pi / 5000, 2 * pi / 2000, 2 * pi / 1000)
-    runs: Annotated[Whole, Field(ge=2)] = 5
+    delta: Many[Step] = (2 * pi / 10000, 2 * pi / 5000, 2 * pi / 2000, 2 * pi / 1000)
+    runs: Annotated[Whole, Field(ge=2, le=MOST)] = 5
     seed: Seed = 1
     columns: Literal["essential", "all"] | Many[Text] = "essential"
     torque: Many[Real] | None = None

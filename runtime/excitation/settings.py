@@ -8,8 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from runtime.core.settings import Count, Many, Positive, Real, Settings, Text, Whole, require
+from runtime.core.settings import Many, Positive, Real, Seed, Settings, Text, Whole, require
 from runtime.loop.families import AnyFamily, Fourier, PointToPoint
+
+MOST_INSTANTS = {"grid": 2e4, "rate": 2e7}
+"""Of a motion, at the points of the optimiser and of the controller."""
 
 
 class Sphere(Settings):
@@ -84,26 +87,35 @@ class ExcitationSettings(Settings):
         Fourier(),
         PointToPoint(points=7, travel=1.0, blend=0.25),
     )
-    poses: Count | None = None
+    poses: Annotated[Whole, Field(ge=1, le=10_000)] | None = None
     criterion: Literal["auto", "record", "cond", "logdet", "sigma"] = "auto"
     columns: Literal["essential", "all"] | Many[Text] = "essential"
     limits: Mapping[str, Any] = field(default_factory=dict)
     torque_rms: Many[Real] | None = None
     torque_rate: Many[Real] | None = None
     margin: Annotated[Real, Field(ge=0, lt=1)] = 0.02
-    grid: Positive = 20.0
-    rate: Positive = 1000.0
+    grid: Annotated[Real, Field(ge=0.01, le=10_000)] = 20.0
+    rate: Annotated[Real, Field(ge=0.01, le=1e6)] = 1000.0
     begin: Many[Real] | None = None
     spheres: Many[Sphere] = ()
     apart: tuple[tuple[Whole, Whole], ...] | None = None
     gap: Real = 0.0
     smooth: Positive = 0.05
     torque_sigma: Many[Real] | None = None
-    starts: Count = 10
-    iterations: Count = 200
-    seed: Whole = 1
+    starts: Annotated[Whole, Field(ge=1, le=10_000)] = 10
+    iterations: Annotated[Whole, Field(ge=1, le=100_000)] = 200
+    seed: Seed = 1
 
     def __post_init__(self) -> None:
+        length = sum(part.duration for part in self.parts)
+        for key in ("grid", "rate"):
+            instants = length * getattr(self, key)
+            require(
+                instants <= MOST_INSTANTS[key],
+                f"{getattr(self, key):g} Hz over {length:g} s are {instants:.3g} instants; expected "
+                f"at most {MOST_INSTANTS[key]:g}",
+                key,
+            )
         for pair in self.apart or ():
             require(
                 all(1 <= k <= len(self.spheres) for k in pair),

@@ -175,7 +175,7 @@ class Points(Settings):
     """
 
     duration: Positive = 10.0
-    seed: Whole = 1
+    seed: Seed = 1
 
 
 class ReferenceSettings(Settings):

@@ -238,7 +238,11 @@ def _check_element(e: Element, robot: Any) -> None:
         ),
         (laws and not own, f"{e.kind} has its law; leave out torque and energy", "kind"),
         (own and not e.unit, "give the `unit` of its parameter, such as N*m", ""),
-        (not e.unit.isprintable() or len(e.unit) > 40 or '"' in e.unit, "unit: up to 40 signs", ""),
+        (
+            not re.fullmatch(r"[\w*/^().°%+-]{0,40}", e.unit),
+            f"unit {e.unit!r:.50}; expected up to 40 letters, digits and * / ^ ( ), such as N*m*s/rad",
+            "unit",
+        ),
         (e.kind not in KINDS, f"kind {e.kind!r}; expected one of {', '.join(KINDS)}", "kind"),
         (
             e.when is not None

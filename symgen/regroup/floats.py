@@ -21,12 +21,13 @@ from symgen.derive.loop_equations import LoopSystem, loop_system
 from symgen.derive.loops import close
 from symgen.description.expression import Expression
 from symgen.description.robot import PRISMATIC, Robot
-from symgen.errors import SymgenError
+from symgen.errors import DescriptionError, SymgenError
 from symgen.regroup.residues import states_for
 
 # singular values of unit columns: those below are rounding where a gap says so, at most here
 LARGEST_ROUNDING, SMALLEST = 1e-9, 1e-14
 NEGLIGIBLE = 1e-6  # of a coefficient between unit columns
+OVERFLOWS = 1e100  # its square is a number
 SPREAD, MOST_STATES = 0.8, 4000  # rad about the start, and of half the longest length for slides
 DECADES = -3.5, 1.0  # decades of the velocities at which laws are compared
 Relations = dict[str, dict[str, Expression]]  # {dependent: {base column: coefficient}}
@@ -89,9 +90,26 @@ def sampled_columns(floats: Floats, names: Sequence[str], count: int) -> Array:
     robot = floats.robot
     D = derive(robot).columns
     entries = [D[name].get(j, 0) for j in robot.joints for name in names]
-    values = [
-        np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
-    ]
+    with np.errstate(all="ignore"):  # of laws, which are judged here
+        values = [
+            np.broadcast_to(np.asarray(x, dtype=float), count) for x in interpret(entries, floats)
+        ]
+    for k, x in enumerate(values):
+        if not (wrong := ~(np.abs(x) <= OVERFLOWS)).any():
+            continue
+        name, at = names[k % len(names)], int(np.argmax(wrong))
+        state = ", ".join(
+            f"{symbol.name} = {np.broadcast_to(given, count)[at]:.3g}"
+            for symbol, given in floats.states.items()
+            if symbol.kind in ("q", "qd")
+        )
+        own = next((e for e in robot.elements if e.is_own and name.startswith(e.family)), None)
+        raise DescriptionError(
+            f"column {name} is no number at {state} (rad, m, s)"
+            + (f": {own.torque or own.energy}" if own else "")
+            + "; write a law that is finite everywhere, such as sqrt(max(1 - q, 0))",
+            path=("columns", own.family) if own else (),
+        )
     return np.stack(values).reshape(len(robot.joints), len(names), count).swapaxes(1, 2)
 
 

@@ -96,3 +96,34 @@ def test_labels_and_titles_of_any_text_come_back(label):
     robot = replace(parse_robot(ARM.encode(), "arm.yaml"), labels={1: label}, title=label)
     again = parse_robot(write_yaml(robot).encode(), "arm.yaml")
     assert dict(again.labels) == {1: label} and again.title == label
+
+
+COLUMN = 'columns: {{CAB: {{along: 2, torque: "{}", unit: {}}}}}\n'
+
+
+@pytest.mark.parametrize("unit", ['"N m"', '"N*m\\n"', "\"N*m' + '\"", '"N*m\\"\\"\\""', '"N\\tm"'])
+def test_a_unit_is_one_word(unit):
+    with pytest.raises(DescriptionError, match=r"unit .*expected up to 40 letters.*line 10"):
+        parse_robot((ARM + COLUMN.format("sin(q)", unit)).encode(), "arm.yaml")
+
+
+def test_units_of_columns_stay_with_their_parameters():
+    text = ARM + COLUMN.format("sin(q)", "N*m/rad^2")
+    assert symgen.model(parse_robot(text.encode(), "arm.yaml")).UNITS["CAB2"] == "N*m/rad^2"
+
+
+@pytest.mark.parametrize(
+    ("law", "place"),
+    [
+        ("sqrt(q)", "sqrt(q) is not finite at q = -0.4"),
+        ("q**q", "is not finite at q = -0.4"),
+        ("exp(1000*q)", "column CAB2 is no number at q1 = "),
+        ("sqrt(1 - q)", "column CAB2 is no number at q1 = "),
+        ("exp(exp(exp(q)))", "column CAB2 is no number at q1 = "),
+        ("sqrt(4 - qd)", "column CAB2 is no number at q1 = "),
+    ],
+)
+def test_a_law_that_is_no_number_somewhere_is_named_with_the_place(law, place):
+    with pytest.raises(DescriptionError) as caught:
+        symgen.model(parse_robot((ARM + COLUMN.format(law, "N*m")).encode(), "arm.yaml"))
+    assert place in str(caught.value) and "\n" not in str(caught.value)

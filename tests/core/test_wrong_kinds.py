@@ -1,6 +1,6 @@
 """The border to callers: every entry point with every wrong kind of argument, one sentence each.
 
-`pytest -rP -k test_table tests/core/test_borders.py` prints how many pairs were tried and refused.
+`pytest -rP -k test_table tests/core/test_wrong_kinds.py` prints how many pairs were tried and refused.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import pytest
 
 import runtime
 import symgen
-from runtime.core.errors import InputError
+from runtime.core.errors import InputError, SettingsError
+from runtime.study import study_from_mapping
 from symgen.errors import SymgenError
 
 N = 200
@@ -197,3 +198,42 @@ def test_other_ways_to_write_real_numbers_are_taken(same: Callable[[Any], Any]) 
     np.testing.assert_allclose(runtime.Record(T, same(Q), TAU).q, Q, rtol=1e-15)
     with pytest.raises(InputError, match="holds a Decimal; expected numbers"):
         runtime.Record(T, np.full(Q.shape, Decimal(1)), TAU)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("signals.lowpass", "cutoff", 1e-300),
+        ("signals.lowpass", "cutoff", 1e300),
+        ("signals", "median", 99_999_999),
+        ("signals.decimate", "factor", 10**12),
+        ("signals", "velocity", 1e-320),
+        ("rows", "window", [0, 1e300]),
+        ("rows", "low_speed", 1e300),
+        ("cestac", "runs", 10**12),
+        ("cestac", "delta", 1e300),
+        ("cestac", "delta", 1e-300),
+        ("cestac", "seed", -1),
+        ("cestac", "seed", 10**30),
+        ("excitation", "grid", 1e12),
+        ("excitation", "grid", 5000),
+        ("excitation", "rate", 1e-300),
+        ("excitation", "starts", 10**9),
+        ("excitation", "starts", 1e9),
+        ("excitation", "iterations", 10**9),
+        ("excitation", "poses", 10**9),
+        ("excitation", "seed", -1),
+        ("excitation", "smooth", 1e-300),
+        ("controller.reference.points", "seed", -1),
+        ("controller.reference.points", "duration", 1e300),
+        ("record", "rate", 1e300),
+    ],
+)
+def test_settings_without_end_are_refused_at_their_key(section: str, key: str, value: Any) -> None:
+    mapping: dict[str, Any] = {key: value}
+    for name in reversed(section.split(".")):
+        mapping = {name: mapping}
+    with pytest.raises(SettingsError) as caught:
+        study_from_mapping(mapping)
+    assert key in str(caught.value) and "expected" in str(caught.value)
+    assert "\n" not in str(caught.value)
