@@ -28,6 +28,7 @@ from runtime.documents.yaml_text import yaml_text
 from runtime.excitation.settings import ExcitationSettings
 from runtime.loop.settings import Controller
 from runtime.payload import settings as load
+from runtime.reading import drafts
 from runtime.reading.datasets import DATASETS, dataset_study
 from runtime.reading.formats import endings, is_measured
 from runtime.reading.records import read_records
@@ -233,6 +234,13 @@ def suggested(study: Study, model: GeneratedModel) -> tuple[Study, list[str]]:
             study = study_from_mapping(mapping)
         else:
             return study, sentences
+
+
+def draft(study: Study, model: GeneratedModel) -> str:
+    """What the names of the columns of the first record tell, as the text of a study to complete; "" where that is nothing."""
+    record = study.record[0]
+    joints = tuple(getattr(model, "LABELS", {}).values())
+    return drafts.draft(record, Path(record.files[0]), joints) if record.files else ""
 
 
 def located(study: Study, folder: Path) -> Study:

@@ -304,6 +304,6 @@ def _torque_constant(
     else:
         raise InputError(
             f"tau is in {', '.join(dict.fromkeys(names))} but there is no torque constant; for currents of the motors set record.torque_side: motor, then gears and torque constants are those of the robot's drives; else set record.torque_constant (N*m/A) of every joint with the gears in it; 1 is no constant of a motor",
-            remedy={"torque_constant": 1.0} if drives is None else {"torque_side": "motor"},
+            remedy={"torque_side": "motor"} if drives is not None and drives.declared else None,
         )
     return factors, np.where(commands, constant, 1.0)

@@ -1,33 +1,86 @@
 """Which columns of a file are likely to be time, positions and torques, by their names: a proposal,
 for a study that a person looks at.
 
-    actual_q_0 ... actual_q_5    one quantity: a stem, and numbers in it
-    q_J_1 [deg], axis2.pos       also before a unit in brackets, or within
-    elbow_pos, wrist_pos         or the names of the joints, in the order of the robot
-    actual, q                    words of the stem
+    actual_q_0 ... actual_q_5    one family: a stem, and numbers in it
+    A1 Ist-Position [Grad]       also before a unit in brackets, or within; in other languages
+    elbow_pos, /joints/elbow/effort, elbow    or the names of the joints, in the order of the robot
+    positions (N, n)             or an array, or a field of a structure
+
+`WORDS` says what the words of a name mean; a new word is an entry there. A measured family goes before
+one without such a word, and that before targets.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 from runtime.core.errors import InputError
 from runtime.reading.units import position_unit, time_unit, torque_unit
 
-QUANTITY_WORDS = {  # the first words are taken before the others
-    "q": ("q", "pos", "position", "positions", "angle", "angles", "winkel"),
+WORDS = {  # the first words of a quantity are taken before the others; parts of long words count
+    "t": (
+        *("t", "time", "times", "timestamp", "stamp", "seconds", "secs"),
+        *("zeit", "zeitstempel", "temps", "horodatage", "tempo", "tiempo"),
+    ),
+    "q": (
+        *("q", "pos", "position", "positions", "angle", "angles"),
+        *("winkel", "stellung", "lage", "posizione", "posicion", "posición", "gelenkwinkel"),
+    ),
     "tau": (
-        *("tau", "torque", "torques", "effort", "moment", "drehmoment", "trq", "tq"),
-        *("current", "currents", "cur"),
+        *("tau", "torque", "torques", "effort", "efforts", "moment", "drehmoment", "trq", "tq"),
+        *("couple", "couples", "coppia", "momento"),
+        *("current", "currents", "cur", "strom", "motorstrom", "courant", "corrente", "corriente"),
+    ),
+    "qd": (
+        *("qd", "dq", "vel", "velocity", "velocities", "speed", "speeds", "qdot"),
+        *("geschwindigkeit", "drehzahl", "vitesse", "velocita", "velocidad"),
+    ),
+    "other": (
+        *("qdd", "ddq", "acc", "accel", "acceleration", "accelerations", "beschleunigung"),
+        *("temp", "temperature", "temperatur", "voltage", "spannung", "error", "fehler", "limit"),
     ),
 }
-TIME = {"t", "time", "timestamp", "stamp", "seconds", "zeit", "temps"}
+CURRENTS = WORDS["tau"][WORDS["tau"].index("current") :]
+MEASURED = {"actual", "act", "measured", "meas", "feedback", "ist", "mesure", "mesuré", "reel"}
+TARGETS = {
+    *("target", "desired", "des", "ref", "reference", "cmd", "command", "commanded", "setpoint"),
+    *("set", "soll", "consigne", "window"),
+}
+SECONDARY = {"se", "secondary", "link"}  # encoders behind the gears
 NAMED_UNITS = {"ms", "deg", "mA"}  # words of a name; others stand in brackets
-NOT_MEASURED = {"target", "desired", "ref", "reference", "cmd", "command", "setpoint", "window"}
+UNITS = {"grad": "deg", "gradi": "deg", "degrés": "deg", "degres": "deg", "sek": "s"}
+
+
+@dataclass(frozen=True)
+class Family:
+    """Columns of one quantity: a stem, and what stands for the joints in it.
+
+    Attributes
+    ----------
+    quantity : "t", "q", "tau", "qd", "other" or ""
+    word : int
+        Place of its word among those of the quantity.
+    target : int
+        0 measured, 1 without a word, 2 a target.
+    names : tuple of str
+    stem : str
+    """
+
+    quantity: str
+    word: int
+    target: int
+    names: tuple[str, ...]
+    stem: str
+
+    @property
+    def order(self) -> tuple[int, int, int, int, str]:
+        """Smallest first: measured, the better word, more joints, joints before a single array."""
+        return self.target, self.word, -len(self.names), len(self.stem), self.stem
 
 
 def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
@@ -35,54 +88,97 @@ def likely_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str
     they say mA); {} where names do not tell positions and as many torques. joints : their names in
     the robot file.
     """
+    found = known_columns(names, joints)
+    return found if {"q", "tau"} <= {*found.get("columns", ())} else {}
+
+
+def known_columns(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, Any]:
+    """The same as far as names tell it; without torques where none are as many as the positions."""
+    families = sorted(families_of(names, joints), key=lambda family: family.order)
+    of = {key: [f for f in families if f.quantity == key] for key in WORDS}
+    whole = [f for f in of["q"] if len(f.names) == len(joints)] or of["q"]
+    positions = next(iter(whole), None)
+    torques = next(
+        (f for f in of["tau"] if positions is None or len(f.names) == len(positions.names)), None
+    )
+    beside = positions.names[0].rpartition(".")[0] if positions else ""
+    time = min(of["t"], key=lambda f: f.names[0].rpartition(".")[0] != beside, default=None)
+    chosen = {"t": time, "q": positions, "tau": torques}
+    columns: dict[str, Any] = {
+        key: family.names[0] if key == "t" else list(family.names)
+        for key, family in chosen.items()
+        if family
+    }
+    units: dict[str, str] = {}
+    if torques and WORDS["tau"][torques.word] in CURRENTS:
+        units["tau"] = "A"
+    for key, read in (("t", time_unit), ("q", position_unit), ("tau", torque_unit)):
+        if (family := chosen[key]) is not None and (unit := _unit(family.names[0], read)):
+            units[key] = unit
+    return {**({"columns": columns} if columns else {}), **({"units": units} if units else {})}
+
+
+def candidates(names: Sequence[str], joints: Sequence[str] = ()) -> dict[str, list[str]]:
+    """First names of the families that may be t, q or tau, the likeliest first."""
+    families = sorted(families_of(names, joints), key=lambda family: family.order)
+    return {
+        key: [f.names[0] for f in families if f.quantity in (key, "")][:8]
+        for key in ("t", "q", "tau")
+    }
+
+
+def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Family]:
+    """Names that differ by a joint, by its name or by a number, and names by themselves."""
     stems: dict[str, list[str]] = {}
     for joint, name in product(joints, names):
-        stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "", name)
+        stem, found = re.subn(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", "#", name)
         if found:
             stems.setdefault(stem, []).append(name)
     for name in sorted(names, key=lambda name: [int(x) for x in re.findall("[0-9]+", name)]):
         for number in re.finditer("[0-9]+", name):
             stems.setdefault(f"{name[: number.start()]}#{name[number.end() :]}", []).append(name)
+    for stem, alike in stems.items():
+        if stem == "#" and joints:  # the bare name of a joint
+            yield Family("q", len(WORDS["q"]), 1, tuple(alike), stem)
+        elif (quantity := _quantity(stem))[0] != "t":
+            yield Family(*quantity, _target(stem), tuple(alike), stem)
+    single = {name: (*_quantity(name), _target(name)) for name in names}
+    for name, (quantity, word, target) in single.items():
+        numbered = any(name in alike for alike in stems.values())
+        alike = [x for x in single.values() if x == (quantity, word, target)]
+        if quantity == "t" or (quantity and not numbered and ("." in name or len(alike) == 1)):
+            yield Family(quantity, word, target, (name,), name)
 
-    def ranked(key: str) -> list[tuple[bool, int, int, str]]:
-        return sorted(
-            (bool(NOT_MEASURED & _words(stem)), QUANTITY_WORDS[key].index(word), -len(alike), stem)
-            for stem, alike in stems.items()
-            for word in _words(stem) & {*QUANTITY_WORDS[key]}
-        )
 
-    positions = next((stem for *_, stem in ranked("q")), None)
-    if positions is None:
-        return {}
-    n = len(stems[positions])
-    torques, word = next(
-        (
-            (stem, word)
-            for _, word, count, stem in ranked("tau")
-            if stem != positions and count == -n
-        ),
-        ("", 0),
-    )
-    if not torques:
-        return {}
-    time = next((name for name in names if _words(name) & TIME), "")
-    columns = {"q": stems[positions], "tau": stems[torques], **({"t": time} if time else {})}
-    units = {"tau": "A"} if QUANTITY_WORDS["tau"][word].startswith("cur") else {}
-    for key, name, read in (
-        ("t", time, time_unit),
-        ("q", positions, position_unit),
-        ("tau", torques, torque_unit),
-    ):
-        words = re.split(r"[\W\d_]+", name.lower())
-        for unit in (
-            *re.findall(r"[\[(]([^\])#]+)[\])]", name),
-            *(unit for unit in NAMED_UNITS if unit.lower() in words),
-        ):
-            with suppress(InputError):  # of something else, or no unit
-                read(unit)
-                units[key] = unit
-    return {"columns": columns, **({"units": units} if units else {})}
+def _quantity(stem: str) -> tuple[str, int]:
+    """What the words of a stem mean, and the place of the word; ("", 0) where they say nothing."""
+    words = _words(stem)
+    for exact in (True, False):
+        for key in ("other", "qd", "tau", "q", "t"):
+            for place, word in enumerate(WORDS[key]):
+                inside = len(word) > 3 and any(word in other for other in words)
+                if word in words if exact else inside:
+                    return key, place
+    return "", 0
+
+
+def _target(stem: str) -> int:
+    words = _words(stem)
+    return 2 if words & TARGETS else 0 if words & MEASURED and not words & SECONDARY else 1
+
+
+def _unit(name: str, read: Any) -> str:
+    """The unit that a name states in brackets or as a word; "" where it states none."""
+    words = re.split(r"[\W\d_]+", name.lower())
+    stated = [*re.findall(r"[\[(]([^\])#]+)[\])]", name)]
+    for unit in (*stated, *(unit for unit in NAMED_UNITS if unit.lower() in words)):
+        unit = UNITS.get(unit.strip().lower(), unit)
+        with suppress(InputError):  # of something else, or no unit
+            read(unit)
+            return unit
+    return ""
 
 
 def _words(name: str) -> set[str]:
-    return {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)}
+    bare = re.sub(r"[\[(][^\])]*[\])]", " ", name)
+    return {word.lower() for word in re.findall(r"[A-Z]+(?![a-zà-ÿ])|[A-Z]?[a-zà-ÿ]+", bare)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -80,8 +80,26 @@ class Table:
         return tuple(self.columns)
 
     def chosen(self, names: Sequence[str]) -> Table:
-        """The table of the samples that hold these columns: of most files, all of them."""
-        return self
+        """The table of the samples that hold these columns: of most files, all of them. Rows in which
+        all columns but one, the time, are empty are those of another source, and left out.
+        """
+        gaps = [name for name in dict.fromkeys(names) if name in self.empty]
+        if not gaps or len({*names}) - len(gaps) > 1:
+            return self
+        lost = np.isnan([self.columns[name] for name in gaps]).all(axis=0)
+        kept = np.flatnonzero(~lost)
+        columns = {
+            name: x[kept] if x.shape == lost.shape else x for name, x in self.columns.items()
+        }
+        still = {name: row for name, row in self.empty.items() if np.isnan(columns[name]).any()}
+        note = f"{lost.sum()} rows without any of these columns are left out"
+        return replace(
+            self,
+            columns=columns,
+            empty=still,
+            row=lambda k: self.row(int(kept[k])),
+            note=". ".join(filter(None, (self.note, note))),
+        )
 
     def read(self, names: Sequence[str], *, empty: bool = False, hint: str = "") -> Array:
         """These columns side by side, shape (N, k); InputError for names that the file has not, and for what is no number.

@@ -243,12 +243,19 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     """The study with what is likely to cure each refusal of its records, written to `path`."""
     from runtime.core.errors import InputError
     from runtime.reporting.result_files import write_all
-    from runtime.study import study_text, suggested
+    from runtime.study import draft, study_text, suggested
 
     if path.exists():
         raise InputError("the study to suggest exists; choose another name", file=str(path))
-    study, told = suggested(study, model)
     folder = path.resolve().parent
+    try:
+        study, told = suggested(study, model)
+    except InputError as e:
+        if text := draft(study, model):
+            write_all(folder, {path.name: text})
+            hint = f"{path} holds what the names tell; complete the lines marked # ?"
+            raise InputError(f"{e}; {hint}") from e
+        raise
     write_all(folder, {path.name: study_text(study, folder, defaults=False)})
     for text in (*told, f"suggested study: {path}; look at it before you trust the values"):
         say(text)
