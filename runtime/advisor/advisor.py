@@ -51,7 +51,7 @@ from runtime.advisor.coarse_encoders import READERS, CoarseEncoders, ReaderName
 from runtime.advisor.position_errors import Perturbation, perturbation, solution
 from runtime.advisor.readers import reader_advice
 from runtime.core.cestac.perturbed import study_columns
-from runtime.core.cestac.result import deciding_names
+from runtime.core.cestac.result import deciding_names, judged
 from runtime.core.cestac.rounding import VARIANCE, Mode
 from runtime.core.drives import Drives
 from runtime.core.errors import InputError, SettingsError
@@ -170,7 +170,7 @@ def advise(
         stack([part.observation for part in parts]) if len(parts) > 1 else parts[0].observation
     )
     rows = stacked(model, as_measured, names)
-    origins = {**problem.provenance, **(provenance or {})}
+    origins = {**problem.provenance, **judged(study.cestac), **(provenance or {})}
     reference = linear_estimate(rows, linear, model=model, provenance=origins)
     system = linear_system(measured, linear)
     predictor = Predictor(parts, 1 / np.array(system.scales), VARIANCE[law])

@@ -83,7 +83,7 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, Integral) and not isinstance(value, bool) else value
 
 
-def _not_tiny(value: float) -> float:
+def not_tiny(value: float) -> float:
     if 0 < value < 1 / LARGEST:
         raise SettingsError(f"{value:g}; expected at least {1 / LARGEST:g}")
     return value
@@ -111,7 +111,7 @@ Real = Annotated[
     BeforeValidator(_number),
     Written(lambda s: {**s, "type": ["number", "string"]}),
 ]
-Positive = Annotated[Real, Field(gt=0), AfterValidator(_not_tiny)]
+Positive = Annotated[Real, Field(gt=0), AfterValidator(not_tiny)]
 NotNegative = Annotated[Real, Field(ge=0)]
 Whole = Annotated[int, Field(strict=True), BeforeValidator(_whole)]
 Count = Annotated[Whole, Field(ge=1, le=MOST)]

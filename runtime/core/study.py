@@ -34,6 +34,7 @@ from runtime.core.settings import (
     Settings,
     Text,
     Whole,
+    not_tiny,
     require,
 )
 
@@ -47,7 +48,7 @@ def version(number: int) -> int:
 
 
 Version = Annotated[Whole, AfterValidator(version)]
-Step = Annotated[Real, Field(ge=1e-12, le=1000)]
+Step = Annotated[Real, Field(gt=0, le=1000), AfterValidator(not_tiny)]
 """A step of an encoder, rad or m."""
 CHAPTER_CUTOFF = 50.0
 """Cut-off of the low-pass in the chapter, Hz."""
@@ -274,7 +275,7 @@ class CestacSettings(Settings):
     seed : int
         Seed of the random numbers.
     columns : str or tuple of str
-        essential, all, or names.
+        essential; all; or names that are judged, in the fit of these and the essential ones.
     torque : tuple of float or None, N m or N
         Steps of the perturbed motor torque (Table 4); null: none.
     common : bool

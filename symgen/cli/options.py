@@ -51,7 +51,12 @@ Trust = Annotated[
     typer.Option("--trust", help="Run a module (.py) that was not emitted here: it is code."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-Columns = Annotated[Text, typer.Option(help="essential, all, or names separated by commas.")]
+Columns = Annotated[
+    Text,
+    typer.Option(
+        help="essential, all, or names separated by commas: of cestac these are judged, in the fit of the essential ones."
+    ),
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of what is drawn at random.")]
 Workers = Annotated[
     int,

@@ -78,7 +78,8 @@ def test_torque_steps_and_named_columns(emps_data):
         "--json",
     )
     found = json.loads(result.stdout)
-    assert found["names"] == ["M1R", "FV1"] and len(found["levels"]) == 3
+    assert found["names"][:2] == ["M1R", "FV1"] and len(found["levels"]) == 3
+    assert {*found["deciding"]} == {"M1R", "FV1"} and "FS1" in found["names"]  # fitted, not judged
 
 
 @pytest.mark.parametrize(

@@ -210,11 +210,21 @@ def test_columns_are_the_essential_ones_by_default():
         cestac(planar, RECORD, study(columns=("ZZ9",)))
 
 
-def test_other_columns_are_not_evaluated_into_the_fit():
-    names = ("ZZ1R", "FS1", "ZZ2", "FV1")
-    found = cestac(planar, RECORD, study(columns=names, runs=2))
-    assert found.names == names and found.reference.names == names
-    assert len(found.levels[0].mean) == 4
+@pytest.mark.parametrize("names", [("ZZ1R",), ("FV1", "FS2"), ("ZZ2", "MX2R")])
+def test_named_columns_are_judged_in_the_essential_fit(names):
+    names = tuple(name for name in names if name in planar.BASE_PARAMETERS)
+    simple = study(columns="essential", runs=2, delta=(1e-3, 2e-2))
+    whole = cestac(planar, RECORD, simple)
+    found = cestac(planar, RECORD, replace(simple, cestac=replace(simple.cestac, columns=names)))
+    assert found.names[: len(names)] == names and {*found.names} == {*whole.names, *names}
+    assert {*found.deciding} <= {*names}
+    for name in names:
+        if name in whole.names:
+            places = [result.names.index(name) for result in (found, whole)]
+            X, X_whole = (r.reference.X[k] for r, k in zip((found, whole), places, strict=True))
+            assert pytest.approx(X_whole, rel=1e-9) == X
+    for level in found.levels:
+        assert {*level.decided_by} <= {*names, "rho"}
 
 
 def test_several_records_are_stacked():

@@ -51,7 +51,7 @@ def test_a_run_reads_the_counts_of_its_draw():
         RECORD, filtered_states(RECORD.q, RECORD.rate, SIGNALS).qd, SIGNALS, Rows(trim=20)
     )
     seen = observation_from_states(
-        planar, states, decimated_torque(RECORD.tau, selection), selection, columns=NAMES
+        planar, states, decimated_torque(RECORD.tau, selection), selection, columns=found.names
     )
     X, *_ = np.linalg.lstsq(seen.W, seen.Y, rcond=None)
     assert np.allclose(found.levels[0].runs[1].X, X, rtol=1e-8)

@@ -11,8 +11,8 @@ N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the deviation (
 (21) and the residual (22); `runtime.core.cestac.result` holds them
 and their verdict. The rows used are those of the measured record in every run. Steps of the motor
 torque (`torque`, section 4.1.3) are studied alone and
-with the first Delta. Columns are by default the essential ones of the identification, rounding is
-two-point, on the joint side: those
+with the first Delta. Columns are the essential ones of the identification; parameters that the
+settings name are judged alone, in that fit. Rounding is by default two-point, on the joint side: those
 reproduce the chapter's figures.
 
 The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in
@@ -37,7 +37,7 @@ from runtime.core.cestac.perturbed import (
     prepared_records,
     study_columns,
 )
-from runtime.core.cestac.result import Cestac, level_result
+from runtime.core.cestac.result import Cestac, judged, level_result
 from runtime.core.cestac.run import USABLE, run_block
 from runtime.core.cestac.runs import Level, Runs
 from runtime.core.cestac.sources import Checkpoint, EncoderOf, LoopOf
@@ -80,7 +80,7 @@ def cestac(
     loop_of : callable
         From a problem to the closed loop that it simulates; None where it simulates none.
     columns : sequence of str, optional
-        Essential names where they are known; default: those of the problem. Unused unless settings.cestac.columns is "essential".
+        Essential names where they are known; default: those of the problem. Unused where settings.cestac.columns is "all".
     map : callable, optional
         As the built-in one; computes the runs, in processes (`runtime.parallel.processes.processes`) or by a
         Dask cluster (`runtime.parallel.cluster.cluster`). The results do not depend on it in any bit.
@@ -143,7 +143,7 @@ def cestac(
     )
     measured = measured_rows(task, as_measured)
     whole = [reading.record for reading in as_measured]
-    origins = {**problem.provenance, **(provenance or {})}
+    origins = {**problem.provenance, **judged(study.cestac), **(provenance or {})}
     point = point_estimate(task.estimate, problem.methods)
     reference = estimate_of(measured, point, problem.methods, model=model, provenance=origins)
     _refuse(reference)
@@ -294,7 +294,7 @@ def resolution(result: Identification, own_encoder: EncoderOf, loop_of: LoopOf) 
     """The study of an identification at the steps of settings.cestac, of the columns that these name; own_encoder, loop_of : as of `cestac`."""
     if not result.determined:
         raise InputError("the record does not determine the parameters")
-    essential = result.study.cestac.columns == "essential"
+    essential = result.study.cestac.columns != "all"
     return cestac(
         result.problem,
         own_encoder=own_encoder,

@@ -33,7 +33,7 @@ from runtime.core.rows.prepared import Prepared, decimated_torque, observation_o
 from runtime.core.rows.regressor import Columns
 from runtime.core.rows.selection import Selection, select_rows
 from runtime.core.signals.filters import States, derivative, filtered_states
-from runtime.core.signals.states import Reader, require_motion
+from runtime.core.signals.states import Reader, lowpassed, require_motion
 from runtime.core.study import CestacSettings, EstimateSettings, Signals, Study
 
 Array = np.ndarray
@@ -212,18 +212,35 @@ def study_columns(
     columns: Sequence[str] | None,
     loop: Loop | None = None,
 ) -> tuple[str, ...]:
-    """Columns of settings.cestac.columns: a list, all, or the essential ones of the identification that the problem describes.
+    """Columns that are fitted: all, or the essential ones of the identification that the problem describes. Names of
+    settings.cestac.columns come first, and the other essential ones follow: a fit without these would move what is judged.
 
     columns : essential names where they are known.
             Raises SettingsError for a name that is no base parameter, and for poses at rest.
     """
-    settings = problem.settings
+    settings, asked = problem.settings, problem.settings.cestac.columns
     require_motion(settings.signals, "the study of encoders")
-    if settings.cestac.columns == "essential" and columns is None:
-        rows = stacked(problem.model, records) if loop is None else loop.measured()
+    named = base_columns(problem.model, asked, (), "cestac", "columns")
+    if asked == "all":
+        return named
+    if columns is None:
+        rows = _measured(problem, records) if loop is None else loop.measured()
         linear = linear_companion(settings.estimate)
-        return essential_of(rows, settings.essential, linear).names
-    return base_columns(problem.model, settings.cestac.columns, columns or (), "cestac", "columns")
+        columns = essential_of(rows, settings.essential, linear).names
+    return (*named, *(name for name in columns if name not in named))
+
+
+def _measured(problem: Problem, records: Sequence[Prepared]) -> Observation:
+    """Rows of the records as measured; by the low-pass where positions are no counts that the study could read."""
+    try:
+        return stacked(problem.model, records)
+    except InputError:
+        signals = problem.settings.signals
+        if signals.reader != "counts" or signals.step is not None:
+            raise
+    signals = replace(signals, reader="lowpass", side="joint", options={})
+    study = replace(problem.settings, signals=signals)
+    return stacked(problem.model, [replace(own, study=study, reader=lowpassed) for own in records])
 
 
 def stream_keys(draw: tuple[int, ...], k: int) -> tuple[tuple[int, ...], tuple[int, ...]]:

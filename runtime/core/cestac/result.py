@@ -56,6 +56,7 @@ from runtime.core.part import (
     Part,
 )
 from runtime.core.rows.observation import Observation
+from runtime.core.study import CestacSettings
 from runtime.core.table import Table, csv_text, notebook
 
 Array = np.ndarray
@@ -65,6 +66,8 @@ VERDICTS = "Two verdicts stand below. The printed rule asks every parameter that
 
 SCHEMA = "symgen-cestac/1"
 """Kind and version of the JSON layout; `symgen schema --of cestac` prints its JSON Schema."""
+JUDGED = "judged"
+"""Key of the provenance of a reference: names that study.cestac.columns asks for."""
 Verdict = Literal["unbiased", "doubtful", "biased"]
 
 
@@ -161,7 +164,7 @@ class Cestac(Result, Part):
     @cached_property
     def deciding(self) -> tuple[str, ...]:
         """Parameters that decide the verdict: %sigma (11) of the reference at most
-        LIMIT.DECIDING.
+        LIMIT.DECIDING, of those that study.cestac.columns names.
         """
         return deciding_names(self.reference)
 
@@ -451,12 +454,18 @@ def texts(words: Iterable[str]) -> Array:
     return np.array(list(words), dtype=np.str_)
 
 
+def judged(settings: CestacSettings) -> dict[str, tuple[str, ...]]:
+    """Provenance of a reference of which some parameters alone are judged: their names."""
+    return {} if isinstance(settings.columns, str) else {JUDGED: settings.columns}
+
+
 def deciding_names(reference: Estimate) -> tuple[str, ...]:
-    """Names whose %sigma (11) is at most LIMIT.DECIDING."""
+    """Names whose %sigma (11) is at most LIMIT.DECIDING, of those that are judged."""
+    asked = reference.provenance.get(JUDGED, reference.names)
     return tuple(
         name
         for name, relative in zip(reference.names, reference.relative_sigma, strict=True)
-        if relative <= LIMIT.DECIDING
+        if relative <= LIMIT.DECIDING and name in asked
     )
 
 
@@ -568,7 +577,10 @@ def _message(
     needed: int,
 ) -> str:
     named = ", ".join(f"{name} {value:.2f} %" for name, value in decided_by.items())
-    undecided = [name for i, name in enumerate(reference.names) if i not in decisive]
+    asked = reference.provenance.get(JUDGED, reference.names)
+    undecided = [
+        name for i, name in enumerate(reference.names) if i not in decisive and name in asked
+    ]
     text = {
         "unbiased": (
             "practically unbiased, all errors of the deciding parameters below "
