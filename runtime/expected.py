@@ -186,7 +186,8 @@ def expected_error(
         if limits_of(model)
         else "motions over the range of this record at its speeds (the robot file has no limits)"
     )
-    return Expected(*np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist(), motions)
+    error, low, high = np.minimum(errors, LIMIT.LARGEST_EXPECTED).tolist()
+    return Expected(error, low, high, motions)
 
 
 def with_values(physical: PhysicalModel, K: Array, R: Array, y: Array) -> tuple[Array, Array]:

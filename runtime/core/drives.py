@@ -83,7 +83,7 @@ class Drives:
         return cls(
             mapping["ratio"],
             mapping.get("offset", 0.0),
-            1.0 if constant is None else constant,
+            np.asarray(1.0 if constant is None else constant),
             declared=constant is not None,
         )
 

@@ -592,7 +592,7 @@ def helps(trial: Trial, baseline: Baseline, other: Baseline) -> bool:
     assert trial.fit is not None
     given = unchanged(other.samples.n)
     after = min(misfit(cause, trial.fit.X) for cause in (given, trial.cause))
-    return misfit(given, baseline.given.X) - after > np.log(LIMIT.VISIBLE) / 2
+    return bool(misfit(given, baseline.given.X) - after > np.log(LIMIT.VISIBLE) / 2)
 
 
 def _misfit(grams: Grams, X: Array) -> float:

@@ -142,12 +142,12 @@ def families_of(names: Sequence[str], joints: Sequence[str] = ()) -> Iterator[Fa
             yield Family("q", len(WORDS["q"]), 1, tuple(alike), stem)
         elif (quantity := _quantity(stem))[0] != "t":
             yield Family(*quantity, _target(stem), tuple(alike), stem)
-    single = {name: (*_quantity(name), _target(name)) for name in names}
-    for name, (quantity, word, target) in single.items():
+    single = {name: (_quantity(name), _target(name)) for name in names}
+    for name, (meaning, target) in single.items():
         numbered = any(name in alike for alike in stems.values())
-        alike = [x for x in single.values() if x == (quantity, word, target)]
-        if quantity == "t" or (quantity and not numbered and ("." in name or len(alike) == 1)):
-            yield Family(quantity, word, target, (name,), name)
+        several = list(single.values()).count((meaning, target)) > 1 and "." not in name
+        if meaning[0] == "t" or (meaning[0] and not numbered and not several):
+            yield Family(*meaning, target, (name,), name)
 
 
 def _quantity(stem: str) -> tuple[str, int]:
@@ -175,7 +175,7 @@ def _unit(name: str, read: Any) -> str:
         unit = UNITS.get(unit.strip().lower(), unit)
         with suppress(InputError):  # of something else, or no unit
             read(unit)
-            return unit
+            return str(unit)
     return ""
 
 

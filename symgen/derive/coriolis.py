@@ -95,7 +95,8 @@ class CompositeRates(CompositeLinks):
             (sub(0, XY), mul(half, sub(add(XX, ZZ), YY)), sub(0, YZ)),
             (sub(0, XZ), sub(0, YZ), mul(half, sub(add(XX, YY), ZZ))),
         )
-        self.HP[j] = cross(w, self.own[j][6:9])
+        mx, my, mz = self.own[j][6:9]
+        self.HP[j] = cross(w, (mx, my, mz))
         self.BP[j] = (cross(w, K[0]), cross(w, K[1]), cross(w, K[2]))
 
     def _take_rates(self, j: int, i: int) -> None:

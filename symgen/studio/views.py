@@ -238,7 +238,8 @@ def check() -> None:
     robot_file, study_file, target = sys.argv[1:4]
     value = findings(robot_file, study_file)
     if "error" in value:
-        sys.exit(f"error: {value['error']}")
+        print(f"error: {value['error']}", file=sys.stderr)
+        sys.exit(2)
     write_all(Path(), {target: f"{dumps(value, indent=1)}\n"})
 
 

@@ -6,6 +6,7 @@ import asyncio
 import gzip
 import io
 import json
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -455,3 +456,26 @@ def test_the_server_ends_some_time_after_its_last_page(
 
     asyncio.run(closed_after(0.3))
     assert ended[0] >= 0.45
+
+
+def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
+    """Code 1 counts as a result: a failed Check said nothing."""
+    from symgen.studio import views
+
+    (tmp_path / "arm.yaml").write_text("symgen: 1\nname: [\n")
+    (tmp_path / "study.yaml").write_text("symgen: 1\n")
+    monkeypatch.setattr(
+        "sys.argv", ["check", str(tmp_path / "arm.yaml"), str(tmp_path / "study.yaml"), "out.json"]
+    )
+    with pytest.raises(SystemExit) as ended:
+        views.check()
+    assert ended.value.code == 2 and capsys.readouterr().err.startswith("error: ")
+
+
+def test_an_error_fills_the_box_of_messages_and_does_not_replace_it():
+    """With the swap of the button that asked, outerHTML, the first error took the box away."""
+    from importlib.resources import files
+
+    base = files("symgen.studio").joinpath("templates/base.html.jinja").read_text()
+    errors = re.search(r'\{"code":"\[45\]\.\."[^}]*\}', base)
+    assert errors and '"swapOverride":"innerHTML"' in errors[0]
