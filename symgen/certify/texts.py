@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
@@ -36,7 +36,7 @@ from symgen.emit.targets import TARGETS
 from symgen.version import VERSION
 
 TOLERANCE = 1e-9  # of the largest entry: rounding of some thousand operations, and closed loops
-C_FLAGS = ("-std=c11", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
+C_FLAGS = ("-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC")
 WITHOUT_AVX512 = "-D__builtin_cpu_supports(x)=0"  # another way past the caches
 LONGEST_RUN = 300  # s, of the compiler and of the functions
 HELPERS = {"store", "casadi"}
@@ -128,6 +128,8 @@ def text_check(file: str, text: str, target: str, witness: Witness) -> TextCheck
     text = without_certificate(text)
     key = sha256(text.encode("utf-8")).hexdigest()
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
+    if file.endswith(".h"):
+        return TextCheck(target, key, not_run="it declares what the C file has")
     if not file.endswith((".py", ".c")):
         return TextCheck(target, key, not_run=f"nothing here runs {TARGETS[target].language}")
     if file.endswith(".c") and compiler is None:
@@ -317,7 +319,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     rows = np.arange(TILES) % STATES
     own, constants = witness.own[rows], [*witness.keywords.values(), 0.0]
     N, n, b = own.shape
-    found = re.findall(rf"^int32_t {name}_(\w+)\(", text, re.MULTILINE)
+    found = re.findall(rf"^int32_t {name}_(\w+)\(\s*int64_t", text, re.MULTILINE)
     checks = {
         f: replace(
             c,
@@ -331,6 +333,21 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     calls: list[tuple[str, list[Any], int]] = [
         (f"{name}_{f}", [N, *map(_flat, c.arguments), constants, None, flags], c.expected.size)
         for f, c, flags in asked
+    ]
+    single = list(_of_one_state(name, text, witness))
+    calls += [
+        (
+            f"{name}_{f}1",
+            [
+                *check.keywords.values(),
+                *(_flat(a[k] if a.ndim > 1 else a) for a in check.arguments),
+                constants,
+                None,
+            ],
+            check.expected[k].size,
+        )
+        for f, check in single
+        for k in range(len(check.expected))
     ]
     columns = [_flat(x[rows].T) for x in (witness.q, witness.qd, witness.qdd)]
     try:
@@ -356,10 +373,26 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
     except (OSError, subprocess.SubprocessError, ValueError, IndexError):
         return {"compile": float("inf")}
     apart = {"abi", "signals", *witness.left_out}
-    errors = dict.fromkeys({*found} - {*checks, *apart}, float("inf"))
+    unknown = {*found} - {*checks, *apart}
+    unknown |= {f"{f}1" for f in _one_state(name, text)} - {f"{f}1" for f, _ in single}
+    unknown -= {f"{f}1" for f in witness.left_out}
+    errors = dict.fromkeys(unknown, float("inf"))
     errors["signals"] = difference(store.reshape(b, n, N).T, own, 1.0)
     store[row[:varying]] = 0.0  # the functions leave to their caller what is constant
-    for (f, check, _), (status, numbers) in zip(2 * asked, results, strict=True):
+    runs = [results[: len(calls)], results[len(calls) :]]
+    for found_now in runs:
+        of_one = iter(found_now[len(asked) :])
+        for f, check in single:
+            value = np.array(
+                [numbers for _, (_, numbers) in zip(check.expected, of_one, strict=False)]
+            )
+            value = value.reshape(len(value), *_stored(f, check.expected.shape[1:]))
+            if MODELS[f].by_columns:
+                value = value.transpose(0, 2, 1)
+            worst = difference(check.compared(value), check.expected, check.scale)
+            errors[f"{f}1"] = max(errors.get(f"{f}1", 0.0), worst)
+    several = [result for run in runs for result in run[: len(asked)]]
+    for (f, check, _), (status, numbers) in zip(2 * asked, several, strict=True):
         shape = check.expected.shape[1:]
         if MODELS[f].by_columns:
             value = (np.reshape(numbers, (*shape[::-1], N)) + store.reshape(b, n, N)).T
@@ -368,6 +401,24 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
         worst = float("inf") if status else difference(value, check.expected, check.scale)
         errors[f] = max(errors.get(f, 0.0), worst)
     return errors
+
+
+def _of_one_state(name: str, text: str, witness: Witness) -> Iterator[tuple[str, Check]]:
+    """The functions of one state, with what they have to give for every state."""
+    for f in _one_state(name, text):
+        every = [c for c in witness.checks.get(f, ()) if c.arguments[0].ndim > 1]
+        framed = [c for c in every if c.keywords.get("frame")]
+        yield from ((f, check) for check in framed or every[:1])
+
+
+def _one_state(name: str, text: str) -> list[str]:
+    found = re.findall(rf"^(?:void|int32_t) {name}_(\w+)1\(", text, re.MULTILINE)
+    return list(dict.fromkeys(found))
+
+
+def _stored(f: str, shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of a result in its store: columns first, where it is stored so."""
+    return shape[::-1] if MODELS[f].by_columns else shape
 
 
 def _flat(a: Array) -> list[float]:

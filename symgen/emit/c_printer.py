@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from fractions import Fraction
 
 from symgen.derive.graph import CONST, COS, SIN, SYM, Node, Scalar, reachable
 from symgen.description.expression import FUNCTIONS
@@ -21,9 +22,9 @@ KEYWORDS = """auto break case char const continue default do double else enum ex
 if inline int long register restrict return short signed sizeof static struct switch typedef union
 unsigned void volatile while"""
 MACROS = """asm typeof errno linux unix NULL NAN INFINITY HUGE_VAL TILE KERNEL STREAM PORTABLE
-WIDTH"""
-OWN = """sin cos sqrt exp tanh pow sign above below load save constants flags m t start row tile
-U T S N size_t int32_t int64_t memcpy memset"""
+WIDTH REAL AT INLINE"""
+OWN = """sin cos sqrt exp tanh pow sign above below load save real lanes rate constants flags m t start row
+tile U T S N size_t int32_t int64_t memcpy memset"""
 RESERVED = frozenset(f"{KEYWORDS} {MACROS} {OWN}".split())
 HEADERS = re.compile(r"(M|FP|HUGE|MATH|U?INT\w*|SIZE|PTRDIFF|SIG|WCHAR|WINT)_\w+")
 """Macros of math.h and stdint.h."""
@@ -34,16 +35,22 @@ def is_word(name: str) -> bool:
     return name in RESERVED or bool(HEADERS.fullmatch(name))
 
 
+def number(c: Fraction) -> str:
+    """A constant in the type of the file."""
+    whole = c.denominator == 1 and abs(c) < 2**31
+    return str(c.numerator) if whole else f"(real){float(c)!r}"
+
+
 C = Language(
     {op: f.c for op, f in FUNCTIONS.items()},
     "above({})",
     "below({})",
-    "3.141592653589793",
-    one="1.0",
+    "(real)3.141592653589793",
+    one="1",
     square="{0}*{0}",
-    number=lambda c: repr(float(c)),
+    number=number,
     comment="//",
-    step="const double {} = {};",
+    step="const real {} = {};",
     entry="{} = {};",
     is_word=is_word,
 )

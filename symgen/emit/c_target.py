@@ -1,5 +1,8 @@
-"""What a C file says, as data: the kernels over a tile of samples, the rows of the stores they
-fill, the header.
+"""What a C file says, as data: bodies of one state or of a tile of samples, the rows of the stores
+they fill, the header.
+
+The body of a function stands once, over `lanes` samples side by side: its compiler makes it anew for
+one state and for a tile.
 
 Everything is computed here; the template only lays it out. Joints that only the closure equations
 tie have no C kernels: their Newton
@@ -10,13 +13,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from math import prod
 from typing import Any
 
 from symgen.derive.graph import Scalar
 from symgen.derive.model import Model
+from symgen.description.expression import Expression
 from symgen.description.naming import Namespace
+from symgen.description.robot import FIXED, PRISMATIC
 from symgen.emit.blocks import label
-from symgen.emit.c_printer import CText, is_word
+from symgen.emit.c_printer import C, CText, is_word
 from symgen.emit.header import header, line_of, packed, plain
 from symgen.emit.printers import Section, under_titles
 from symgen.emit.python_target import signature
@@ -27,16 +34,33 @@ from symgen.version import VERSION
 ABI = 2
 SCRATCH = 262144  # bytes of stack for the results of one tile
 FLAGS = (
-    "-std=c11 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
+    "-std=c99 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-shared -fPIC"
 )
-RESULTS = ("joints", "parameters", "energies", "wrench", "standard parameters")
+RESULTS = (
+    *("joints", "parameters", "energies", "wrench", "standard parameters"),
+    *("frames", "pose"),
+)
 """Axes of the models that have a kernel."""
 
 
 def render(spec: ModuleSpec, *, command: str | None = None) -> str:
     """The C file of `spec`. Same robot file, same version: same bytes."""
-    robot = spec.robot
+    return laid_out("kernels.c", _context(spec, command))
+
+
+def render_header(spec: ModuleSpec, *, command: str | None = None) -> str:
+    """The header of that file."""
+    context = _context(spec, command)
+    real = f"{spec.robot.name.upper()}_REAL"
+    declared = re.sub(r"\breal\b", real, laid_out("declared.h", context))
+    return laid_out("header.h", {**context, "declared": declared})
+
+
+@lru_cache(maxsize=1)
+def _context(spec: ModuleSpec, command: str | None) -> dict[str, Any]:
+    """What the file and its header say."""
+    robot, free = spec.robot, spec.regrouping.constants
     names = spec.names(is_word)
     kernels = [
         _kernel(spec, f, names.inner())
@@ -50,29 +74,70 @@ def render(spec: ModuleSpec, *, command: str | None = None) -> str:
         for section in (*kernel["sections"], Section("", kernel["before"]))
         for line in section.lines
     ]
-    return laid_out(
-        "kernels.c",
-        {
-            "title": _comment(robot.title or robot.name),
-            "file": _comment(robot.file or robot.name),
-            "sha256": robot.sha256,
-            "version": VERSION,
-            "command": _comment(command or robot.file or robot.name),
-            "header": [_comment(line) for line in _header(spec, kernels)],
-            "name": robot.name,
-            "abi": ABI,
-            "n": len(robot.joints),
-            "tile": 16
-            if 8 * 16 * most <= SCRATCH
-            else 8,  # the rows of a short tile stay in the first cache
-            "kernels": kernels,
-            "signals": _signals_layout(spec, spec.functions["regressor"].model),
-            "helpers": {
-                name: any(f"{name}(" in line for line in lines)
-                for name in ("sign", "above", "below")
-            },
+    return {
+        "title": _comment(robot.title or robot.name),
+        "file": _comment(robot.file or robot.name),
+        "sha256": robot.sha256,
+        "version": VERSION,
+        "command": _comment(command or robot.file or robot.name),
+        "header": [_comment(line) for line in _header(spec, kernels)],
+        "name": robot.name,
+        "abi": ABI,
+        "n": len(robot.joints),
+        "frames": len(robot.frames),
+        "sizes": {"b": len(spec.regrouping), "c": max(len(free), 1)},
+        "tile": 16
+        if 8 * 16 * most <= SCRATCH
+        else 8,  # the rows of a short tile stay in the first cache
+        "kernels": kernels,
+        "parameters": packed([f'"{name}"' for name in spec.regrouping.names]),
+        "constant_names": packed([f'"{name}"' for name in free] or ['""']),
+        "constants": packed([repr(float(x)) for x in free.values()] or ["0.0"]),
+        "signals": _signals_layout(spec, spec.functions["regressor"].model),
+        "helpers": {
+            name: any(f"{name}(" in line for line in lines) for name in ("sign", "above", "below")
         },
-    )
+        **_kinematics(spec, names.inner()),
+    }
+
+
+def _kinematics(spec: ModuleSpec, names: Namespace) -> dict[str, Any]:
+    """Tables and signatures of the Jacobian and of the forward dynamics."""
+    robot, closure, name = spec.robot, spec.derivation.closure, spec.robot.name
+    moved = [
+        (f.j, k, closure.row[f.j][i])
+        for f in robot.frames
+        if f.sigma != FIXED
+        for k, i in enumerate(closure.independent)
+        if closure.row[f.j].get(i)
+    ]
+    read = {symbol for _, _, rate in moved for symbol in rate.symbols}
+    free, n = [*spec.regrouping.constants], len(robot.joints)
+    pointers = [f"const real *{x}" for x in ("q", "qd", "tau", "X", "constants")]
+    return {
+        "ant": ", ".join(str(f.ant) for f in robot.frames),
+        "sigma": ", ".join(str(int(f.sigma == PRISMATIC)) for f in robot.frames),
+        "rate_constants": [
+            f"const real {names.of_file(c)} = constants[{k}];"
+            for k, c in enumerate(free)
+            if c in read
+        ],
+        "rates": [f"rate[{(j - 1) * n + k}] = {_constant(rate)};" for j, k, rate in moved],
+        "jacobian": signature(
+            f"int32_t {name}_jacobian1",
+            ["int32_t frame", "const real *q", "const real *constants", "real *J"],
+        ),
+        "forward": ""
+        if robot.loaded
+        else signature(f"int32_t {name}_forward_dynamics1", [*pointers, "real *qdd"]),
+    }
+
+
+def _constant(e: Expression) -> str:
+    """A constant expression as C; no quotient of integers."""
+    if e.constant is not None:
+        return repr(float(e.constant))
+    return re.sub(r"(?<![\w.])(\d+)(?![\w.])", r"\1.0", C.expression(e))
 
 
 def _comment(text: str) -> str:
@@ -105,10 +170,8 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         for k, e in enumerate(distinct.entries)
         for line in _result(result, k, text.expression(e.value), e.comment)
     )
-    width = f.shape[-1]
     rows = [
-        f"{{{sum(k * width for k in outer) + last}, {signal}, {sign}}}"
-        for (*outer, last), signal, sign in distinct.places
+        f"{{{_row(place, f.shape)}, {signal}, {sign}}}" for place, signal, sign in distinct.places
     ]
     independent = spec.derivation.closure.independent
     place = {
@@ -120,21 +183,21 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
     free = spec.regrouping.constants
     constants, parameters = (
         [
-            f"const double {names.of_file(c)} = {source.format(k)};"
+            f"const real {names.of_file(c)} = {source.format(k)};"
             for k, c in enumerate(every)
             if c in needed
         ]
         for source, every in (("constants[{}]", free), ("X[{}]", spec.regrouping.names))
     )
     fixed = [
-        f"const double {names.of_file(c)} = {x!r};"
+        f"const real {names.of_file(c)} = {x!r};"
         for c, x in robot.constants.items()
         if c in needed and c not in free
     ]
     trigonometry = list(text.trigonometry_of.items())
     angles = [_input(name, *place[name]) for name in place if name in text.trigonometry_inputs]
     calls = [
-        (call, f"T[{k}][t] = {call};".ljust(32) + f"/* {called} */")
+        (call, f"AT(T, {k}) = {call};".ljust(32) + f"/* {called} */")
         for k, (called, call) in enumerate(trigonometry)
     ]
     waves = [
@@ -142,7 +205,7 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
         for title, function in (("Cosines", "cos("), ("Sines", "sin("))
     ]
     inputs = [_input(name, *place[name]) for name in place if name in text.main_inputs]
-    recalled = [f"const double {called} = T[{k}][t];" for k, (called, _) in enumerate(trigonometry)]
+    recalled = [f"const real {called} = AT(T, {k});" for k, (called, _) in enumerate(trigonometry)]
     trigonometry_loops = tuple(
         Section(title, (*angles, *text.angles, *lines)) for title, lines in waves if lines
     )
@@ -167,15 +230,23 @@ def _kernel(spec: ModuleSpec, f: Function, names: Namespace) -> dict[str, Any]:
     return laid | _signatures(spec, f, laid, [name for name, lines in given.items() if lines])
 
 
+def _row(place: Sequence[int], shape: Sequence[int]) -> int:
+    """The place of an entry in C order."""
+    row = 0
+    for k, size in zip(place, shape, strict=True):
+        row = row * size + k
+    return row
+
+
 def _input(name: str, state: str, k: int) -> str:
-    return f"const double {name} = {state}[{k}][t];"
+    return f"const real {name} = AT({state}, {k});"
 
 
 def _result(result: str, k: int, expression: str, comment: str) -> list[str]:
     """An entry of a tile, its comment behind it, or before it where both are too long for a
     line.
     """
-    line = f"{result}[{k}][t] = {expression};"
+    line = f"AT({result}, {k}) = {expression};"
     both = f"{line:<64}  /* {comment} */" if comment else line
     return [both] if len(both) <= WIDTH - 8 or not comment else [f"/* {comment} */", line]
 
@@ -214,24 +285,44 @@ def _signatures(
     spec: ModuleSpec, f: Function, laid: Mapping[str, Any], needs: Sequence[str]
 ) -> dict[str, object]:
     """A kernel's C signatures; `needs` of X and constants."""
-    n, model = len(spec.robot.joints), f.model
-    used, filled = laid["used"], f"[{laid['computed']}][TILE]"
+    n, model, result = len(spec.robot.joints), f.model, laid["result"]
+    used, computed, calls = laid["used"], laid["computed"], laid["calls"]
     pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
-    tile = [
-        *(f"double {s}[restrict {n}][TILE]" for s in used),
-        *(f"const double *restrict {name}" for name in needs),
-        f"double {laid['result']}[restrict {laid['computed']}][TILE]",
-    ]
-    own = ["int64_t N", *(f"const double *{p}" for p in pointers), "double *S", "int32_t flags"]
+    scratch = ["T"] * bool(calls)
+    body = [f"const real *restrict {s}" for s in (*used, *needs)]
+    body += [f"real *restrict {s}" for s in (*scratch, result)]
+    given = [f"const real *{p}" for p in pointers]
+    own = ["int64_t N", *given, "real *S", "int32_t flags"]
     partly = "; only rows that are not constant" if model.by_columns else ""
     shape = ", ".join(map(str, f.shape))
+    size = prod(f.shape)
+    tile = ", ".join([*(f"{s}_tile" for s in used), *needs, *scratch, result])
+    rooms = {"T": calls, result: computed}
     return {
         "summary": f"/* {model.summary} S has shape ({shape}, N){partly}. */",
-        "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", tile),
-        "tile_arguments": ", ".join([*(f"{s}_tile" for s in used), *needs, laid["result"]]),
+        "one_summary": f"/* {model.summary} S has shape ({shape}). */",
+        "size": size,
+        "unread": [p for p in pointers if p not in (*used, *needs)],
+        "body_prototype": signature(
+            f"INLINE void {model.name}_body", ["const size_t lanes", *body]
+        ),
+        "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", body),
+        "tile_call": ", ".join(["TILE", *used, *needs, *scratch, result]),
+        "tile_arguments": tile,
+        "one_prototype": signature(f"void {spec.robot.name}_{model.name}1", [*given, "real *S"]),
+        "state_prototype": signature(
+            f"static void {model.name}_state",
+            [*(f"const real *{p}" for p in (*used, *needs)), "size_t rows", "real *S"],
+        ),
+        "state_call": f"{model.name}_state({', '.join([*used, *needs, '{}', 'S'])})",
+        "one_call": ", ".join(["1", *used, *needs, *scratch, result]),
+        "one_scratch": ", ".join(f"{x}[{rooms[x]}]" for x in (*scratch, result)),
         "prototype": signature(f"int32_t {spec.robot.name}_{model.name}", own),
         "scratch": ", ".join(
-            [*(f"{s}_tile[{n}][TILE]" for s in used), f"{laid['result']}{filled}"]
+            [
+                *(f"{s}_tile[{n}*TILE]" for s in used),
+                *(f"{x}[{rooms[x]}*TILE]" for x in (*scratch, result)),
+            ]
         ),
         "missing": _missing([*pointers, "S"]),
     }
@@ -244,13 +335,13 @@ def _missing(pointers: Sequence[str]) -> str:
 def _signals_layout(spec: ModuleSpec, regressor: Model) -> dict[str, object]:
     """The function that gives the distinct signals of the regressor, with its table of entries."""
     states = regressor.states
-    pointers = [f"const double *{s}" for s in states]
+    pointers = [f"const real *{s}" for s in states]
     own = [
         "int64_t m",
         *pointers,
         "int64_t stride",
-        "const double *constants",
-        "double *U",
+        "const real *constants",
+        "real *U",
         "int64_t ustride",
     ]
     return {

@@ -28,6 +28,7 @@ EMITTERS = {
     "casadi": _PYTHON,
     "xp": _PYTHON,
     "c": Emitter(C, c_target.render),
+    "h": Emitter(C, c_target.render_header),
 }
 
 
@@ -67,6 +68,7 @@ def generate_files(
     spec: ModuleSpec = (
         spec_of(robot, tuple(options)) if regrouping is None else module_spec(regrouping, options)
     )
+    targets = [*targets, *["h"] * ("c" in targets)]
     served = [name for name in targets if TARGETS[name].iterates or not spec.tied]
     file = {TARGETS[name].file.format(robot.name): name for name in served}
     return {path: EMITTERS[name].render(spec, command=command) for path, name in file.items()}

@@ -24,7 +24,7 @@ def _environment() -> Environment:
 def laid_out(template: str, context: Mapping[str, object]) -> str:
     """The text of `templates/<template>.jinja` with the values of `context`, in lines that fit."""
     text = _environment().get_template(f"{template}.jinja").render(context)
-    return "\n".join(_fitted(text.split("\n"), template.endswith(".c")))
+    return "\n".join(_fitted(text.split("\n"), template.endswith((".c", ".h"))))
 
 
 def _fitted(lines: Iterable[str], in_c: bool) -> Iterator[str]:

@@ -150,7 +150,7 @@ def signals(f: Function, entries: Sequence[Entry]) -> Signals:
     return Signals(tuple(distinct), tuple(places), constant)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModuleSpec:
     """The functions of a robot over its base parameters."""
 

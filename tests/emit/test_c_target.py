@@ -21,7 +21,7 @@ from symgen.description import load_robot, packaged_robots, parse_robot
 from symgen.emit.generate import generate_files
 
 FLAGS = [
-    "-std=c11",
+    "-std=c99",
     "-Wall",
     "-Wextra",
     "-pedantic",
@@ -243,7 +243,7 @@ def test_sanitizers(path: list[str], tmp_path: Path) -> None:
 def test_quantities_have_the_names_of_the_numpy_module() -> None:
     text = files("tx40")["tx40.c"]
     assert (
-        "const double W12 = -S2*QP1;" in text
+        "const real W12 = -S2*QP1;" in text
         and "/* Link 2 */" in text
         and "np." not in text
         and "**" not in text.split("*/", 1)[1]
