@@ -33,7 +33,7 @@ TERM = re.compile(r" [+-] [^+\-=()\[\],]+?(?= [+-] |;|\s*$|\s+[#/])")
 
 SAME = (  # changed lines that change no value, and why
     (
-        r"(double|int32_t) .*\w\[\d+\]\[(TILE|3|8)\]",
+        r"(real|int32_t) .*\w\[(\d+\*TILE\]|\d+\]\[(3|8)\])",
         "an array with room for more, or a parameter that is a pointer",
     ),
     (r"how (= -way|== (-2|3))|flags & \d", "the way of writing: through the caches, or past them"),
@@ -43,10 +43,9 @@ SAME = (  # changed lines that change no value, and why
     (r"reshape\(\d+, -2\)", "NumPy takes any negative size as the one that is left"),
     (r"np\.ndindex\(\d+, 3, 4\)", "the last row of a pose, which is not read there"),
     (
-        r"memset\(tile, (1,|0, [2-9] \+ sizeof tile\[0\])",
+        r"memset\(tile, (1,|0, \d+( \+ |\*)TILE( \+ |\*)sizeof)",
         "lanes of a tile beyond the samples, whose results are not kept",
     ),
-    (r"memset\(tile, 0, \d\*sizeof tile\[1\]\)", "every row of a tile has one size"),
     (
         r"beyond \? (9 - beyond|8 \+ beyond)",
         "samples at a time: 1 to 15, of the 16 or more of a tile",
@@ -75,7 +74,7 @@ WAYS = (
         "gravity of a SCARA is constant: the room of the call before may hold the same numbers",
     ),
     (
-        r"_tile\)\[TILE\] = \(double \(\*\)\[TILE\]\)\(q(d|dd)? - start\);",
+        r"_tile = q(d|dd)? - start;",
         "states are taken without a copy where there is one tile alone: start is 0",
     ),
     (r"steps = -int", "the way of Newton: mode and closure are checked behind it"),
@@ -124,7 +123,7 @@ def code_lines(text: str, c: bool) -> Iterator[tuple[str, int, str]]:
         ends = c and quoted  # the last line of a comment is none of code
         if c:
             quoted = ("/*" in line or quoted) and "*/" not in line
-            if (re.match(r"^[a-zK]", line) and (found := re.search(rf"({NAME})\(", line))) or (
+            if (re.match(r"^[a-zKI]", line) and (found := re.search(rf"({NAME})\(", line))) or (
                 found := re.search(rf"({NAME})\[\d+\]\[3\] = ", line)
             ):
                 inside = found[1]
@@ -204,7 +203,7 @@ def dropped_term(line: str, rng: random.Random) -> str:
 
 
 def dropped_row(line: str, rng: random.Random) -> str:
-    if re.match(r"\s+[A-Z]\w*\[[\d, ]+\](\[\w+\])* = ", line):
+    if re.match(r"\s+([A-Z]\w*\[[\d, ]+\]|AT\(\w+, \d+\)) = ", line):
         return re.match(r"\s*", line)[0] + (
             ";" if line.rstrip().endswith(";") or ";  " in line else "pass"
         )
@@ -232,7 +231,7 @@ KINDS: tuple[Callable[[str, random.Random], str], ...] = (
 def faults(count: int, seed: int) -> list[Fault]:
     """Random faults, texts, functions and kinds alike."""
     rng, found = random.Random(seed), []
-    places = [(name, file) for name in ROBOTS for file in texts(name)[1]]
+    places = [(name, file) for name in ROBOTS for file in texts(name)[1] if not file.endswith(".h")]
     while len(found) < count:
         name, file = places[len(found) % len(places)]
         target, text = texts(name)[1][file]
@@ -303,10 +302,10 @@ def equivalent(fault: Fault) -> str:
 def parts(line: str, c: bool) -> tuple[str, str]:
     """What is assigned, and the expression."""
     line = re.sub(r"(#|/\*).*", "", line).strip().rstrip(";")
-    left, _, right = line.removeprefix("const double ").partition(" = ")
-    return re.sub(r"^\w+\[[\w, ]+\](\[t\])?$", "entry", left), right.replace("np.", "").replace(
-        "ca.", ""
-    )
+    left, _, right = line.removeprefix("const real ").partition(" = ")
+    return re.sub(r"^(\w+\[[\w, ]+\]|AT\(\w+, \d+\))$", "entry", left), right.replace(
+        "np.", ""
+    ).replace("ca.", "")
 
 
 def main() -> None:
