@@ -1,16 +1,12 @@
 """Do several records of one robot give the same parameters?
 
-Each record k is fitted alone, as `identify` fits it, with the same b columns: X_k with corrected
+Each record k is fitted alone, as `identify` fits it, with the same b columns: X_k and its
 deviations s_k. It is compared with the mean of the others, weighted by their deviations,
 
     X_-k = s_-k^2 sum X_m/s_m^2,     s_-k^-2 = sum 1/s_m^2,     d = (X_k - X_-k)/sqrt(s_k^2 + s_-k^2)
 
-Corrected deviations take residuals as independent from block to block. Where these remember for
-m = 2 tau seconds, exp(-t/tau), and blocks last L, the variance is larger by
-
-    c = 1/(1 - (tau/L) (1 - exp(-L/tau)))
-
-s_k^2 is the corrected one times c, m that of the middle joint. A parameter differs where |d| exceeds
+s_k is the corrected deviation, wider by the root of c where residuals remember for longer than a block
+(`runtime.core.residuals.unseen_by_blocks`). A parameter differs where |d| exceeds
 LIMIT.DIFFERS. That is a word, no test (benchmarks/truth.md). Differences up to
 LIMIT.RELEVANT_DIFFERENCE of the value do not change the verdict.
 
@@ -34,12 +30,11 @@ from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel
 from runtime.core.part import Part
 from runtime.core.provenance import record_names
-from runtime.core.residuals import whiteness
+from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.study import EstimateSettings
 from runtime.core.table import Table
-from runtime.core.validation import JointComparison
 
 Array = np.ndarray
 
@@ -224,7 +219,8 @@ def homogeneity(
                 f"{lost or 'the parameters and their deviations'}"
             )
             continue
-        fits[record] = fit, deviations(part, fit)
+        wider = np.sqrt(unseen_by_blocks(part, fit))
+        fits[record] = fit, wider * fit.sigma_corrected
     found = [
         d
         for record in list(fits)[len(fits) == 2 :]  # of two, the second against the first
@@ -233,18 +229,6 @@ def homogeneity(
     ]
     found.sort(key=lambda d: -abs(d.z))
     return Homogeneity(tuple(fits), tuple(names), tuple(found), tuple(untested))
-
-
-def deviations(part: Observation, fit: Estimate) -> Array:
-    """s_k of the parameters of one record, shape (b,), SI."""
-    predicted = part.columns(fit.names).W @ fit.X
-    joints = [
-        JointComparison(str(j), part.t[rows], part.Y[rows], predicted[rows])
-        for j, rows in enumerate(map(part.joint, range(part.n)))
-    ]
-    remembered = [one.rows / one.effective_rows for one in whiteness(joints, part.rate)]
-    memory = float(np.median(remembered)) / part.rate / (2 * part.residual_block)  # tau/L
-    return np.asarray(fit.sigma_corrected / np.sqrt(1 + memory * np.expm1(-1 / memory)))
 
 
 def _apart(record: str, fits: Mapping[str, tuple[Estimate, Array]]) -> list[Disagreement]:

@@ -6,13 +6,15 @@ own range.
     D       regressor in states of a reference motion: sines of every joint over a part of the range
             and at a part of the speed of the robot file, or of the record where it has none
     C       covariance of least squares with joints weighted by their residuals, wider by the median
-            of corrected over stated deviations
+            of corrected over stated deviations, and by what blocks do not see of slow residuals
     V       the same, knowing the values of the robot file to LIMIT.VALUES_KNOWN where the fit
             does: (K'C^-1 K + S^-1)^-1 over the standard parameters, X = K chi, S diagonal; their
             estimate is chi_V
     a       share of the accelerations that is an error of the encoder's steps
+    D_0     D without accelerations
 
-    expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2 + (a/(1 + a))^2
+    expected^2 = tr(D K V K'D')/||D X||^2 + ||D (X - K chi_V)||^2/||D X||^2
+                 + (a/(1 + a))^2 ||(D - D_0) X||^2/||D X||^2
 
 The first part is what the record leaves open, the second how far the fit is from what record and
 values say together, the third how much too small the steps make inertias (the record's own lattice:
@@ -44,6 +46,7 @@ from runtime.core.least_squares.method import linear_companion, linear_system
 from runtime.core.limits import LIMIT
 from runtime.core.model import GeneratedModel, channels_of, joint_units
 from runtime.core.part import Part
+from runtime.core.residuals import unseen_by_blocks
 from runtime.core.result import Identification
 from runtime.core.rows.observation import Observation
 from runtime.core.rows.prepared import Prepared
@@ -78,7 +81,11 @@ def expected_off(likely: Expected) -> Answer | None:
     return Answer(
         "good" if likely.high <= limit else "no" if likely.low > limit else "doubtful",
         f"{likely.error:.2g} % of the torques are expected to be off"
-        + (f", {likely.low:.2g} to {likely.high:.2g} % likely," if likely.low < likely.high else "")
+        + (
+            f", {likely.low:.2g} to {likely.high:.2g} % likely if the model is right,"
+            if likely.low < likely.high
+            else ""
+        )
         + f" in {likely.motions}",
     )
 
@@ -152,7 +159,8 @@ def expected_error(
     if states is None or channels_of(model):
         return Expected(*3 * (float("nan"),))
     try:
-        D = np.asarray(model.regressor(*states))
+        q, qd, qdd = states
+        D, still = (np.asarray(model.regressor(q, qd, x)) for x in (qdd, np.zeros_like(qdd)))
     except ValueError:  # a loop that does not close
         return Expected(*3 * (float("nan"),))
     linear = linear_companion(settings)
@@ -160,11 +168,13 @@ def expected_error(
         linear = EstimateSettings("wls", "joint", linear.columns)
     system = linear_system(observation, linear)
     least_squares = assemble(system, system.solve())
-    D = D[:, :, [model.BASE_PARAMETERS.index(name) for name in least_squares.names]]
+    columns = [model.BASE_PARAMETERS.index(name) for name in least_squares.names]
+    D, still = D[:, :, columns], still[:, :, columns]
     X = np.array(
         [dict(zip(fit.names, fit.X, strict=True)).get(name, 0.0) for name in least_squares.names]
     )
     wider = max(1.0, float(np.median(least_squares.sigma_corrected / least_squares.sigma))) ** 2
+    wider *= unseen_by_blocks(observation, least_squares)
     V = wider * least_squares.covariance
     near = least_squares.X
     if dict(fit.details.get("options", {})).get("prior", "none") != "none":
@@ -172,15 +182,16 @@ def expected_error(
         K, rows = physical.rows(least_squares.names), system.weighted
         variance = wider * (1.0 if system.known_variance else least_squares.sigma_rho**2)
         near, V = with_values(physical, K, rows.R11 / variance**0.5, rows.r12 / variance**0.5)
-        D, X = D @ K, np.linalg.lstsq(K, X, rcond=None)[0]
+        D, still, X = D @ K, still @ K, np.linalg.lstsq(K, X, rcond=None)[0]
     A = D.reshape(-1, len(X))
     size = np.linalg.norm(A @ X)
+    inertial = np.linalg.norm(A @ X - still.reshape(-1, len(X)) @ X) / size
     M = A.T @ A @ V
     spread = max(np.trace(M), 0.0)
     nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
-    errors = 100 * np.sqrt(open_part * times + (steps / (1 + steps)) ** 2)
+    errors = 100 * np.sqrt(open_part * times + (inertial * steps / (1 + steps)) ** 2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)

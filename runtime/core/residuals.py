@@ -24,7 +24,9 @@ from scipy.signal import welch
 from scipy.special import chdtrc
 from scipy.stats import f as fisher
 
+from runtime.core.least_squares.estimate import Estimate
 from runtime.core.limits import LIMIT
+from runtime.core.rows.observation import Observation
 from runtime.core.validation import JointComparison
 
 Array = np.ndarray
@@ -143,6 +145,24 @@ def correlation_time(rho: Array) -> float:
 def effective_share(joints: Sequence[Whiteness]) -> float:
     """Rows that count over rows, all joints together, at most 1."""
     return min(1.0, sum(w.effective_rows for w in joints) / max(sum(w.rows for w in joints), 1))
+
+
+def unseen_by_blocks(observation: Observation, fit: Estimate) -> float:
+    """Variance of a parameter over the corrected one, which takes blocks of L seconds as independent.
+
+    c = 1/(1 - (tau/L) (1 - exp(-L/tau))) for residuals that forget by exp(-t/tau) and remember for
+    m = 2 tau, that of the middle joint.
+    """
+    predicted = observation.columns(fit.names).W @ fit.X
+    joints = [
+        JointComparison(str(j), observation.t[rows], observation.Y[rows], predicted[rows])
+        for j, rows in enumerate(map(observation.joint, range(observation.n)))
+    ]
+    memory = [one.rows / one.effective_rows for one in whiteness(joints, observation.rate)]
+    ratio = float(np.median(memory)) / observation.rate / (2 * observation.residual_block)
+    if not (np.isfinite(ratio) and ratio > 0):  # no residuals
+        return 1.0
+    return float(1 / (1 + ratio * np.expm1(-1 / ratio)))
 
 
 def _lagged(x: Array, place: Array, starts: Array) -> tuple[Array, Array]:
