@@ -23,8 +23,8 @@ the residuals of C.
 
 The square of the error that one record makes is a sum of b squares, of which a few weigh most:
 with M = K'D'D K V it scatters as chi^2/nu with nu = tr(M)^2/tr(M^2) degrees of freedom. The
-interval of the expected error has the first two parts times quantiles of that. Where one direction
-is open, nu is 1: 30 % expected may be 2 %.
+interval of the expected error has the first two parts times quantiles of that, and the third times
+LIMIT.STEPS_MOVE. Where one direction is open, nu is 1: 30 % expected may be 2 %.
 
 Reference: Satterthwaite (1946) for nu.
 """
@@ -191,7 +191,8 @@ def expected_error(
     nu = max(np.trace(M) ** 2 / np.sum(M * M.T), 1.0)
     open_part = (spread + np.sum((A @ (X - near)) ** 2)) / size**2
     times = np.array([1.0, *(chi2.ppf(p, nu) / nu for p in LIMIT.EXPECTED_INTERVAL)])
-    errors = 100 * np.sqrt(open_part * times + (inertial * steps / (1 + steps)) ** 2)
+    part = np.array([1.0, *LIMIT.STEPS_MOVE]) * inertial * steps / (1 + steps)
+    errors = 100 * np.sqrt(open_part * times + part**2)
     motions = (
         "motions over limits.q of the robot file at up to half of limits.qd"
         if limits_of(model)
