@@ -65,21 +65,21 @@ def reported_errors() -> Iterator[None]:
 def _noted_angles() -> Iterator[None]:
     import warnings
 
-    from symgen.description.angles import AngleWarning
+    from symgen.description.angles import RobotFileWarning
 
     with warnings.catch_warnings():
         show = warnings.showwarning
         told: set[str] = set()  # a verb may read its robot twice
 
         def note(message: Warning | str, category: type[Warning], *place: Any) -> None:
-            if not issubclass(category, AngleWarning):
+            if not issubclass(category, RobotFileWarning):
                 show(message, category, *place)
             elif str(message) not in told:
                 told.add(str(message))
                 typer.echo(f"note: {message}", err=True)
 
         warnings.showwarning = note  # type: ignore[assignment]
-        warnings.simplefilter("always", AngleWarning)
+        warnings.simplefilter("always", RobotFileWarning)
         yield
 
 

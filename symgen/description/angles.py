@@ -14,7 +14,11 @@ SNAPPED = "snapped:"  # how the note on them starts
 ALL_DIGITS = 1e-12  # rad: closer to a multiple of pi/12 is that multiple in every digit
 
 
-class AngleWarning(UserWarning):
+class RobotFileWarning(UserWarning):
+    """What a foreign robot file says that its author probably did not mean."""
+
+
+class AngleWarning(RobotFileWarning):
     """Angles of a file were taken as multiples of pi/12; `exact=True` takes them as written."""
 
 

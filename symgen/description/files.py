@@ -20,6 +20,12 @@ WRITTEN = (".yaml", ".yml", ".urdf")  # suffixes of the formats that are written
 MAX_BYTES = 10_000_000  # no format reads more; each has a limit of its own below
 
 
+UNREAD = {
+    ".xacro": "xacro is a template; expand it first: xacro FILE -o arm.urdf",
+    ".sdf": "SDF is not read; convert it to a URDF or an MJCF",
+}
+
+
 def packaged_robots() -> tuple[str, ...]:
     """Names that `load_robot` knows without a path."""
     folder = resources.files("symgen.description") / "robots"
@@ -109,6 +115,8 @@ def read_robot(
             (resources.files("symgen.description") / "robots" / file).read_bytes(), file
         ), ()
     path = Path(source)
+    if suffix in UNREAD:
+        raise DescriptionError(f"{path.name}: {UNREAD[suffix]}")
     content = content_of(path)
     if suffix == ".par":
         return read_par(content, path.name, constants, exact=exact)

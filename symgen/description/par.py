@@ -226,6 +226,7 @@ def _expression(text: str, line: int) -> Expression:
     functions.
     """
     text = re.sub(r"\b(Pi|PI|Sin|Cos|Tan|Sqrt)\b", lambda word: word.group().lower(), text)
+    text = re.sub(r"\b(theta|th|t|q)\((\d+)\)", r"\1\2", text)
     try:
         return parse(text.replace("^", "**").replace("[", "(").replace("]", ")"))
     except ExpressionError as error:

@@ -9,12 +9,13 @@ entities (`xml_text` reads neither). Every error names its line.
 from __future__ import annotations
 
 import sys
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
-from symgen.description.angles import Angles
+from symgen.description.angles import Angles, RobotFileWarning
 from symgen.description.expression import Expression, ratio
 from symgen.description.tree import (
     DROPPED,
@@ -37,6 +38,13 @@ READ = {
     "link": {"inertial"},
     "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic"},
 }
+
+
+ROUNDING = 1e-6  # of moments that a file rounds
+
+
+class InertiaWarning(RobotFileWarning):
+    """A link of a URDF has an inertia that no body can have."""
 
 
 def parse_urdf(content: bytes, file: str, *, exact: bool = False) -> Tree:
@@ -160,7 +168,38 @@ def _inertial(link: XmlElement, angles: Angles) -> Inertial | None:
     if inertia is None:  # a point mass: programs that read URDF say so and go on
         return Inertial(M, pose, np.zeros((3, 3)))
     xx, xy, xz, yy, yz, zz = (inertia.number(name) for name in MOMENTS)
-    return Inertial(M, pose, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if wrong := no_body(M, tensor):
+        warnings.warn(
+            f"link {link.word('name')!a:.60} (line {inertia.line}): {wrong}; it enters the base parameters "
+            "of this link and of those before it. Give the moments about the centre of mass, kg m^2, of CAD "
+            "or of a box, or identify them",
+            InertiaWarning,
+            stacklevel=2,
+        )
+    return Inertial(M, pose, tensor)
+
+
+def no_body(M: float, tensor: Array) -> str:
+    """Why no body has this mass and this tensor about its centre of mass; "" where one has."""
+    if not M and tensor.any():
+        return "mass 0 with an inertia"
+    small, middle, large = np.linalg.eigvalsh(tensor)
+    if small >= -ROUNDING * abs(large) and large <= (1 + ROUNDING) * (small + middle):
+        return ""
+    names = ("ixx", "iyy", "izz")
+    for k, name in enumerate(names):
+        others = [other for other in names if other != name]
+        rest = np.trace(tensor) - tensor[k, k]
+        if tensor[k, k] > (1 + ROUNDING) * rest:
+            return (
+                f"no body has this inertia about its centre of mass: {name} {tensor[k, k]:g} > "
+                f"{' + '.join(others)} {rest:g}"
+            )
+    return (
+        "no body has this inertia about its centre of mass: principal moments "
+        f"{small:.3g}, {middle:.3g}, {large:.3g}"
+    )
 
 
 def _joint(e: XmlElement, angles: Angles) -> Joint:
