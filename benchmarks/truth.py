@@ -3,10 +3,10 @@ known bodies by simulators of another make (`benchmarks/truth_simulator.py`).
 
     python benchmarks/truth.py --question coverage --records 60 --seeds first --workers 1
 
-prints one table as Markdown and writes truth_NAME_SEEDS.json. Record k of a question always has the
+prints one table as Markdown and writes truth_NAME_SEEDS.json every half minute; --more goes on from it. Record k of a question always has the
 seed BASE[seeds] + k, whatever the number of records: `first` is for tuning; `second`,
 `third` and `fourth` have other robots each and are run once, at the end of the work of their time; `final` has all
-of them, and was run once for docs/reliability.md. The code that is judged is called by its public interface alone.
+of them; `classes` was run once on it for docs/reliability.md (truth_classes_final.json). The code that is judged is called by its public interface alone.
 
     coverage       intervals of the sets of parameters against the truth; their errors on unseen motion
     ends           records without noise: what the ends of the filters leave
@@ -742,7 +742,8 @@ def main() -> None:
         head = {"question": question, "seeds": given.seeds, "base": BASE[given.seeds]}
 
         def saved(rows: list[Row], file: Path = file, head: Row = head) -> None:
-            file.write_text(json.dumps(head | {"rows": rows}, indent=1, default=float))
+            lines = ",\n".join(json.dumps(row, default=float) for row in rows)
+            file.write_text(f'{json.dumps(head)[:-1]}, "rows": [\n{lines}\n]}}\n')
 
         before = json.loads(file.read_text())["rows"] if given.more and file.exists() else []
         records = given.records or QUESTIONS[question][2]

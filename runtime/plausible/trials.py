@@ -553,6 +553,9 @@ def decisive(
         if before - baseline.unseen(trial.cause) > np.log(len(trials))
         and (other is None or helps(trial, baseline, other))
     ]
+    if named:  # of those that gain the same, a sign changes least
+        same = LIMIT.GAIN_SAME * named[0].gain
+        named.sort(key=lambda trial: trial.gain < same or trial.cause.kind != "sign")
     if not named or named[0].fit is None or (given.errors - named[0].fit.errors > 0.2).any():
         return named
     least = (1 - LIMIT.GAIN_ALIKE) * named[0].gain

@@ -95,11 +95,17 @@ def parameter_section(result: Identification) -> Section:
         "The value to use stands first. σ is eq. (10), which takes residuals as independent; "
         "filtered ones are not, and the corrected deviation takes blocks of time as independent "
         "instead: quote it. Two of them hold the truth about 95 times in 100 or more while the "
-        "model is right and the residuals do not remember for longer than two blocks; not so "
-        "where parameters were removed. %σ is 100 σ/|value|, eq. (11).",
+        "model is right and the residuals do not remember for longer than two blocks. "
+        "%σ is 100 σ/|value|, eq. (11).",
         "The role is an aid to reading: essential parameters explain the record nearly as well "
-        "alone, the others are numbered in the order in which they go. One without a value was "
-        "removed, as if it were zero; the deviations of the others do not know of that. Beside "
+        "alone, the others are numbered in the order in which they go. "
+        + (
+            "One without a value was removed, as if it were zero; the deviations of the others do "
+            "not know of that and hold the truth less often. "
+            if len(fit.names) < len(estimate.names)
+            else ""
+        )
+        + "Beside "
         "stands the fit of all parameters together. Ratio: of σρ, eq. (9), without it to its "
         "first value.",
     ]

@@ -239,7 +239,7 @@ def test_corpus(path, tmp_path):
             command = ("convert", "emps", "out.urdf", "--estimate", file)
         case _:
             command = ("identify", "model.py", file)
-    if FORMATS[path.parent.name].foreign:  # a library may end the process: docs/reliability.md
+    if FORMATS[path.parent.name].foreign:  # a library may end the process: docs/many_runs.md
         ended = symgen(*map(str, command))
         code, said = ended.returncode, ended.stderr.decode()
         if code < 0:

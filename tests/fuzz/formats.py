@@ -16,7 +16,7 @@ class Format:
     """ending : of the file.   make : a case of a random generator.   read : the bytes, as the file called `case.ENDING` in an empty folder.
 
     share : of the cases of all formats.   named : texts of which an error holds one: the file, as the user knows it.
-    foreign : whether a compiled library reads it: that it hangs or dies on damage is nothing that Python could turn into a message (docs/reliability.md).
+    foreign : whether a compiled library reads it: that it hangs or dies on damage is nothing that Python could turn into a message (docs/many_runs.md).
     """
 
     ending: str
