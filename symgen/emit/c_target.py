@@ -37,6 +37,7 @@ FLAGS = (
     "-std=c99 -O2 -ftree-vectorize -fno-math-errno -fno-trapping-math -ffp-contract=off "
     "-shared -fPIC"
 )
+LONGEST = 1000  # lines of a body that compilers take several times; a longer one is compiled once
 RESULTS = (
     *("joints", "parameters", "energies", "wrench", "standard parameters"),
     *("frames", "pose"),
@@ -288,6 +289,8 @@ def _signatures(
     n, model, result = len(spec.robot.joints), f.model, laid["result"]
     used, computed, calls = laid["used"], laid["computed"], laid["calls"]
     pointers = [*model.states, *(["X"] if model.reads_X else []), "constants"]
+    long = sum(len(section.lines) for section in laid["sections"]) > LONGEST
+    inline, kernel = ("static", "static") if long else ("INLINE", "KERNEL static")
     scratch = ["T"] * bool(calls)
     body = [f"const real *restrict {s}" for s in (*used, *needs)]
     body += [f"real *restrict {s}" for s in (*scratch, result)]
@@ -304,9 +307,9 @@ def _signatures(
         "size": size,
         "unread": [p for p in pointers if p not in (*used, *needs)],
         "body_prototype": signature(
-            f"INLINE void {model.name}_body", ["const size_t lanes", *body]
+            f"{inline} void {model.name}_body", ["const size_t lanes", *body]
         ),
-        "tile_prototype": signature(f"KERNEL static void {model.name}_lanes", body),
+        "tile_prototype": signature(f"{kernel} void {model.name}_lanes", body),
         "tile_call": ", ".join(["TILE", *used, *needs, *scratch, result]),
         "tile_arguments": tile,
         "one_prototype": signature(f"void {spec.robot.name}_{model.name}1", [*given, "real *S"]),

@@ -342,3 +342,13 @@ def test_streamed_rows_at_every_place_in_a_cache_line(tmp_path: Path, shift: int
             assert np.isnan(memory[:start]).all() and np.isnan(memory[start + b * n * N :]).all()
             results.append(rows)
         assert np.array_equal(*results, equal_nan=True) and np.isfinite(results[0]).any(), N
+
+
+@needs_compiler
+def test_long_bodies_are_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many joints: one body for one state and for a tile; the same numbers."""
+    monkeypatch.setattr("symgen.emit.c_target.LONGEST", 0)
+    text = generate_files(load_robot("scara"), targets=("c",), command="scara")["scara.c"]
+    assert "INLINE void" not in text and "KERNEL static void" not in text
+    library = ctypes.CDLL(str(compiled(tmp_path, text, COMPILERS[0], SOON)))
+    compare(library, numpy_module("scara", files("scara")["scara.py"]), (0, 1, 33))
