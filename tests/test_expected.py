@@ -72,3 +72,15 @@ def test_values_hold_what_the_record_leaves_open(arm):
     np.testing.assert_allclose(chi[inertial], np.array(values)[inertial], atol=1e-6)
     mass = physical.link(physical.links[-1])[-1]
     assert V[mass, mass] == pytest.approx((0.3 * values[mass]) ** 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("counts", "state", "named"),
+    [(500, "doubtful", "0.0126"), (2000, "doubtful", "0.00314"), (200_000, "open", "3.14e-05")],
+)
+def test_steps_that_positions_show_are_named(arm, counts, state, named):
+    study = study_from_mapping({"signals": {"lowpass": {"cutoff": 50}}})
+    result = runtime.identify(arm, record(arm, (1, 1), 2 * np.pi / counts), study)
+    asked = "Does the encoder resolve enough?"
+    check = next(c for c in result.checklist.checks if c.question == asked)
+    assert check.state == state and f"in steps of {named} (joint side)" in check.finding

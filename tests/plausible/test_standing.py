@@ -66,6 +66,8 @@ def test_standing_joints_are_the_first_doubt(arm, moving) -> None:
     assert ", ".join(others) in first.finding and "not move (1e-05 " in first.finding
     assert all(f"--lock q{j}=0.2" in first.remedy for j in others)
     assert not found.named_causes
+    result = runtime.identify(arm, record, plausible=True)
+    assert result.brief().startswith(first.finding) and "with --lock" in first.finding
 
 
 def test_a_joint_without_a_motor_is_judged_by_the_others() -> None:
