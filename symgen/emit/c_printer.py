@@ -88,13 +88,8 @@ class CText(Text):
         return super()._has_line(node) or (node.op in (COS, SIN) and not node.fixed)
 
     def sections_of(self, nodes: Collection[int]) -> tuple[Section, ...]:
-        lines = [
-            n
-            for n in self.nodes
-            if n.index in self.named & self._main & {*nodes}
-            and not n.fixed
-            and n.op not in (COS, SIN)
-        ]
+        own = self.named & self._main & {*nodes}
+        lines = [n for n in self.nodes if n.index in own and not n.fixed and n.op not in (COS, SIN)]
         return under_titles(
             ("Angles" if n.index in self._under else self._title(n), self._line(n)) for n in lines
         )
