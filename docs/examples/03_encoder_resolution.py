@@ -2,6 +2,7 @@
 encoder be?
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import runtime
@@ -27,3 +28,15 @@ print(runtime.cestac(model, record, study).to_table())
 everyone = runtime.advise(model, record, study, encoders=["all"], confirm=False).encoders[0]
 for limit in everyone.limits:
     print(f"{limit.percent:g} % is reached by {limit.parameter} at steps of {limit.delta:.2g} rad")
+
+deltas = np.geomspace(1e-4, 3e-2, 7)
+study = runtime.Study(
+    signals={"lowpass": {"cutoff": 20}, "median": 1}, cestac={"delta": list(deltas), "runs": 10}
+)
+levels = runtime.cestac(model, record, study).levels
+plt.loglog(deltas, [level.e.max() for level in levels], "o-")
+plt.axhline(1, ls=":")
+plt.axhline(5, ls="--")
+plt.xlabel("encoder step, rad")
+plt.ylabel("largest %e")
+plt.savefig("encoder_resolution.png")

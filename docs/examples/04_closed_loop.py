@@ -2,6 +2,7 @@
 has no such relation.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import symgen
@@ -14,3 +15,11 @@ for name in ("sr400", "four_bar"):
     print(f"  actuated {model.JOINTS}, passive {model.PASSIVE}; positions of the passive ones:")
     for active, passive in zip(q, model.passive_joints(q), strict=True):
         print("  ", active.round(3), "->", passive.round(4))
+
+bars = symgen.model("four_bar")
+crank = np.linspace(0.7, 1.3, 61)[:, None]
+plt.plot(crank, bars.passive_joints(crank), label=[f"q{j}" for j in bars.PASSIVE])
+plt.xlabel("q1 of the crank, rad")
+plt.ylabel("passive joints, rad")
+plt.legend()
+plt.savefig("closed_loop.png")

@@ -34,7 +34,7 @@ VERBS = {
 }
 
 WENT = {
-    "fleet": "symgen fleet went; docs/examples/09_fleet.py is a loop over files on several cores or a cluster",
+    "fleet": "symgen fleet went; docs/examples/dask_many_robots.py is a loop over files on several cores or a cluster",
 }
 """Verbs of earlier versions, with the sentence that names what to use instead."""
 

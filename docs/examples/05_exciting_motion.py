@@ -2,6 +2,8 @@
 file stand for those not yet identified.
 """
 
+import matplotlib.pyplot as plt
+
 import runtime
 import symgen
 
@@ -12,3 +14,8 @@ result = runtime.excite(model, study=study)
 print(result)
 t, q, qd, qdd, tau = result.sampled()
 print(f"{len(t)} samples, largest torques {abs(tau).max(axis=0).round(1)} N m")
+
+plt.plot(t, q)
+plt.xlabel("time, s")
+plt.ylabel("joint positions, rad")
+plt.savefig("exciting_motion.png")
