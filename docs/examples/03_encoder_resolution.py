@@ -34,6 +34,7 @@ study = runtime.Study(
     signals={"lowpass": {"cutoff": 20}, "median": 1}, cestac={"delta": list(deltas), "runs": 10}
 )
 levels = runtime.cestac(model, record, study).levels
+plt.figure()
 plt.loglog(deltas, [level.e.max() for level in levels], "o-")
 plt.axhline(1, ls=":")
 plt.axhline(5, ls="--")

@@ -18,6 +18,7 @@ for name in ("sr400", "four_bar"):
 
 bars = symgen.model("four_bar")
 crank = np.linspace(0.7, 1.3, 61)[:, None]
+plt.figure()
 plt.plot(crank, bars.passive_joints(crank), label=[f"q{j}" for j in bars.PASSIVE])
 plt.xlabel("q1 of the crank, rad")
 plt.ylabel("passive joints, rad")

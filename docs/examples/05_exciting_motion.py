@@ -15,6 +15,7 @@ print(result)
 t, q, qd, qdd, tau = result.sampled()
 print(f"{len(t)} samples, largest torques {abs(tau).max(axis=0).round(1)} N m")
 
+plt.figure()
 plt.plot(t, q)
 plt.xlabel("time, s")
 plt.ylabel("joint positions, rad")
