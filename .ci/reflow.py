@@ -53,11 +53,10 @@ def texts(tree: ast.AST, source: list[str]) -> Iterator[list[Line]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             first = node.body[0] if node.body else None
-            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-                if isinstance(first.value.value, str):
-                    rows = range(first.lineno, (first.end_lineno or first.lineno) + 1)
-                    quotes = re.compile(r'^(\s*)[rRuU]*"""|"""\s*$')
-                    yield [(k, quotes.sub(r"\1", source[k - 1])) for k in rows]
+            if first is not None and ast.get_docstring(node, clean=False) is not None:
+                rows = range(first.lineno, (first.end_lineno or first.lineno) + 1)
+                quotes = re.compile(r'^(\s*)[rRuU]*"""|"""\s*$')
+                yield [(k, quotes.sub(r"\1", source[k - 1])) for k in rows]
     block: list[Line] = []
     for k, text in enumerate([*source, ""], 1):
         if comment := re.match(r"(\s*)#+ ?(?!!)(.*)$", text):
