@@ -8,10 +8,14 @@
     result.estimate, result.checklist
     runtime.report(result, "out")                   # the page and the files of `symgen identify -o`
 
-Names are loaded when they are first used, so that `import runtime` is light. NumPy and SciPy serve
-every function but `simulate`, `excite` and
-the estimators that simulate the closed loop (CasADi), the estimator of feasible parameters
-(Clarabel) and `report` (Matplotlib, Jinja2).
+Names are loaded when they are first used, so that `import runtime` is light. NumPy, SciPy and
+pydantic serve Record, resample, observe, estimate, essential and cestac. Other packages are loaded
+where they are used:
+
+    ruamel.yaml           study files                     clarabel   identify, method feasible
+    casadi                simulate, excite, iv, didim     pint       units that no table holds
+    matplotlib, jinja2    report                          pooch      datasets
+    threadpoolctl         one BLAS thread, which is faster
 """
 
 from importlib import import_module

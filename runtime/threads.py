@@ -28,8 +28,10 @@ def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
-        from threadpoolctl import threadpool_limits
-
+        try:
+            from threadpoolctl import threadpool_limits
+        except ModuleNotFoundError:  # slower, and the last bits are those of so many threads
+            return function(*args, **kwargs)
         with threadpool_limits(1, user_api="blas"):
             return function(*args, **kwargs)
 

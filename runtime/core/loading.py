@@ -40,16 +40,32 @@ def cache_folder(of: str) -> Path:
     return base / "symgen" / of
 
 
-def is_writable_by_all(folder: Path) -> bool:
-    """Whether anyone may write to the folder: what lies there proves nothing."""
-    return os.name == "posix" and bool(folder.stat().st_mode & 0o002)
+def is_writable_by_others(folder: Path) -> bool:
+    """Whether somebody else may put files into the folder, or another folder in its place: what
+    lies there proves nothing.
+    """
+    if os.name != "posix":
+        return False
+    for place in (folder, *folder.absolute().parents):
+        if not place.exists():
+            continue
+        found = place.stat()
+        others = found.st_mode & 0o002 or (
+            found.st_mode & 0o020 and found.st_gid not in (0, os.getgid())
+        )
+        sticky = place != folder and found.st_mode & 0o1000  # names there belong to their makers
+        if (others and not sticky) or found.st_uid not in (0, os.getuid()):
+            return True
+    return False
 
 
 def is_emitted(text: bytes) -> bool:
     """Whether this installation has emitted and certified the text."""
     try:
         folder = cache_folder("modules")
-        return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_all(folder)
+        return (folder / sha256(text).hexdigest()[:KEY]).is_dir() and not is_writable_by_others(
+            folder
+        )
     except (OSError, RuntimeError):  # no home folder
         return False
 

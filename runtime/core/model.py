@@ -143,7 +143,9 @@ def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, 
         raise InputError(
             "this model was not loaded from a file, which other processes need; use one process alone"
         )
-    return run, (Path(file).read_text(encoding="utf-8"), Path(file))
+    loader = getattr(getattr(module, "__spec__", None), "loader", None)
+    text = getattr(loader, "text", None)  # that runs here, whatever stands in the file by now
+    return run, (text or Path(file).read_text(encoding="utf-8"), Path(file))
 
 
 copyreg.pickle(ModuleType, _reduced)

@@ -8,13 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from io import StringIO
-from typing import Any
-
-from ruamel.yaml import YAML, MappingNode, Node, ScalarNode
-from ruamel.yaml.error import MarkedYAMLError
+from typing import TYPE_CHECKING, Any
 
 from runtime.core.errors import InputError, SettingsError, first_line
 from runtime.core.limits import LIMIT
+
+if TYPE_CHECKING:
+    from ruamel.yaml import Node
 
 Path = tuple[str | int, ...]
 
@@ -34,10 +34,12 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
         raise InputError(
             f"{len(text)} characters; such a file has at most {LIMIT.YAML_CHARACTERS}", file=file
         )
+    from ruamel.yaml.error import MarkedYAMLError
+
     lines: dict[Path, int] = {}
     try:
         _require_plain(text, file)
-        node = YAML(typ="safe", pure=True).compose(text)
+        node = _yaml().compose(text)
         return (None if node is None else _value(node, (), lines, file)), lines
     except InputError:
         raise
@@ -54,7 +56,7 @@ def yaml_values(text: str, *, file: str) -> tuple[Any, dict[Path, int]]:
 
 def yaml_text(mapping: Mapping[str, Any]) -> str:
     """A mapping of plain values as YAML, keys in their order, lists of numbers on one line."""
-    yaml: Any = YAML(typ="safe", pure=True)
+    yaml = _yaml()
     yaml.default_flow_style = None
     yaml.sort_base_mapping_type_on_output = False
     yaml.width = 140
@@ -63,11 +65,18 @@ def yaml_text(mapping: Mapping[str, Any]) -> str:
     return stream.getvalue()
 
 
+def _yaml() -> Any:
+    """Reader and writer of YAML 1.2; the package is loaded where a text is read or written."""
+    from ruamel.yaml import YAML
+
+    return YAML(typ="safe", pure=True)
+
+
 def _require_plain(text: str, file: str) -> None:
     """Raise SettingsError at the first thing that is not plain, too deep or too much, before anything is built of the text."""
     depth = 0
     documents = 0
-    for count, event in enumerate(YAML(typ="safe", pure=True).parse(text)):
+    for count, event in enumerate(_yaml().parse(text)):
         kind = type(event).__name__
         depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
         documents += kind == "DocumentStartEvent"
@@ -86,6 +95,8 @@ def _require_plain(text: str, file: str) -> None:
 
 def _value(node: Node, path: Path, lines: dict[Path, int], file: str) -> Any:
     """The plain value of a node; its line, and those of all in it, are put among the `lines`."""
+    from ruamel.yaml import MappingNode, ScalarNode
+
     lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, ScalarNode):
         return node.value if node.style is not None else _scalar(node.value)

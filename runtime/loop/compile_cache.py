@@ -21,7 +21,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from runtime.core.limits import LIMIT
-from runtime.core.loading import is_writable_by_all
+from runtime.core.loading import is_writable_by_others
 from runtime.core.provenance import cpuinfo
 
 LIBRARIES = ("-lm",)
@@ -82,7 +82,7 @@ def shared_object(
     key = hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if is_writable_by_all(folder):
+        if is_writable_by_others(folder):
             raise NotCompiledError(
                 f"anyone may write to the cache folder {folder}; choose another by SYMGEN_CACHE"
             )

@@ -49,6 +49,13 @@ class Checkpoint:
         InputError
             The runs are those of another study, or the file is damaged.
         """
+        for path in (self.file, self.file.with_name(FILE + UNFINISHED)):
+            if path.is_symlink() or (path.exists() and not path.is_file()):
+                raise InputError(
+                    "a link, a folder, a pipe or a device is where runs are kept; remove it, or "
+                    "choose another folder",
+                    file=str(path),
+                )
         self._study = json.dumps(identity, sort_keys=True)
         self._last = monotonic()
         self._runs = [self._read(b)] if self.file.exists() else [Runs.of((), b)]

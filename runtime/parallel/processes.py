@@ -72,6 +72,7 @@ def _unpacked(sent: bytes) -> Callable[[Any], Any]:
 def _begin() -> None:
     """Ctrl-C is for the process that asked; end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

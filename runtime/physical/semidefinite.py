@@ -28,7 +28,6 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, Literal
 
-import clarabel
 import numpy as np
 from scipy import sparse
 from scipy.linalg import null_space
@@ -53,6 +52,13 @@ STATUS = {
     "AlmostDualInfeasible": "unbounded_inaccurate",
 }
 SOLVED = ("optimal", "optimal_inaccurate")
+
+
+def _clarabel() -> Any:
+    """The solver, loaded where a program is solved."""
+    import clarabel
+
+    return clarabel
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +227,7 @@ class Program:
     def at_least_zero(self, A: Array, b: Array) -> None:
         """A x + b >= 0, row by row."""
         if len(b):
-            self.constraints.append((clarabel.NonnegativeConeT(len(b)), A, b))
+            self.constraints.append((_clarabel().NonnegativeConeT(len(b)), A, b))
 
     def add_squares(self, M: Array, z: Array, weight: float) -> None:
         """weight ||M chi - z||^2 in the criterion; the residual are further unknowns."""
@@ -229,7 +235,7 @@ class Program:
         A, b = self.of_chi(M)
         A[np.arange(len(z)), own] = -1.0
         self.diagonal[own] = 2 * weight
-        self.constraints.append((clarabel.ZeroConeT(len(z)), A, b - z))
+        self.constraints.append((_clarabel().ZeroConeT(len(z)), A, b - z))
 
     def solve(self) -> Optimum:
         """The optimum, by the tightest of TOLERANCES that Clarabel reaches."""
@@ -239,7 +245,7 @@ class Program:
         Q[: self.m, : self.m] += self.squares
         whole = np.vstack([np.pad(part, ((0, 0), (0, count - part.shape[1]))) for part in A])
         for gap, feasible in TOLERANCES:
-            settings = clarabel.DefaultSettings()
+            settings = _clarabel().DefaultSettings()
             settings.verbose = False
             settings.tol_gap_abs = settings.tol_gap_rel = gap
             settings.tol_feas = feasible
@@ -331,7 +337,7 @@ class Quadratic:
         self.A = sparse.csc_matrix(-scale * np.vstack([triangles, rows]))
         self.cones = [_cone(c.B.shape[1]) for c in conditions]
         if len(rows):
-            self.cones.append(clarabel.NonnegativeConeT(len(rows)))
+            self.cones.append(_clarabel().NonnegativeConeT(len(rows)))
         self.solver: Any = None
 
     def minimum(self, A: Array, g: Array) -> Array:
@@ -353,7 +359,7 @@ class Quadratic:
         """Clarabel, which may take nothing out of a program whose criterion changes. Unknowns that
         are near one need no scaling of its own: half of the time.
         """
-        settings = clarabel.DefaultSettings()
+        settings = _clarabel().DefaultSettings()
         settings.verbose = False
         settings.presolve_enable = False
         settings.chordal_decomposition_enable = False
@@ -363,12 +369,12 @@ class Quadratic:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-7
         p, b = len(linear), np.zeros(self.A.shape[0])
         Q = sparse.csc_matrix((squares, self.upper[0], self.starts), shape=(p, p))
-        return clarabel.DefaultSolver(Q, linear, self.A, b, self.cones, settings)
+        return _clarabel().DefaultSolver(Q, linear, self.A, b, self.cones, settings)
 
 
 def _solved(*data: Any) -> Any:
     """The solution of one program."""
-    return clarabel.DefaultSolver(*data).solve()
+    return _clarabel().DefaultSolver(*data).solve()
 
 
 def _solution(solve: Callable[[], Any]) -> Any:
@@ -383,7 +389,7 @@ def _solution(solve: Callable[[], Any]) -> Any:
 
 def _cone(n: int) -> Any:
     """The cone of a condition of n rows."""
-    return clarabel.PSDTriangleConeT(n) if n > 1 else clarabel.NonnegativeConeT(1)
+    return _clarabel().PSDTriangleConeT(n) if n > 1 else _clarabel().NonnegativeConeT(1)
 
 
 def triangle(B: Array) -> Array:

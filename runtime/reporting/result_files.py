@@ -72,7 +72,7 @@ class Results:
     def recover(self) -> None:
         """Move up what is finished, delete what is not."""
         for unfinished in self.folder.glob(f"{UNFINISHED}*"):
-            if not unfinished.is_symlink():
+            if unfinished.is_dir() and not unfinished.is_symlink():  # rmtree waits for a pipe
                 shutil.rmtree(unfinished, ignore_errors=True)
         finished = self.folder / FINISHED
         if finished.is_symlink() or (finished.exists() and not finished.is_dir()):

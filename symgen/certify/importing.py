@@ -103,12 +103,38 @@ def imported(path: Path) -> ModuleType:
 
 
 class _TextLoader(SourceFileLoader):
-    """Loader of the text alone: bytecode of an earlier text that lies beside is neither read nor
-    written.
+    """Loader of the text alone, which it keeps: bytecode of an earlier text that lies beside is
+    neither read nor written.
     """
+
+    text = ""
+
+    def get_data(self, path: str) -> bytes:
+        data = super().get_data(path)
+        self.text = data.decode("utf-8")
+        return data
 
     def path_stats(self, path: str | bytes) -> dict[str, float]:
         raise OSError(f"{path!r} has no bytecode")
+
+
+def is_writable_by_others(folder: Path) -> bool:
+    """Whether somebody else may put files into the folder, or another folder in its place: what
+    lies there proves nothing.
+    """
+    if os.name != "posix":
+        return False
+    for place in (folder, *folder.absolute().parents):
+        if not place.exists():
+            continue
+        found = place.stat()
+        others = found.st_mode & 0o002 or (
+            found.st_mode & 0o020 and found.st_gid not in (0, os.getgid())
+        )
+        sticky = place != folder and found.st_mode & 0o1000  # names there belong to their makers
+        if (others and not sticky) or found.st_uid not in (0, os.getuid()):
+            return True
+    return False
 
 
 def _key(text: str) -> str:
@@ -116,12 +142,21 @@ def _key(text: str) -> str:
 
 
 def _entry(text: str) -> Path | None:
-    """Folder of a text in the cache; None without a home folder, or where anyone may write."""
+    """Folder of a text in the cache; None without a home folder, or where others may write.
+
+    Raises SymgenError where SYMGEN_CACHE names such a folder.
+    """
     try:
         folder = cache_folder().absolute()
-        if os.name == "posix" and folder.is_dir() and folder.stat().st_mode & 0o002:
-            return None
+        shared = is_writable_by_others(folder)
     except (OSError, RuntimeError):
+        return None
+    if shared and os.environ.get("SYMGEN_CACHE"):
+        raise SymgenError(
+            f"SYMGEN_CACHE: others can write to {folder}, or to a folder above it, and could put "
+            "code there that this program would run; choose a folder of your own (chmod 700)"
+        )
+    if shared:
         return None
     return folder / _key(text)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 from importlib import import_module
 from typing import Any
@@ -104,6 +105,7 @@ def symgen(
 def main() -> None:
     """Entry point of the command line."""
     gc.set_threshold(ALLOCATIONS, 50, 100)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # cleans up as Ctrl-C does
     _open_streams()
     try:
         app()

@@ -229,10 +229,16 @@ def test_a_cache_for_reading_alone_is_read(cache, monkeypatch) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permission bits")
-def test_a_cache_that_anyone_may_write_to_is_not_used(cache) -> None:
+@pytest.mark.parametrize(("place", "mode"), [("modules", 0o777), ("", 0o777), ("", 0o1777)])
+def test_a_cache_that_others_may_write_to_is_refused(cache, place, mode) -> None:
+    """Itself, or a folder above it, in which another could take its place."""
     (cache / "modules").mkdir(parents=True)
-    (cache / "modules").chmod(0o777)
-    assert not Path(symgen.model("planar_2r").__file__).is_relative_to(cache)
+    (cache / place).chmod(mode)
+    if mode == 0o1777:  # as /tmp: names belong to their makers
+        assert Path(symgen.model("planar_2r").__file__).is_relative_to(cache)
+        return
+    with pytest.raises(SymgenError, match=r"SYMGEN_CACHE: others can write to .*chmod 700"):
+        symgen.model("planar_2r")
 
 
 def test_two_processes_at_once_and_others_that_load_the_file(cache) -> None:

@@ -190,3 +190,48 @@ print(*sys.modules)
     assert [path.name for path in tmp_path.iterdir()] == ["file"] and (
         tmp_path / "file"
     ).read_text() == "mine"
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+@pytest.mark.parametrize("name", [FINISHED, f"{UNFINISHED}x"])
+def test_names_of_our_own_that_are_links_or_pipes(tmp_path, kind, name):
+    """Nothing of another folder moves, and nothing hangs."""
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "theirs.txt").write_text("theirs")
+    folder = tmp_path / "results"
+    folder.mkdir()
+    place = folder / name
+    place.symlink_to(other) if kind == "link" else os.mkfifo(place)
+    if name == FINISHED:
+        with pytest.raises(OutputError, match="not a folder of this program; remove it"):
+            write_all(folder, NEW)
+    else:
+        write_all(folder, NEW)
+    assert texts(other) == {"theirs.txt": "theirs"}
+    assert not (folder / "theirs.txt").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_command_that_is_ended_leaves_nothing(tmp_path, number):
+    script = """
+import sys, time
+from pathlib import Path
+from symgen.cli import main as command, session
+
+def wait():
+    with session.results_in(Path(sys.argv[1])):
+        print("ready", flush=True)
+        time.sleep(60)
+
+command.app = wait
+command.main()
+"""
+    folder = tmp_path / "results"
+    child = subprocess.Popen(
+        [sys.executable, "-c", script, str(folder)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert child.stdout.readline() == b"ready\n" and folder.is_dir()
+    child.send_signal(number)
+    child.communicate(timeout=30)
+    assert child.returncode != 0 and not folder.exists()

@@ -2,6 +2,7 @@
 reader trusts it. What is loaded is then checked.
 """
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -95,3 +96,27 @@ def test_what_is_loaded_computes(tmp_path):
     q = np.linspace(0, 1, 6).reshape(3, 2)
     assert np.array_equal(one.observation_matrix(q, q, q), two.observation_matrix(q, q, q))
     assert before == (np.sin, np.zeros, np.linalg.solve)
+
+
+@pytest.mark.parametrize("trust", [True, False])
+def test_workers_run_the_text_that_was_loaded(generated, trust):
+    """A file that changes on disk after it was loaded is not what travels."""
+    file = generated / "planar_2r.py"
+    if trust:
+        appended(file, "MORE = 1")
+    model = load_model(file, trust=trust)
+    mark = generated / "mark"
+    appended(file, f"__import__('pathlib').Path({str(mark)!r}).touch()")
+    again = pickle.loads(pickle.dumps(model))  # noqa: S301
+    assert again.NAME == "planar_2r" and hasattr(again, "MORE") == trust and not mark.exists()
+
+
+def test_workers_run_the_text_that_the_cache_held(generated):
+    model = symgen.model("planar_2r")
+    file = Path(model.__file__)
+    held = file.read_text(encoding="utf-8")
+    try:
+        appended(file, "raise SystemError")
+        assert pickle.loads(pickle.dumps(model)).NAME == "planar_2r"  # noqa: S301
+    finally:
+        file.write_text(held, encoding="utf-8")

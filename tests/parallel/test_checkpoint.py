@@ -286,3 +286,21 @@ def test_the_file_says_what_was_studied(tmp_path):
         and found["robot"] == "planar_2r_test"
         and "cestac.runs" not in found
     )
+
+
+@pytest.mark.parametrize("name", ["runs.npz", "runs.npz.unfinished"])
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
+def test_names_of_our_own_that_are_no_files_are_refused(tmp_path, name, kind):
+    """A pipe would never answer; a link would write elsewhere."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_text("kept")
+    folder = tmp_path / "results"
+    folder.mkdir()
+    {
+        "link": lambda: (folder / name).symlink_to(elsewhere),
+        "pipe": lambda: os.mkfifo(folder / name),
+        "folder": (folder / name).mkdir,
+    }[kind]()
+    with pytest.raises(InputError, match="a link, a folder, a pipe or a device"):
+        Checkpoint(folder).resume({}, 2)
+    assert elsewhere.read_text() == "kept"
