@@ -91,6 +91,7 @@ class Results:
             for name, content in contents.items():
                 data = encodable(content).encode("utf-8") if isinstance(content, str) else content
                 _write_durably(unfinished / name, data)
+                _keep_rights(unfinished / name, self.folder / name)
             _sync(unfinished)
             unfinished.rename(self.folder / FINISHED)
         except BaseException:
@@ -155,6 +156,15 @@ def _write_durably(path: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _keep_rights(path: Path, replaced: Path) -> None:
+    """Mode and owner of the file that `path` is going to replace, where there is one."""
+    with suppress(OSError):
+        found = replaced.stat()
+        with suppress(OSError):  # an owner that this user cannot give
+            os.chown(path, found.st_uid, found.st_gid)
+        path.chmod(found.st_mode & 0o777)
 
 
 def _sync(folder: Path) -> None:

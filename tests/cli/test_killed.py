@@ -235,3 +235,14 @@ command.main()
     child.send_signal(number)
     child.communicate(timeout=30)
     assert child.returncode != 0 and not folder.exists()
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
+def test_a_file_that_is_replaced_keeps_its_mode_and_owner(tmp_path, mode):
+    write_all(tmp_path, OLD)
+    (tmp_path / "a.txt").chmod(mode)
+    owner = (tmp_path / "a.txt").stat().st_uid
+    write_all(tmp_path, NEW)
+    found = (tmp_path / "a.txt").stat()
+    assert (found.st_mode & 0o777, found.st_uid) == (mode, owner)
+    assert (tmp_path / "a.txt").read_text() == "new"
