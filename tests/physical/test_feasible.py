@@ -397,7 +397,7 @@ def test_a_solver_that_fails_is_told(arm, monkeypatch) -> None:
         problem[-1].max_iter = 1
         return whole(*problem)
 
-    monkeypatch.setattr("runtime.physical.semidefinite.clarabel.DefaultSolver", impatient)
+    monkeypatch.setattr("clarabel.DefaultSolver", impatient)
     with pytest.raises(
         InputError, match=r"was not solved \(Clarabel: MaxIterations\); try another margin"
     ):
@@ -413,7 +413,7 @@ def test_a_solver_that_panics_is_told(arm, monkeypatch) -> None:
     def panics(*problem):
         raise PanicException("index out of bounds")
 
-    monkeypatch.setattr("runtime.physical.semidefinite.clarabel.DefaultSolver", panics)
+    monkeypatch.setattr("clarabel.DefaultSolver", panics)
     with pytest.raises(InputError, match=r"was not solved \(Clarabel stopped by an error"):
         estimate_of(simulated(arm, arm.base_parameters(arm.VALUES), 0.1), FEASIBLE, model=arm)
 
