@@ -80,6 +80,9 @@ def literals(text: str, source: list[str]) -> Iterator[tuple[int, str]]:
                     whole <= WIDTH or previous.start[1] + len(one) + len(word) + SLACK <= WIDTH
                 )
                 ended = re.search(r"(\\n|[.:;!?] ?)$", bare[0])
+                if re.search(r"[<=|\\{]", one + two):  # markup, code and parts of formats
+                    previous = token
+                    continue
                 if previous.end[0] == token.start[0] or (torn and not ended):
                     yield previous.start[0], f"literals: {one} / {two}"
             previous = token

@@ -1,6 +1,5 @@
 """The installed package, in a folder that holds nothing, with the core dependencies alone: every
-module is imported, every verb runs, and what needs
-an extra says which in one line.
+module is imported, every verb runs, and what needs an extra says which in one line.
 
     python smoke.py [--extras]      optional libraries may be there, their lines are not asked for
 """

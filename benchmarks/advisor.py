@@ -5,16 +5,14 @@ cost.
     python benchmarks/advisor.py --real [emps tx40 haptic]   real encoders, read as positions and as counts, in place of the chapter's law
 
 Steps: CESTAC at steps in the ratio 1.3, RUNS runs each, all encoders alike; where |change of the
-mean| first reaches a limit between two of them, on
-logarithmic axes. The interval is that of |change| +- the half width of Student's. Predicted over
-sampled should be within 15 %.
+mean| first reaches a limit between two of them, on logarithmic axes. The interval is that of
+|change| +- the half width of Student's. Predicted over sampled should be within 15 %.
 
 Cost: CPU time of one advice without runs (every choice of encoders, both limits, the curve) over
-that of the sampling it stands for: for every choice of
-encoders, LEVELS steps (to bracket two limits within 15 %) of five runs, as the chapter has it; or
-of as many as bring the Student interval of every
-parameter that matters below 30 % of the limit at the step where it reaches it, since the advice
-gives those steps too. One core, BLAS on one thread, medians of interleaved rounds.
+that of the sampling it stands for: for every choice of encoders, LEVELS steps (to bracket two
+limits within 15 %) of five runs, as the chapter has it; or of as many as bring the Student interval
+of every parameter that matters below 30 % of the limit at the step where it reaches it, since the
+advice gives those steps too. One core, BLAS on one thread, medians of interleaved rounds.
 """
 
 import sys

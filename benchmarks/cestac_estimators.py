@@ -4,15 +4,13 @@ and recorded positions alone rounded.
     python benchmarks/cestac_estimators.py [--runs 5] [-o docs]
 
 Everything goes through the verb: `symgen cestac ROBOT study.yaml --json`, with `cestac: {place:
-loop, rounding: phase}`, or `place: record` on a record
-that `symgen simulate` makes with an exact encoder. Robots, gains, noise, steps and determined
-parameters are those of benchmarks/estimators.py.
-Answers are kept in cestac_estimators_runs/; the same command goes on from there. Written:
-cestac_estimators.png, and a table on the screen. Above: the
-estimates of the runs against the truth, noise and disturbance of each run included. Below: %e (21)
-as the verb prints it, mean of the runs against those
-of the same seeds with an exact encoder (against the record, where recorded positions alone are
-rounded). Both: rms over the determined parameters.
+loop, rounding: phase}`, or `place: record` on a record that `symgen simulate` makes with an exact
+encoder. Robots, gains, noise, steps and determined parameters are those of
+benchmarks/estimators.py. Answers are kept in cestac_estimators_runs/; the same command goes on from
+there. Written: cestac_estimators.png, and a table on the screen. Above: the estimates of the runs
+against the truth, noise and disturbance of each run included. Below: %e (21) as the verb prints it,
+mean of the runs against those of the same seeds with an exact encoder (against the record, where
+recorded positions alone are rounded). Both: rms over the determined parameters.
 """
 
 from __future__ import annotations

@@ -3,16 +3,14 @@
     python benchmarks/cestac_run.py [--rounds 7] [--runs 2000]
 
 A run perturbs every sample of the position (two-point, 2 pi/5000), filters, evaluates W, decimates
-by 40 and solves Y = W X. Plain: low-pass by
-scipy, the dense W of the emitted NumPy module, scipy.signal.decimate column by column,
-numpy.linalg.lstsq; Y is decimated once for both. TX40,
-on its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000
+by 40 and solves Y = W X. Plain: low-pass by scipy, the dense W of the emitted NumPy module,
+scipy.signal.decimate column by column, numpy.linalg.lstsq; Y is decimated once for both. TX40, on
+its record in motion (37501 samples) with its essential and with all 60 columns, and on all 45000
 samples with 60 columns.
 
 One process pinned to one core, one BLAS thread, CPU time, contenders in rotated order in every
-round, ratios per round as median [range]. X of both
-is compared before timing. Workers: processes, the one that asks among them, wall time of a
-whole study with its start, with the load of the
+round, ratios per round as median [range]. X of both is compared before timing. Workers: processes,
+the one that asks among them, wall time of a whole study with its start, with the load of the
 machine. Goal: two workers 1.6 times faster than one.
 """
 

@@ -4,12 +4,11 @@ the bits.
     python benchmarks/cluster.py [--runs 2000] [--rounds 3]
 
 TX40 record in motion, its essential columns, two-point rounding, 2 pi/5000; `runs` runs in all. In
-each round every way is taken once, in
-rotated order: this process alone; `--workers 2`, the start of the other one included; a
-LocalCluster of two worker processes of one thread each that
-is already up, one of them killed halfway in the last round. Every X and residual norm is compared
-bit by bit with those of the first study. Wall time, so
-look at the load: with other work on two cores no ratio above one can be expected. Goals: cluster
+each round every way is taken once, in rotated order: this process alone; `--workers 2`, the start
+of the other one included; a LocalCluster of two worker processes of one thread each that is already
+up, one of them killed halfway in the last round. Every X and residual norm is compared bit by bit
+with those of the first study. Wall time, so look at the load: with other work on two cores no ratio
+above one can be expected. Goals: cluster
 1.5, two workers 1.6 times faster than one.
 """
 

@@ -4,13 +4,12 @@ rates, uneven lines; a haptic device.
     python benchmarks/counts.py [steps tuned rates lines time haptic kr300] [--seeds 20]
 
 Positions of the record are rounded to steps of 2 pi/5000 ... 2 pi/100 at a random phase of every
-joint and seed, torques stay as recorded. Errors are
-those of the main parameters against the estimate from the record itself. Estimates are kept in
-counts_runs.jsonl as they come; the same command
-goes on from there. The record comes from `symgen datasets`. `tuned`: the low-pass at the best of a grid of
-cut-offs, phase by phase, and at cutoff: auto. `haptic`: change of its essential
-parameters by CESTAC of law phase, encoders at the motors.
-`kr300`: what the detector says of two records of degrees, A.mat and B.mat in SYMGEN_DATA/kr300.
+joint and seed, torques stay as recorded. Errors are those of the main parameters against the
+estimate from the record itself. Estimates are kept in counts_runs.jsonl as they come; the same
+command goes on from there. The record comes from `symgen datasets`. `tuned`: the low-pass at the
+best of a grid of cut-offs, phase by phase, and at cutoff: auto. `haptic`: change of its essential
+parameters by CESTAC of law phase, encoders at the motors. `kr300`: what the detector says of two
+records of degrees, A.mat and B.mat in SYMGEN_DATA/kr300.
 """
 
 # ruff: noqa: E402

@@ -4,11 +4,10 @@ truth, bias and scatter beside other estimators.
     python benchmarks/counts_loop.py [--records 66] [--simulating 6] [--robots tx40 emps]
 
 Records, loops and other estimators are those of `benchmarks/estimators.py`. OLS and WLS read as
-counts know neither controller nor reference. IV and
-DIDIM start from WLS read as counts; "counts iv" and "counts didim" also take W, or the rows, from
-the reader, "didim from counts" starts there and does the
-rest by the low-pass. Estimates are kept in counts_loop_runs.jsonl; the same command goes on from
-there.
+counts know neither controller nor reference. IV and DIDIM start from WLS read as counts; "counts
+iv" and "counts didim" also take W, or the rows, from the reader, "didim from counts" starts there
+and does the rest by the low-pass. Estimates are kept in counts_loop_runs.jsonl; the same command
+goes on from there.
 """
 
 # ruff: noqa: E402

@@ -11,12 +11,11 @@ record:
     points   from point to point through that loop, joints at rest 5 % of the time
 
 Torques are those of the values of the robot file with white noise of 0.05 N m and noise up to 5 Hz
-of 3 % of the torque (`sigma`: 1 %); its dry
-friction is one of FRICTION. Parts: `rows`, errors against the estimate from the exact positions of
-the same record, by what becomes of rows of uncertain
-direction; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the filtered
-acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl; the same
-command goes on from there.
+of 3 % of the torque (`sigma`: 1 %); its dry friction is one of FRICTION. Parts: `rows`, errors
+against the estimate from the exact positions of the same record, by what becomes of rows of
+uncertain direction; `sigma`, errors against the truth over stated sigma; `gaps`, errors of the
+filtered acceleration where samples are missing. Estimates are kept in counts_simulated_runs.jsonl;
+the same command goes on from there.
 """
 
 # ruff: noqa: E402

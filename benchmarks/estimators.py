@@ -4,11 +4,10 @@ scatter against stated sigma.
     python benchmarks/estimators.py [--records 100] [--workers 2] [-o docs]
 
 Each record has its own seed: torque noise on the record, and a disturbance of the arm that nobody
-records. Estimates are kept in
-estimators_runs.jsonl as they come; the same command goes on from there. Written:
-estimators_simulated.md, estimators.png (bias and
-scatter by parameter). Simulating methods start 15 % from the truth, a different way in each record.
-%e against Delta: cestac_estimators.py.
+records. Estimates are kept in estimators_runs.jsonl as they come; the same command goes on from
+there. Written: estimators_simulated.md, estimators.png (bias and scatter by parameter). Simulating
+methods start 15 % from the truth, a different way in each record. %e against Delta:
+cestac_estimators.py.
 
 EMPS needs its record for the reference (`symgen datasets`).
 """

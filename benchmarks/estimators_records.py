@@ -3,9 +3,8 @@
     python benchmarks/estimators_records.py [-o benchmarks/estimators_measured.md]
 
 EMPS: identified on one record, torque predicted on the other, and the position simulated with the
-parameters found, with and without the tick of delay
-of the diagram. TX40: first half of the window predicts the second. All methods of a table use the
-same rows. Records: `symgen datasets`.
+parameters found, with and without the tick of delay of the diagram. TX40: first half of the window
+predicts the second. All methods of a table use the same rows. Records: `symgen datasets`.
 """
 
 # ruff: noqa: E402

@@ -10,8 +10,8 @@ the robot file. Printed: weighted cond(W) of
 2. The motion as the reference of a simulated closed loop with known parameters (values of the robot
 file), white torque noise of the deviations
    of the record; least squares weighted by joint on so many records. Printed: scatter over
-   predicted %sigma, root mean square over the parameters
-   of predicted %sigma below 30, and its range. Goal: within 20 %.
+   predicted %sigma, root mean square over the parameters of predicted %sigma below 30, and its
+   range. Goal: within 20 %.
 """
 
 from __future__ import annotations

@@ -5,21 +5,18 @@ to base parameters with their deviations.
     python benchmarks/figaroh_job.py --figaroh FOLDER/bin/python [--rounds 7]        needs the record `tx40`: SYMGEN_DATA, or be on line
 
 Both read the same files, take the motor side to the joints, cut the record at 7.5 s, filter (median
-5, Butterworth of order 4 at 50 Hz on the
-positions, which is what figaroh filters), differentiate twice, evaluate the regressor with
-friction, actuators, offsets and the coupled wrist,
-decimate by 40 with zero phase, and solve by ordinary least squares. Differences that stay: figaroh
-pads its median with zeros and cuts the record
-before it filters, and does not filter torques by the median (here they are taken through it, which
-costs more); it finds its base parameters by QR
-in every job, here they are known from the generation; its wrist has one parameter more (Iam6 apart
-from Ia6). figaroh's report of the result is counted, ours (%sigma, residuals by joint) too.
+5, Butterworth of order 4 at 50 Hz on the positions, which is what figaroh filters), differentiate
+twice, evaluate the regressor with friction, actuators, offsets and the coupled wrist, decimate by
+40 with zero phase, and solve by ordinary least squares. Differences that stay: figaroh pads its
+median with zeros and cuts the record before it filters, and does not filter torques by the median
+(here they are taken through it, which costs more); it finds its base parameters by QR in every job,
+here they are known from the generation; its wrist has one parameter more (Iam6 apart from Ia6).
+figaroh's report of the result is counted, ours (%sigma, residuals by joint) too.
 
 First the results are compared: relative error, and the predicted torques of both against each
-other. Then each round runs every contender once, in
-rotated order, pinned to one core, one BLAS thread, CPU time without imports; ratios are taken per
-round and given as median [range], of the whole
-job and of what follows the reading of the files, which is half of ours.
+other. Then each round runs every contender once, in rotated order, pinned to one core, one BLAS
+thread, CPU time without imports; ratios are taken per round and given as median [range], of the
+whole job and of what follows the reading of the files, which is half of ours.
 """
 
 # ruff: noqa: E402

@@ -2,13 +2,11 @@
 figaroh_job.py.
 
 One JSON line with settings on standard input; then for every line `run` the job is done once and a
-JSON line with its CPU seconds, and those of reading the files, is written. The
-line `result` writes what the last run found. figaroh's own steps are used as they are: median,
-filter, differentiation, regressor, decimation, base
-parameters by QR, least squares, relative deviations. Only what figaroh asks its users for is
-written here: reading the files, the drives, and the
-three columns of the coupled wrist. Its validation is left out, which evaluates the regressor a
-second time.
+JSON line with its CPU seconds, and those of reading the files, is written. The line `result` writes
+what the last run found. figaroh's own steps are used as they are: median, filter, differentiation,
+regressor, decimation, base parameters by QR, least squares, relative deviations. Only what figaroh
+asks its users for is written here: reading the files, the drives, and the three columns of the
+coupled wrist. Its validation is left out, which evaluates the regressor a second time.
 """
 
 import contextlib

@@ -5,11 +5,10 @@ the ones that are checked in.
     python benchmarks/gate.py --write      # writes gate.json and the table in benchmarks/performance.md
 
 Each ratio is the cost of ours over that of a peer, CPU time, median of interleaved rounds on one
-core; smaller is better. Machines differ in such a ratio
-by a tenth or two, which the margins allow for; a regression shows all the same. The record of the
-TX40 is read from the dataset cache. The identification
-counts time outside the kernel: the plain way asks it for arrays of 130 MB, which took 0.07 to 1.8 s
-beside 0.4 s of its own within one minute.
+core; smaller is better. Machines differ in such a ratio by a tenth or two, which the margins allow
+for; a regression shows all the same. The record of the TX40 is read from the dataset cache. The
+identification counts time outside the kernel: the plain way asks it for arrays of 130 MB, which
+took 0.07 to 1.8 s beside 0.4 s of its own within one minute.
 """
 
 # ruff: noqa: E402 (the number of BLAS threads is set before numpy is loaded)
@@ -256,8 +255,7 @@ def main() -> int:
             print(
                 (
                     f"{line.what:55} / {line.peer:22} {value[0]:8.3g} [{value[1]:.3g}, "
-                    f"{value[2]:.3g}] "
-                    f" baseline {was:.3g}  {verdict}"
+                    f"{value[2]:.3g}]  baseline {was:.3g}  {verdict}"
                 ),
                 flush=True,
             )

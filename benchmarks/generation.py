@@ -4,10 +4,9 @@ process; robots in numbers against the same in constants.
     python benchmarks/generation.py [--rounds 7]
 
 Goals: TX40 at most 0.5, Panda at most 1.0 of the CPU time of `import sympy`; a chain of 30 hinges 2
-s; a robot whose constants are numbers twice its
-twin with constants. Imports are done before the clock starts, nothing is kept from one generation
-to the next; each round measures every robot and one
-fresh process, so that ratios are taken under one load; medians are quoted.
+s; a robot whose constants are numbers twice its twin with constants. Imports are done before the
+clock starts, nothing is kept from one generation to the next; each round measures every robot and
+one fresh process, so that ratios are taken under one load; medians are quoted.
 """
 
 from __future__ import annotations

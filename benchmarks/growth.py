@@ -3,16 +3,15 @@ figure.
 
     python benchmarks/growth.py [-o benchmarks/growth.png] [--quick]
 
-Samples: the TX40 regressor into a reused store and the distinct signals through the decimation; largest resident set of
-`symgen identify`. Joints, 2 to 30: revolute chains and binary trees with friction; generation
-from the robot file to the text of the module, and the regressor
-of each. Runs, columns, workers: a resolution study of the TX40 with 9000 samples.
+Samples: the TX40 regressor into a reused store and the distinct signals through the decimation;
+largest resident set of `symgen identify`. Joints, 2 to 30: revolute chains and binary trees with
+friction; generation from the robot file to the text of the module, and the regressor of each. Runs,
+columns, workers: a resolution study of the TX40 with 9000 samples.
 
 One core, one BLAS thread, CPU time, the least of three after a warm-up; workers: every core,
 elapsed time. The least of three under an unknown load is good for slopes, which is what the figure
-is for; ratios
-between contenders are measured in interleaved rounds by the other files of this folder. The numbers
-of the figure are printed.
+is for; ratios between contenders are measured in interleaved rounds by the other files of this
+folder. The numbers of the figure are printed.
 """
 
 # ruff: noqa: E402

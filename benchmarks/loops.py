@@ -4,11 +4,9 @@ general loops.
     python benchmarks/loops.py [--rounds 7]
 
 1  CPU time of derivation + regrouping + text against `import sympy` in a fresh process (goal: at
-most 1.0 for parallelograms)
-2  multiplications and additions in inertial parameters (with Ia for the regressor) against the
-limits of the regrouping theory, section 6
-3  regressor on 7103 samples, CPU time per emitted operation against the serial TX40's (goal: at
-most 1.5); operations are
+most 1.0 for parallelograms) 2  multiplications and additions in inertial parameters (with Ia for
+the regressor) against the limits of the regrouping theory, section 6 3  regressor on 7103 samples,
+CPU time per emitted operation against the serial TX40's (goal: at most 1.5); operations are
    multiplications, additions, sines and cosines of the header, all columns. General loops: closure
    by Newton included, and their closure alone
 4  Newton passes per sample on a smooth record, those of the samples followed from `start` included

@@ -9,16 +9,14 @@ compiler (CXX, else c++). The C++ loop,
 pinocchio_loop.cpp, reuses its data and writes W joint-major; it is built twice against the
 installed package: "C++ headers" with
 -O3 -march=native -DNDEBUG, everything from the headers, and "C++ library" with -O3 -DNDEBUG, the
-algorithms from the package's library, which
-is not compatible with -march=native. Each runs as a process of its own beside this one, on the same
-core; the clock is its CPU time.
+algorithms from the package's library, which is not compatible with -march=native. Each runs as a
+process of its own beside this one, on the same core; the clock is its CPU time.
 
 pinocchio computes the 10 n standard columns. The product to base columns is not counted in its
-time, nor are friction and Ia; the emitted W
-holds base columns with friction ("all columns") or those of the inertial parameters and Ia alone
-("inertial"). Before timing, every entry of
-both W is compared: standard columns = D K, K = d base parameters / d standard parameters, 1e-10 of
-the column.
+time, nor are friction and Ia; the emitted W holds base columns with friction ("all columns") or
+those of the inertial parameters and Ia alone ("inertial"). Before timing, every entry of both W is
+compared: standard columns = D K, K = d base parameters / d standard parameters, 1e-10 of the
+column.
 
 Goals, TX40 / Panda: NumPy 3 / 2.5 and C 25 / 20 times faster than the C++ loop of the library,
 joint-major W; C at most 1.4 times the fill.

@@ -5,11 +5,9 @@ loop.
     [--large 1000000]
 
 One process pinned to one core, one BLAS thread, CPU time. Before timing, every entry of pinocchio's
-regressor (standard inertial
-columns) is compared with D K, K = d base_parameters / d standard. Each round runs every contender
-once, in rotated order and each
-for about the same time; the ratio is taken per round and given as median [range]. All write into
-buffers already in use:
+regressor (standard inertial columns) is compared with D K, K = d base_parameters / d standard. Each
+round runs every contender once, in rotated order and each for about the same time; the ratio is
+taken per round and given as median [range]. All write into buffers already in use:
 
     emitted      regressor(q, qd, qdd, out=store)                all base columns, then those of the inertial parameters and Ia alone
     pinocchio    W[k] = computeJointTorqueRegressor(...)         10 standard columns per link; the product to base columns is not counted

@@ -4,12 +4,10 @@ friction, encoder steps inside the loop.
     python benchmarks/simulation.py [--seconds 10] [--rounds 7]
 
 One process pinned to one core, CPU time, contenders in rotated order in every round, medians
-[range] and ratios per round: the loop in C, the
-same function in CasADi's interpreter, and the loop with the derivatives by all 60 parameters over a
-tenth of the time. The C file is compiled
-into an empty cache, its time is printed apart. Goal: 10 s in less than 5 s of one core. Motion:
-random points within the limits of the robot
-file, gains of the BIRDy benchmark.
+[range] and ratios per round: the loop in C, the same function in CasADi's interpreter, and the loop
+with the derivatives by all 60 parameters over a tenth of the time. The C file is compiled into an
+empty cache, its time is printed apart. Goal: 10 s in less than 5 s of one core. Motion: random
+points within the limits of the robot file, gains of the BIRDy benchmark.
 """
 
 from __future__ import annotations

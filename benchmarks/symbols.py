@@ -4,9 +4,9 @@ recursion over SymPy matrices.
     python benchmarks/symbols.py [--robots tx40] [--expand]
 
 The second way is that of SymPyBotics (sympybotics/dynamics/rne_khalil.py): Newton-Euler of Khalil
-over SymPy matrices, a column of A for each unit
-acceleration, nothing simplified. It is written here from the equations, since SymPyBotics is on no
-package index and was written for an older SymPy.
+over SymPy matrices, a column of A for each unit acceleration, nothing simplified. It is written
+here from the equations, since SymPyBotics is on no package index and was written for an older
+SymPy.
 --expand multiplies its result out by sympy.expand. Both ways have the same base parameters, and
 agree at a random state before anything is printed.
 """

@@ -2,19 +2,18 @@
 without rest, with the counterbalance known or not".
 
 Every candidate is identified on its own terms; of its sets of parameters
-(`runtime.core.parameter_sets`) the one that predicts the validation records best stands
-for it, the essential one too. All of them are then judged on the
-same rows: those of every candidate's filters and rows in turn, so that none wins by leaving out
-what it cannot explain,
+(`runtime.core.parameter_sets`) the one that predicts the validation records best stands for it, the
+essential one too. All of them are then judged on the same rows: those of every candidate's filters
+and rows in turn, so that none wins by leaving out what it cannot explain,
 
     e_ck = 100 ||Y_k - W_k X_c|| / ||tau_k||
             residual of candidate c on the validation records treated as by candidate k, of the
             measured torque
 
 known torques included in what is measured, so that those who know them have no advantage by the
-norm. Order: the geometric mean over k. A candidate whose
-estimator did not end well comes after all others. The winner of many candidates is chosen by the
-validation records, which are then no unseen data for it.
+norm. Order: the geometric mean over k. A candidate whose estimator did not end well comes after all
+others. The winner of many candidates is chosen by the validation records, which are then no unseen
+data for it.
 """
 
 from __future__ import annotations

@@ -4,9 +4,8 @@ there, and a table says which test catches it.
     python tests/mutations.py [NUMBER ...]        all faults, or those of these numbers; some 20 s each
 
 A fault is a file, a text that stands in it once, the text in its place, and what it means. A fault
-that no test catches ends the script with code 1; so does
-a text that is no longer there: then choose the fault anew. Golden files stand last among the tests,
-since they notice any change.
+that no test catches ends the script with code 1; so does a text that is no longer there: then
+choose the fault anew. Golden files stand last among the tests, since they notice any change.
 """
 
 from __future__ import annotations

@@ -2,20 +2,17 @@
 below 5 %, predicted without sampling.
 
 CESTAC rounds every position at random, many times, and asks how far the mean estimate moves. That
-mean is known to first order in the variance v
-of the rounding (errors in variables), from the expected normal equations of
-`runtime.advisor.position_errors`:
+mean is known to first order in the variance v of the rounding (errors in variables), from the
+expected normal equations of `runtime.advisor.position_errors`:
 
     X(v) = E[W_c' W_c]^-1 E[W_c' Y]                %e (21) = 100 |1 - X(v) / X(0)|
 
     v = Delta^2 (two-point, gaussian), Delta^2 / 3 (uniform, quantise)
 
 so that one set of sensitivities gives the curve of every parameter, for all encoders together and
-for one at a time with the others exact. The step at
-which the first parameter that matters reaches a limit is confirmed by runs of CESTAC, with Student
-intervals. Parameters matter when their
-%sigma (11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not
-decide.
+for one at a time with the others exact. The step at which the first parameter that matters reaches
+a limit is confirmed by runs of CESTAC, with Student intervals. Parameters matter when their %sigma
+(11) is at most 10, as in CESTAC's verdict; small parameters with a large %sigma do not decide.
 
 Noise of the torques does not move the mean: Y is linear in it. What it adds to sigma is, for white
 noise of the motors
@@ -357,14 +354,12 @@ def assumptions(
     if real:
         encoders.append(
             f"Real encoders: counts of steps Delta, lines {lines}, the phase random by encoder and "
-            f"run, {place}. The reader knows the step, not the phase. "
-            "Curves are a quadrature over the phase, without first order; steps of fewer than "
-            f"{LIMIT.LINES_IN_MOTION} in the motion of a joint are not judged. "
-            "Both estimates stand on the rows that the reader leaves in; rows in which dry "
-            "friction has no certain direction are not among them. Steps are "
-            f"tried in the ratio {LIMIT.READER_RATIO:g}, read as positions more closely where "
-            "constant speeds "
-            "of the record lock to the sampling and change more; between "
+            f"run, {place}. The reader knows the step, not the phase. Curves are a quadrature over "
+            f"the phase, without first order; steps of fewer than {LIMIT.LINES_IN_MOTION} in the "
+            "motion of a joint are not judged. Both estimates stand on the rows that the reader "
+            "leaves in; rows in which dry friction has no certain direction are not among them. "
+            f"Steps are tried in the ratio {LIMIT.READER_RATIO:g}, read as positions more closely "
+            "where constant speeds of the record lock to the sampling and change more; between "
             "these, ask for the step of the encoder itself."
         )
     return (
@@ -372,8 +367,7 @@ def assumptions(
         (
             f"Filters: {filters}, no median, decimation by "
             f"{', '.join(str(part.selection.factor) for part in parts)}. Another rate or cut-off "
-            "gives "
-            "another answer."
+            "gives another answer."
         ),
         f"Method {study.estimate.method}; {FIRST_ORDER if law else ''}rows used and weights are "
         "those of the record.",
@@ -391,9 +385,7 @@ def assumptions(
         + (f"; not: {', '.join(out)}." if out else ", here all of them."),
         (
             "Torques: white noise of the motors does not bias X, to first order and beyond, since "
-            "Y "
-            "is "
-            "linear in it and W does not know it; it adds to sigma."
+            "Y is linear in it and W does not know it; it adds to sigma."
         ),
     )
 

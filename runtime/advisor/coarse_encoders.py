@@ -130,8 +130,7 @@ class CoarseEncoders:
     @property
     def coarsest(self) -> Array:
         """Largest step of each encoder, shape (n,): LIMIT.LINES_IN_MOTION of them in its motion;
-        inf of one at
-        rest.
+        inf of one at rest.
         """
         spans = np.min([np.ptp(part.x, axis=0) for part in self.parts], axis=0)
         return np.where(spans > 0, spans / LIMIT.LINES_IN_MOTION, np.inf)
@@ -160,9 +159,8 @@ class CoarseEncoders:
         the encoders, shape (m,); delta, shape (m,).
 
         Harmonic h of the error of a count has the frequency h |qd|/Delta and a power as 1/h^2;
-        sampled, it is as slow as its distance from a multiple of
-        the rate. Where a joint keeps a speed that is a simple fraction of a step per sample, the
-        error stands still.
+        sampled, it is as slow as its distance from a multiple of the rate. Where a joint keeps a
+        speed that is a simple fraction of a step per sample, the error stands still.
         """
         h = np.arange(1, LIMIT.SAWTOOTH_HARMONICS + 1)
         weight, most = 1 / h**2 / np.sum(1 / h**2), np.zeros(len(delta))

@@ -1,9 +1,8 @@
 """What errors of the position do to the normal equations, on average and without sampling.
 
 With e the errors of the encoders, independent from sample to sample and of variance v, and filters
-that are linear (`runtime.core.signals.noise_gain`), the
-columns of W move by dW = sum_i W_qi dq_i + W_qdi dqd_i + W_qddi dqdd_i + second order. Over the
-rows t of joint j that are used
+that are linear (`runtime.core.signals.noise_gain`), the columns of W move by dW = sum_i W_qi dq_i +
+W_qdi dqd_i + W_qddi dqdd_i + second order. Over the rows t of joint j that are used
 
     E[dW_j' dW_j] = v sum_i sum_t S_i(t) C S_i(t)'
         S_i = [W_qi, W_qdi, W_qddi]: sensitivities to encoder i, C after decimation
@@ -13,11 +12,10 @@ rows t of joint j that are used
     E[W_c' W_c] = W'W + E[dW'dW] + W'E[dW] + E[dW]'W          E[W_c' Y] = W'Y + E[dW]'Y
 
 Decimation filters the products S(t) e(t). S varies with the motion, the errors with the filters'
-cut-off, ten times faster by the rule of the chapter:
-S is taken as constant over one impulse response, the correlation of the errors in time is exact.
-Sensitivities are central differences of the
-emitted regressor along the principal axes of C_0, at the kept instants alone. Columns that switch
-with the sign of a speed: `runtime.advisor.sign_errors`.
+cut-off, ten times faster by the rule of the chapter: S is taken as constant over one impulse
+response, the correlation of the errors in time is exact. Sensitivities are central differences of
+the emitted regressor along the principal axes of C_0, at the kept instants alone. Columns that
+switch with the sign of a speed: `runtime.advisor.sign_errors`.
 """
 
 from __future__ import annotations

@@ -202,7 +202,6 @@ def uncertain(
                 f"{step_text(first, advice.unit)} to {step_text(last, advice.unit)}: the predicted "
                 f"change of {limit.parameter} is {limit.percent:g} %, within the accuracy of the "
                 "prediction. Simulate the encoder's own step: symgen cestac --rounding phase "
-                "--delta "
-                "STEP."
+                "--delta STEP."
             )
     return found

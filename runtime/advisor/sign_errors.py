@@ -1,8 +1,8 @@
 """Friction that switches with the direction of motion, under a noisy velocity.
 
 Columns of sign(s), s = G qd, have no derivative. With s known up to a normal error of deviation
-sigma (filters sum many raw errors, so it is
-normal whatever their law), u = s/sigma, phi and erf of the normal law, He_n Hermite's polynomials,
+sigma (filters sum many raw errors, so it is normal whatever their law), u = s/sigma, phi and erf of
+the normal law, He_n Hermite's polynomials,
 
     E sign(s + sigma z) = erf(u/sqrt 2)
         c_n = E[sign(s + sigma z) He_n(z)] = 2 phi(u) He_(n-1)(-u)
@@ -12,9 +12,8 @@ normal whatever their law), u = s/sigma, phi and erf of the normal law, He_n Her
         rho the correlation of the two errors
 
 c_1/sigma is what takes the place of a derivative: Cov(f, x) = c_1/sigma Cov(s, x) for every x
-normal with s. Four orders are summed one by one.
-Where the speed passes zero quickly the others cancel over the passage; where it stays near zero
-c_n^2/n! falls as n^(-3/2) and their spectrum
+normal with s. Four orders are summed one by one. Where the speed passes zero quickly the others
+cancel over the passage; where it stays near zero c_n^2/n! falls as n^(-3/2) and their spectrum
 widens as n^(1/2), so that all of them together weigh half of what their variance does at order
 five.
 

@@ -1,11 +1,10 @@
 """Can the values of an identification be used? One question after another, each with its answer,
 the limit, and what to do.
 
-The verdict is the worst of the answers. Limits stand in runtime/core/limits.toml: they are conventions of
-practice, not theorems. Errors are relative, in %:
-100 ||Y - W X|| / ||Y||; deviations are the larger of the corrected one and the one of the block
-bootstrap (`runtime.core.uncertainty`), never
-eq. (10) alone.
+The verdict is the worst of the answers. Limits stand in runtime/core/limits.toml: they are
+conventions of practice, not theorems. Errors are relative, in %: 100 ||Y - W X|| / ||Y||;
+deviations are the larger of the corrected one and the one of the block bootstrap
+(`runtime.core.uncertainty`), never eq. (10) alone.
 """
 
 from __future__ import annotations
@@ -270,8 +269,7 @@ def lost_joints(estimate: Estimate, fit: Estimate) -> str:
     none.
 
     The threshold of the essential parameters looks at ||Y - W X|| of all joints. Without weights a
-    joint of large forces rules it, such as a lift
-    in N beside a wrist in N m.
+    joint of large forces rules it, such as a lift in N beside a wrist in N m.
     """
     if len(fit.names) == len(estimate.names):
         return ""

@@ -15,8 +15,7 @@ from runtime.core.errors import encodable
 
 class Result:
     """A dataclass with a text and a JSON text, whose keys it declares: `class Delay(Result,
-    keys="joints
-    shift")`.
+    keys="joints shift")`.
 
     keys : fields and properties in the order of JSON, key:name where JSON calls one otherwise;
     default:
@@ -50,8 +49,7 @@ def plain(value: Any) -> Any:
     null.
 
     Results become their summaries, other dataclasses mappings of their fields, arrays lists,
-    anything
-    else its text.
+    anything else its text.
     """
     if isinstance(value, Result):
         return plain(value.summary())

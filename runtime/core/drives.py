@@ -3,10 +3,9 @@
     qm  = R (q - offset)                    tau = R' (torque_constant * u)
 
 so that the power tau' qd is that of the motors. Off-diagonal elements of R are couplings: motor 6
-of a wrist also turns with joint 5. Leaving
-them out of the position, the torque or both changes the total error of a fit little and ruins the
-joints concerned, hence `decoupled`, for
-reports that compare.
+of a wrist also turns with joint 5. Leaving them out of the position, the torque or both changes the
+total error of a fit little and ruins the joints concerned, hence `decoupled`, for reports that
+compare.
 """
 
 from __future__ import annotations

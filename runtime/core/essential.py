@@ -1,11 +1,10 @@
 """Essential parameters: the few that carry the model (chapter 4.1.1).
 
 The parameter of largest %sigma, eq. (11), is removed and the rest fitted again, as long as
-sigma_rho, eq. (9), stays below threshold times its
-first value. Removing column k deletes a column of the triangular factor and makes its trailing
-block triangular again; W is not touched. The
-same trail, followed to its end, gives the count for every other threshold. With weights, the
-weights of the first fit stay.
+sigma_rho, eq. (9), stays below threshold times its first value. Removing column k deletes a column
+of the triangular factor and makes its trailing block triangular again; W is not touched. The same
+trail, followed to its end, gives the count for every other threshold. With weights, the weights of
+the first fit stay.
 """
 
 from __future__ import annotations

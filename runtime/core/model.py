@@ -133,8 +133,7 @@ def require_emitted(model: Any) -> None:
 
 def _reduced(module: ModuleType) -> tuple[Callable[..., ModuleType], tuple[Any, ...]]:
     """How modules are pickled: an emitted one as text, since the process that receives it trusts
-    the one
-    that sends it; any other by name. InputError for an emitted one without a file.
+    the one that sends it; any other by name. InputError for an emitted one without a file.
     """
     if not hasattr(module, "SOURCE_SHA256"):
         return import_module, (module.__name__,)
@@ -169,9 +168,7 @@ def checked_model(module: ModuleType) -> GeneratedModel:
         raise ModelError(
             (
                 f"{n} joints and {b} base parameters {model.BASE_PARAMETERS}; expected at least "
-                "one "
-                "of "
-                "each, names once"
+                "one of each, names once"
             ),
             file=label,
         )
@@ -286,8 +283,7 @@ def elements_of(
         raise ModelError(
             (
                 f"no {table}, which say what friction acts along; emit it again with this version "
-                "of "
-                "symgen"
+                "of symgen"
             ),
             file=model.NAME,
         )
@@ -321,9 +317,9 @@ def joint_units(model: GeneratedModel) -> tuple[str, ...]:
     """Unit of each joint position, "rad" or "m", in the order of JOINTS.
 
     A joint slides where an element along it alone (friction, spring, motor inertia) has the unit of
-    one that slides; without such elements, where no
-    moment of inertia acts on it, since a force depends on masses and first moments alone. The unit
-    of a column of the user's own says nothing: that of its law is his.
+    one that slides; without such elements, where no moment of inertia acts on it, since a force
+    depends on masses and first moments alone. The unit of a column of the user's own says nothing:
+    that of its law is his.
     """
     units, elements = getattr(model, "UNITS", {}), getattr(model, "ELEMENTS", {})
     result = []

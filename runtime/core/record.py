@@ -94,8 +94,8 @@ class Record:
         `torque` is tau without them.
     missing : array_like of bool, shape (N, n) or (N,), or Missing, optional
         Samples of q that hold no position, where `signals.reader` is counts: np.isnan(q). There q
-        becomes a straight line between its neighbours, for
-        what looks at positions as they are; the reader takes no notice of it.
+        becomes a straight line between its neighbours, for what looks at positions as they are; the
+        reader takes no notice of it.
     channels : mapping of str to array_like, optional
         What else was measured, shape (N, k) by name. An array that cannot be written is taken as it
         is, others are copied.

@@ -117,9 +117,9 @@ class Signals(Settings):
         Decimation; null switches it off.
     reader : str
         Ahead of the low-pass: lowpass takes positions as they are; counts takes them as counts of
-        an encoder, which bound the motion, and
-        needs no median; static takes each row as a pose at rest, with the mean of its torques: no
-        filter, no decimation, no trim, whatever their settings say.
+        an encoder, which bound the motion, and needs no median; static takes each row as a pose at
+        rest, with the mean of its torques: no filter, no decimation, no trim, whatever their
+        settings say.
     step : float or tuple of float or None, rad or m
         Step of the encoders, for counts; null: from the record.
     side : str

@@ -170,13 +170,11 @@ class Uncertainty(Result):
             ),
             (
                 f"Residuals are {white} (Ljung-Box, 5 %); the rows are worth {share:.0f} % of "
-                "their "
-                "number."
+                "their number."
             ),
             (
                 f"The threshold keeps {kept} parameters, an F-test at 5 % on the rows that count "
-                "keeps "
-                f"{self.kept_by_f_test}."
+                f"keeps {self.kept_by_f_test}."
             ),
         )
 

@@ -2,8 +2,8 @@
 or refused.
 
 The step comes from a data sheet or from the record, the phase from the record alone. Floor against
-round in a driver, and an offset of up to half a
-step of the zero of the joint, cannot be told from counts.
+round in a driver, and an offset of up to half a step of the zero of the joint, cannot be told from
+counts.
 """
 
 from __future__ import annotations
@@ -212,9 +212,8 @@ def unwrapped_counts(
             is_wrap = np.any([np.abs(np.abs(size) - w) <= moved for w in periods], axis=0)
             first = int(np.argmin(is_wrap))
             raise InputError(
-                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; "
-                "it was reset or lost there, cut the record at "
-                "such samples",
+                f"encoder {j + 1}: the count jumps by {size[first]:.0f} at sample {at[first]}; it "
+                "was reset or lost there, cut the record at such samples",
                 file=name,
             )
         turns = np.zeros(len(k))
@@ -246,8 +245,7 @@ def _step(x: Array, given: float | None, label: str, name: str) -> tuple[float, 
         raise InputError(
             (
                 f"{label}: step {given:g} is larger than its motion, {span:g}; correct "
-                "signals.step "
-                f"(side: {label} sees the motor or the joint)"
+                f"signals.step (side: {label} sees the motor or the joint)"
             ),
             file=name,
         )
@@ -298,16 +296,14 @@ def _speed(change: Array, label: str) -> list[str]:
         return [
             (
                 f"{label}: the count changes {len(moving)} times only; the motion is known at "
-                "these "
-                "instants alone, move further or use a finer encoder"
+                "these instants alone, move further or use a finer encoder"
             )
         ]
     if len(moving) and (fast := float(np.median(moving))) > FAST:
         return [
             (
                 f"{label}: the count changes by {fast:.0f} a sample; no edge is seen, counts tell "
-                "as "
-                "much as positions here, log faster"
+                "as much as positions here, log faster"
             )
         ]
     return []

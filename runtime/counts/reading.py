@@ -315,15 +315,12 @@ class Gaps:
         return tuple(
             (
                 f"encoder {j + 1}: {self.samples[j]} samples are missing, at most "
-                f"{self.longest[j]} "
-                "in "
-                f"a row ({self.longest[j] / rate:.3g} s); "
+                f"{self.longest[j]} in a row ({self.longest[j] / rate:.3g} s); "
             )
             + (
                 (
                     "where the counts around a gap do not tell the position to half a step, rows "
-                    "are "
-                    f"left out ({self.unknown[j]} samples)"
+                    f"are left out ({self.unknown[j]} samples)"
                 )
                 if self.unknown[j]
                 else "the counts around them tell the motion there"

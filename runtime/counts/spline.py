@@ -10,10 +10,9 @@ samples: means, deviations, draws in linear time.
     diagonal,  A c = sum_k nu_k b_k
 
 A = L L' by LAPACK. Elements of Z = A^-1 within the band follow from L backward in time (Takahashi):
-c_i given the later ones is normal, of
-mean l_i'(c_(i+1), c_(i+2), c_(i+3)) and variance 1/L_ii^2. The recursion is linear in what stands
-at its end, so stretches of time are passed
-side by side from an end without error, and joined afterwards; exact, with few steps of long arrays.
+c_i given the later ones is normal, of mean l_i'(c_(i+1), c_(i+2), c_(i+3)) and variance 1/L_ii^2.
+The recursion is linear in what stands at its end, so stretches of time are passed side by side from
+an end without error, and joined afterwards; exact, with few steps of long arrays.
 
 References: Takahashi, Fagan and Chin (1973); Wahba (1978) for splines as posteriors of integrated
 white noise.
@@ -215,10 +214,9 @@ def next_density(basis: Basis, samples: Array, unit: Array, g: Array, r: float) 
     samples, unit : shares of A that sites have, and the prior of density one.
     g : slope at c = 0.
 
-    The number is M less the trace of
-    A^-1 unit/r, which is the slope of log |A| by log 1/r: two factors and no inverse. Never below
-    basis.least_density: where counts tell no jerk, the
-    rule has no other fixed point than zero.
+    The number is M less the trace of A^-1 unit/r, which is the slope of log |A| by log 1/r: two
+    factors and no inverse. Never below basis.least_density: where counts tell no jerk, the rule has
+    no other fixed point than zero.
     """
     factor, beside = (Factor.of(samples + unit / x) for x in (r, r * np.exp(SLOPE)))
     determined = basis.M - (factor.log_determinant - beside.log_determinant) / SLOPE

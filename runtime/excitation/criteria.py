@@ -2,8 +2,8 @@
 section 2.2.3).
 
 The criterion is that of the observation matrix as an estimator uses it: rows of joint j divided by
-the deviation s_j of its torque, columns multiplied by the
-size of their parameter, so that parameters are compared by their relative error.
+the deviation s_j of its torque, columns multiplied by the size of their parameter, so that
+parameters are compared by their relative error.
 
     W_w = diag(1/s_j) W diag(|X_i|)       cond      s_max/s_min of W_w
                                           logdet    -log det W_w'W_w
@@ -92,8 +92,7 @@ class Excess:
 
     def __str__(self) -> str:
         return (
-            f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, "
-            "limit "
+            f"{self.what} of joint {self.joint} is {self.value:.4g} at {self.time:.3f} s, limit "
             f"{self.limit:.4g}"
         )
 
@@ -109,8 +108,7 @@ def limits_of(model: GeneratedModel, given: Mapping[str, Any]) -> MotionLimits:
         raise SettingsError(
             (
                 f"{model.NAME} has no limits of {', '.join(missing)}; give them here or in the "
-                "robot "
-                "file"
+                "robot file"
             ),
             path=("limits",),
         )

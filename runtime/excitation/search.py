@@ -5,8 +5,8 @@
     t, q, qd, qdd, tau = excitation.sampled()
 
 The margin at the points of the optimiser's grid (`runtime.excitation.optimiser`) is widened until
-the limits hold at the controller rate. Every
-figure of the result is that of the rows the identification will use, with sign(qd) itself.
+the limits hold at the controller rate. Every figure of the result is that of the rows the
+identification will use, with sign(qd) itself.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ class ExcitationSettings(Settings):
         (`runtime.excitation.poses`); null: a motion.
     criterion : str
         record, cond, logdet or sigma; auto: record where there is one, else cond. record is the
-        largest predicted %sigma over that of the motion of
-        the record: below 1, every parameter is told better than by it.
+        largest predicted %sigma over that of the motion of the record: below 1, every parameter is
+        told better than by it.
     columns : str or tuple of str
         essential (of an estimate), all, or names.
     limits : mapping

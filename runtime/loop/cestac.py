@@ -12,12 +12,10 @@ encoders that stand inside it.
                 y = R^-1 (phi + Delta floor((R (q - offset) - phi)/Delta + 1/2)) + offset
 
 Rounding recorded positions alone tells nothing of a controller that answers encoder steps, and next
-to nothing of didim, which reads one position.
-In the loop every run has a seed of its own for phase, torque noise and disturbance, the same for
-every Delta and method; so have the runs that they are
-compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e is
-what the steps alone do. `around` of estimate.options
-then serves every method.
+to nothing of didim, which reads one position. In the loop every run has a seed of its own for
+phase, torque noise and disturbance, the same for every Delta and method; so have the runs that they
+are compared with, whose encoder is that of the study (an exact one, if it gives none), so that %e
+is what the steps alone do. `around` of estimate.options then serves every method.
 """
 
 from __future__ import annotations

@@ -13,18 +13,16 @@ DIDIM compare the record with.
                                               decimation alone       DIDIM
 
 g_j^k = J_j(X^k)/J_j(X_ref), J_j the mean of A_jj over the reference, multiplies all that stands
-between position error and torque: the bandwidth
-of the simulated loop stays that of the real one while X^k is far from the truth. Rows are chosen by
-the velocity of the reference, never by that
-of the measured positions: a choice that depends on noise biases every method. Slow rows of joint j
-(`rows.low_speed`) are those where a dry friction
-that acts on it, coupled ones of a wrist included, slips slower: at rest its torque is anything
-between -FS and FS, not W X, and the decimation smears
+between position error and torque: the bandwidth of the simulated loop stays that of the real one
+while X^k is far from the truth. Rows are chosen by the velocity of the reference, never by that of
+the measured positions: a choice that depends on noise biases every method. Slow rows of joint j
+(`rows.low_speed`) are those where a dry friction that acts on it, coupled ones of a wrist included,
+slips slower: at rest its torque is anything between -FS and FS, not W X, and the decimation smears
 that into the rows `around`. Instants with the torque at its limit are left out.
 
 Where the reference is not known (`reference: measured`), the measured motion through the filters
-stands for it: then the instruments carry the
-noise of the same run, and DIDIM is output error about itself. The Estimate says so.
+stands for it: then the instruments carry the noise of the same run, and DIDIM is output error about
+itself. The Estimate says so.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """The C of CasADi functions, compiled on first use into a cache that is checked.
 
-The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder
-(compiled in `SYMGEN_CACHE`, else that of the platform). Its name
-holds the SHA-256 of source, flags, compiler and processor, and that of its own bytes, so that a
-damaged file is not loaded; it is
-written under another name and moved, so that processes may compile at once.
+The system compiler (`CC`, else cc, gcc, clang) writes a shared object into a cache folder (compiled
+in `SYMGEN_CACHE`, else that of the platform). Its name holds the SHA-256 of source, flags, compiler
+and processor, and that of its own bytes, so that a damaged file is not loaded; it is written under
+another name and moved, so that processes may compile at once.
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@
     cascade  P = kv kp    Vr = kv cv    Vm = kv       K = ki   Ie = kp   Ir = cv   Im = 1
 
 all of P, Vr, Vm, K times the gain of the drive. g scales everything between position error and
-torque, the saturation too: with
-g_j = J_j(X)/J_j(reference) a simulation with other parameters keeps the bandwidth of the real loop.
+torque, the saturation too: with g_j = J_j(X)/J_j(reference) a simulation with other parameters
+keeps the bandwidth of the real loop.
 """
 
 from __future__ import annotations

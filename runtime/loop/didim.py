@@ -5,11 +5,10 @@ simulated motion.
             Z^k = F_p[W(q_s, qd_s, qdd_s)] of the simulation with X^k
 
 Needs the measured torque and the reference; of the measured position only its start. Z passes the
-decimation alone: simulated states are
-exact. It is output error on the torque with the Jacobian of the loop left out (the loop holds q_s
-near q_r). C = (Z'VZ)^-1. The residual is that
-of the simulated motion, larger than that of IV with the same X: what moved the arm besides the
-model is not in Z.
+decimation alone: simulated states are exact. It is output error on the torque with the Jacobian of
+the loop left out (the loop holds q_s near q_r). C = (Z'VZ)^-1. The residual is that of the
+simulated motion, larger than that of IV with the same X: what moved the arm besides the model is
+not in Z.
 
 Reference: Gautier, Janot and Vandanjon (2013).
 """

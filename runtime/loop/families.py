@@ -12,9 +12,8 @@ frequency, point to point, triangular.
             (chapter, section 4.2.1)
 
 A family turns the coefficients p of one joint into its motion. The same text evaluates arrays
-(numpy) and expressions (casadi): `math` is the
-module whose sin and cos apply. All but Sinusoids are linear in p. Position, velocity and
-acceleration are continuous. SI, rad.
+(numpy) and expressions (casadi): `math` is the module whose sin and cos apply. All but Sinusoids
+are linear in p. Position, velocity and acceleration are continuous. SI, rad.
 """
 
 from __future__ import annotations

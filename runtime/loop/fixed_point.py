@@ -5,13 +5,12 @@ that stay physical.
     still; then again with g = 1
 
 g refers to X_ref, which is not the truth: the last passes need g = 1. A parameter vector whose loop
-cannot be simulated (inertia not positive
-definite, unstable) is refused: the step towards it is halved, at most five times. Stop: max
+cannot be simulated (inertia not positive definite, unstable) is refused: the step towards it is
+halved, at most five times. Stop: max
 |dX_i|/sigma_i < 0.1 and the norm of the residual
 changes by less than 1e-3 of itself, or the change is rounding. A loose loop makes passes of DIDIM
-overshoot: from the third pass on the steps are
-those of Anderson (1965), f_k = X_next - X^k, gamma = argmin |f_k - dF gamma| over the last
-differences, X^(k+1) = X^k + f_k - (dX + dF) gamma.
+overshoot: from the third pass on the steps are those of Anderson (1965), f_k = X_next - X^k, gamma
+= argmin |f_k - dF gamma| over the last differences, X^(k+1) = X^k + f_k - (dX + dF) gamma.
 """
 
 from __future__ import annotations

@@ -128,14 +128,12 @@ def law_text(fits: Sequence[LawFit]) -> str:
     hints = ", ".join(
         (
             f"joint {one.joint} {max(one.best, 0.0):.0f} % with {one.factor:.3g} times the gains "
-            "and "
-            f"{1000 * one.delay:.0f} ms later"
+            f"and {1000 * one.delay:.0f} ms later"
         )
         for one in poor
     )
     return (
-        f"The stated control law explains {shares} of the torques: gains, units, side, delay "
-        "or "
+        f"The stated control law explains {shares} of the torques: gains, units, side, delay or "
         f"reference are not those of this record (best: {hints})."
     )
 

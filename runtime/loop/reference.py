@@ -212,8 +212,7 @@ def require_rate(record: Record, controller: Controller) -> None:
     raise SettingsError(
         (
             f"{told}; the rate of the controller is no multiple of that of the record: correct one "
-            "of "
-            "them"
+            "of them"
         ),
         path=("controller", "rate"),
     )

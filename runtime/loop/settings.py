@@ -2,10 +2,8 @@
 encoders and drives.
 
     controller:
-      law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]}
-      rate: 5000
-      reference: {points: {duration: 10, seed: 1}}
-      encoder: {step: 2*pi/65536, side: motor}
+      law: {kind: pid, kp: [450, ...], kd: [2.5, ...], ki: 0, gain: [35.24, ...]} rate: 5000
+      reference: {points: {duration: 10, seed: 1}} encoder: {step: 2*pi/65536, side: motor}
 
 SI, rad, joint side. A number stands for all joints.
 """

@@ -7,8 +7,7 @@
     torque      100 ||tau_s - tau||/||tau||           decimated, on the rows of the observation
 
 A simulated motion that is not the measured one makes Z, or the output error, that of another
-experiment: whatever the residual says then, it is not
-about this robot. Limits are conventions.
+experiment: whatever the residual says then, it is not about this robot. Limits are conventions.
 """
 
 from __future__ import annotations

@@ -5,11 +5,10 @@
     run = simulator.run(X, reference, g=g, ideal=True)      # exact states, no noise, no steps
 
 Torque is held between the ticks of the controller; between them Runge-Kutta of order 4 (or CVODES),
-with dry friction that holds at rest and only
-takes energy. Substeps are at most `pole_step` over the fastest pole of the loop. Before a run the
-inertia matrix must be positive definite and
-the sampled loop stable along the reference: what is not raises SimulationError, which says where,
-and what to try.
+with dry friction that holds at rest and only takes energy. Substeps are at most `pole_step` over
+the fastest pole of the loop. Before a run the inertia matrix must be positive definite and the
+sampled loop stable along the reference: what is not raises SimulationError, which says where, and
+what to try.
 """
 
 from __future__ import annotations

@@ -7,8 +7,7 @@ c_plus,
             between them where s = 0,
 
 h without dry friction. At rest the force is the one that keeps ds/dt = 0 while it lies between its
-bounds, else the bound itself: a linear
-complementarity problem, solved by block pivots.
+bounds, else the bound itself: a linear complementarity problem, solved by block pivots.
 
 A step ends where a slip changes its sign, and the slip is zero from there on: friction never pushes
 along the motion, so that it takes energy only.

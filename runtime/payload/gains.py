@@ -1,9 +1,8 @@
 """Torque constants of the drives from a weighed load.
 
 The torque of a record is v, computed with the torque constants of the robot file; the true one is g
-v, a factor per motor. V holds the share of
-every motor in the torque of every joint (block diagonal without coupling), a without the load, b
-with it:
+v, a factor per motor. V holds the share of every motor in the torque of every joint (block diagonal
+without coupling), a without the load, b with it:
 
     [[V_a, -W_a, 0, 0], [V_b, -W_b, -W_Lu, -W_Lk chi_Lk]] [g; X; chi_Lu; 1] = 0
 

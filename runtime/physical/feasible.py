@@ -4,12 +4,11 @@
             P_j(chi) >= margin S_j, forms >= margin 1, Ia, FV, FS >= margin, limits
     X = K chi                                    R z = Q'Y, W = Q R
 
-W is factored once and b rows enter the semidefinite program (`runtime.physical.semidefinite`);
-the conditions are those of `runtime.physical.inertia`. All base
-parameters are fitted, essential or not: a condition ties every parameter of a link. With the
-columns of some parameters alone, the others
-are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls. Where least
-squares is feasible, it is the solution.
+W is factored once and b rows enter the semidefinite program (`runtime.physical.semidefinite`); the
+conditions are those of `runtime.physical.inertia`. All base parameters are fitted, essential or
+not: a condition ties every parameter of a link. With the columns of some parameters alone, the
+others are free to make a robot of them. `weights` weighs the rows as for ols ("none") and wls.
+Where least squares is feasible, it is the solution.
 
 options (all of `runtime.physical.feasibility.RobotLimits` too):
     margin     smallest eigenvalue of every condition: of a link with values in the robot file as
@@ -85,8 +84,8 @@ class FeasibleOptions(RobotLimits):
         Distance D of the inertial parameters from the values of the robot file: none or euclidean; auto: euclidean where the file has values of links, else none.
     weight : float or str
         Weight of D; held-out: that by which four fifths of the record in time predict the fifth
-        that is left out best; auto: the largest, to half
-        a decade, that raises the residual norm by at most 1 %.
+        that is left out best; auto: the largest, to half a decade, that raises the residual norm by
+        at most 1 %.
     reach : float, str or None, m
         Size of the robot: no centre of mass lies further from the origin of its frame, and all
         links together weigh less than a fifth of the water in a cube of that

@@ -2,20 +2,18 @@
 actuators have inertia, friction takes power.
 
 Base parameters are X = K chi, chi the standard parameters. Of link j, with J the inertia tensor
-about the origin of its frame (the elements XX .. ZZ
-as they are) and l = (MX, MY, MZ), the pseudo-inertia
+about the origin of its frame (the elements XX .. ZZ as they are) and l = (MX, MY, MZ), the
+pseudo-inertia
 
     P_j = [[tr(J)/2 1 - J, l], [l', M]],   4 x 4,
 
 is the matrix of second moments of the density in homogeneous coordinates: a density exists if and
-only if P_j is positive semidefinite, which holds
-the triangle inequalities of the moments of inertia. Every element along s = G q (inertia, viscous,
-Coulomb) asks for c >= 0. Elements given as forms
-q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive
-semidefinite (the inertia of a coupled wrist,
-the power its viscous friction takes). Friction of one direction of motion counts in that direction
-and leaves forms alone. Offsets and springs
-have no sign.
+only if P_j is positive semidefinite, which holds the triangle inequalities of the moments of
+inertia. Every element along s = G q (inertia, viscous, Coulomb) asks for c >= 0. Elements given as
+forms q'Bq act together with those along the same joints: the sum of c_k B_k of one kind is positive
+semidefinite (the inertia of a coupled wrist, the power its viscous friction takes). Friction of one
+direction of motion counts in that direction and leaves forms alone. Offsets and springs have no
+sign.
 
 References: Wensing, Kim and Slotine (2018) for P_j; Sousa and Cortesao (2014, 2019) for
 identification under such constraints.

@@ -9,13 +9,11 @@
 
 S = diag(size) of the condition: the cones hold S^-1/2 P S^-1/2, whose entries are near one.
 Clarabel solves  min 1/2 x'Qx + c'x,  A x + s = b,  s in a product of cones. The unknowns x are w of
-chi = origin + basis w, with sizes near one as
-interior point methods want, then what the criterion adds: residuals y with y = R chi - z as an
-equation, so that R is not squared (the euclidean
+chi = origin + basis w, with sizes near one as interior point methods want, then what the criterion
+adds: residuals y with y = R chi - z as an equation, so that R is not squared (the euclidean
 distance, of unknowns in units of their size, is). A symmetric matrix enters by the columns of its
 upper triangle, entries off the diagonal times sqrt(2). K chi = X is a Space, not an equation, and
-holds to
-rounding. Clarabel is deterministic: same problem, same bits.
+holds to rounding. Clarabel is deterministic: same problem, same bits.
 
 Reference: Goulart and Chen (2024) for Clarabel; Boyd and Vandenberghe, Convex Optimization (2004),
 for the cones.

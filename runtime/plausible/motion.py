@@ -6,9 +6,9 @@ tell, from W alone, before anything is fitted? Friction at rest is no law of mot
             `runtime.core.rows.predicted` predicts it
 
 is the predicted deviation of parameter i in % of the value with which it alone would make all of
-the measured torque. A larger value is not to be expected, so
-its %sigma is hardly below share_i. The torque noise is taken as LIMIT.TORQUE_NOISE of the torque of
-the joint, white: a convention, since the noise is not known before the fit.
+the measured torque. A larger value is not to be expected, so its %sigma is hardly below share_i.
+The torque noise is taken as LIMIT.TORQUE_NOISE of the torque of the joint, white: a convention,
+since the noise is not known before the fit.
 """
 
 from __future__ import annotations

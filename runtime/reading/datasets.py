@@ -5,9 +5,8 @@ with them.
     dataset_study("tx40")                    settings as read from a study file
 
 A file is looked for in the folder SYMGEN_DATA as <name>/<file> or <name>/<file>.gz (never written
-to), then in the user's cache, then at its
-source. Hashes are of the uncompressed bytes. The records belong to their authors and are not part
-of this package.
+to), then in the user's cache, then at its source. Hashes are of the uncompressed bytes. The records
+belong to their authors and are not part of this package.
 """
 
 from __future__ import annotations

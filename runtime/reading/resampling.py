@@ -5,10 +5,10 @@ step back of time.
                                 for every stretch without gap or step back
 
 between two samples by a straight line or by a cubic spline through all samples of the stretch. For
-a signal of highest pulsation w and steps up to h the error is at
-most (w h)^2/8 or 5 (w h)^4/384 of its amplitude (de Boor, A Practical Guide to Splines, 2001,
-II.(12) and V.(18)), the ends of the spline aside. Nothing is
-filtered: a rate below that of the record would fold what lies above half of it, and is refused.
+a signal of highest pulsation w and steps up to h the error is at most (w h)^2/8 or 5 (w h)^4/384 of
+its amplitude (de Boor, A Practical Guide to Splines, 2001, II.(12) and V.(18)), the ends of the
+spline aside. Nothing is filtered: a rate below that of the record would fold what lies above half
+of it, and is refused.
 
 Where the samples are uniform and their stamps are not (a controller samples, another computer
 stamps), interpolation at the stamps would add the jitter times the

@@ -66,10 +66,9 @@ class Columns(Settings):
     """Names of the columns of a record file, one per joint.
 
     A name may be the number of the column (from 1) in a file without header, or an (N, n) array of
-    a .npz or .mat file, which stands
-    for its n columns. `names` stands for the labels of the joints in the robot file: a column is
-    called as the joint, or q_ and the joint,
-    joint.position, tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
+    a .npz or .mat file, which stands for its n columns. `names` stands for the labels of the joints
+    in the robot file: a column is called as the joint, or q_ and the joint, joint.position,
+    tau_joint, joint/effort ...; of q it stands for tau too, where tau is left out.
 
     Attributes
     ----------
@@ -97,8 +96,8 @@ class Columns(Settings):
         are those of tau. For methods that simulate it, and for the torque of a law.
     tau_known : tuple of str
         Torques of the drives that do not come from the model (a counterbalance, a cable), computed
-        elsewhere; N m or N, joint side. They are
-        subtracted from tau. 0 in place of a name: none on this joint.
+        elsewhere; N m or N, joint side. They are subtracted from tau. 0 in place of a name: none on
+        this joint.
     channels : mapping of str to str
         Column of each channel.NAME of the laws of the robot file, in the file of the positions, as
         it is: {temperature: T_motor}.
@@ -188,8 +187,7 @@ class Resample(Settings):
         Sampling rate made; default: record.rate, else the mean rate of the record.
     method : str
         cubic or linear interpolate between the stamps; count takes the samples as they are, for a
-        logger whose stamps jitter while the
-        controller samples uniformly.
+        logger whose stamps jitter while the controller samples uniformly.
     gaps : str
         refuse a record with gaps or with time that goes back, or split it at these places into
         records of their own.
@@ -213,8 +211,7 @@ class RecordSettings(Settings):
     ----------
     files : tuple of str
         One file with all columns, or two: positions (and time), then torques; then, where it is
-        apart, the file of the known torques. Relative to
-        the study file, or files of `dataset`.
+        apart, the file of the known torques. Relative to the study file, or files of `dataset`.
     columns : Columns
         Names of the columns.
     side : str

@@ -6,9 +6,8 @@ used. Inside, everything is SI.
     speed("30 rpm")          3.141592653589793
 
 The units of most records are in a table; pint is loaded for others, which it knows by their
-dimension. A grammar checks a unit before pint reads
-it: names, products, quotients and small powers, no numbers and no calls. Factors are computed as
-fractions and rounded once.
+dimension. A grammar checks a unit before pint reads it: names, products, quotients and small
+powers, no numbers and no calls. Factors are computed as fractions and rounded once.
 """
 
 from __future__ import annotations

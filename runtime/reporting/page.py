@@ -2,9 +2,8 @@
 anyone. jinja2 only here.
 
 A Page is plain values; the template holds the layout. Everything that comes from a file or a user
-is escaped, by the template or by `markup.element`;
-numbers for the script are JSON in which <, > and & are escapes. The content security policy allows
-this script and this style sheet by their
+is escaped, by the template or by `markup.element`; numbers for the script are JSON in which <, >
+and & are escapes. The content security policy allows this script and this style sheet by their
 hashes, hence nothing else. Without scripts, and in print, figures are the images and tables stand
 as they were written.
 """

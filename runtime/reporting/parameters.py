@@ -105,9 +105,8 @@ def parameter_section(result: Identification) -> Section:
             if len(fit.names) < len(estimate.names)
             else ""
         )
-        + "Beside "
-        "stands the fit of all parameters together. Ratio: of σρ, eq. (9), without it to its "
-        "first value.",
+        + "The last columns are the fit of all parameters together. Ratio: σρ of eq. (9) without "
+        "the parameter, over its first value.",
     ]
     if cad:
         text.append(
@@ -161,8 +160,7 @@ def correlation_section(result: Identification) -> Section:
         f"Groups, all parameters fitted: {groups}.",
         (
             "Two estimates with a correlation near ±1 are known together, not apart: what one "
-            "gains "
-            "the other loses, and the torques hardly change."
+            "gains the other loses, and the torques hardly change."
         ),
     )
     matrix = correlation_matrix(result.model_estimate)

@@ -44,14 +44,12 @@ def torque_section(result: Identification) -> Section:
         plots.drawn(
             (
                 f"Joint {joint.joint}: {result.source}, predicted by {columns} parameters, and "
-                "error "
-                f"below; {joint.relative_error:.2f} % of the {result.source} norm"
+                f"error below; {joint.relative_error:.2f} % of the {result.source} norm"
             ),
             plots.joint_overlay(joint, unit, result.source),
             (
                 f"Torque of joint {joint.joint} against time: {result.source}, predicted, error; "
-                "error "
-                f"{joint.relative_error:.1f} %"
+                f"error {joint.relative_error:.1f} %"
             ),
             series=series(joint, unit, result.source),
         )
@@ -101,10 +99,10 @@ def joint_section(result: Identification) -> Section:
     )
     text = (
         f"{fit.rows} rows, {len(fit.names)} parameters, rank {fit.rank}; condition number of W "
-        f"{number(fit.cond)}, {number(fit.cond_unit)} "
-        f"with columns of norm 1. Residual norm {number(fit.residual_norm, '.6g')} with all "
-        f"parameters, {number(essential.residual_norm, '.6g')} with the "
-        "essential ones. The error is 100 ||Y - W X|| / ||Y||.",
+        f"{number(fit.cond)}, {number(fit.cond_unit)} with columns of norm 1. Residual norm "
+        f"{number(fit.residual_norm, '.6g')} with all parameters, "
+        f"{number(essential.residual_norm, '.6g')} with the essential ones. The error is 100 ||Y - "
+        "W X|| / ||Y||.",
         *([fit.message] if fit.message else []),
     )
     return Section(
@@ -183,8 +181,7 @@ def validation_section(result: Identification) -> Section:
     text = (
         (
             "Parameters fitted on one part of the data predict the torques of another; the "
-            "essential "
-            "names are those of the whole record."
+            "essential names are those of the whole record."
         ),
         result.ranking,
     )

@@ -6,23 +6,19 @@ Exact, over F_p at fresh random lengths and states, for two or more primes:
             rank_p(D_base) = number of base parameters.
 
 The primes are drawn anew, so that no coefficient is checked over the prime that gave it. The rank
-over F_p is never above the generic rank, so
-equality proves that no further relation exists. A false identity is a nonzero rational function of
-the geometry and of each state; with
-its degree bounded by d (`degree`: every angle counts 2 per multiple, numerator and denominator
-together) it vanishes at a random geometry, or at
-every state of one, with probability at most 2 d/p (Schwartz 1980, Zippel 1979). Draws are repeated
-until (2 d/p)**draws is below SURE. Numbers are
-not random: a false identity among them is a fixed nonzero number, which only its own few prime
-factors divide.
+over F_p is never above the generic rank, so equality proves that no further relation exists. A
+false identity is a nonzero rational function of the geometry and of each state; with its degree
+bounded by d (`degree`: every angle counts 2 per multiple, numerator and denominator together) it
+vanishes at a random geometry, or at every state of one, with probability at most 2 d/p (Schwartz
+1980, Zippel 1979). Draws are repeated until (2 d/p)**draws is below SURE. Numbers are not random: a
+false identity among them is a fixed nonzero number, which only its own few prime factors divide.
 
 General loops: the same identities at random points of the closed mechanism (`regroup.closed_draw`),
 lengths that are numbers of the file at their values; the rank at random ones.
 
 Numeric, in floats at the lengths of the robot file: the standard regressor W of a dynamics by
-energies (`derive.lagrange`), which shares
-no code with the recursions, has the rank of the base parameters (SVD), and W chi = W_base X for
-random chi and X of the formulas.
+energies (`derive.lagrange`), which shares no code with the recursions, has the rank of the base
+parameters (SVD), and W chi = W_base X for random chi and X of the formulas.
 """
 
 from __future__ import annotations

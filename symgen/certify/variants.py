@@ -6,10 +6,10 @@ length or gravity, without another derivation.
     free.observation_matrix(q, qd, qdd, free_gx=9.81, free_gz=0.0)
 
 Its columns are all standard parameters: which of them regroup depends on the geometry, and is left
-to the numbers. `runtime.identify` takes it
-as `variants` and tries with it whether another table explains a record better. A robot with closed
-loops keeps its table, which the loops have to close; gravity alone is free there. Frames between
-joints that a constraint ties keep their entries: it holds for this geometry.
+to the numbers. `runtime.identify` takes it as `variants` and tries with it whether another table
+explains a record better. A robot with closed loops keeps its table, which the loops have to close;
+gravity alone is free there. Frames between joints that a constraint ties keep their entries: it
+holds for this geometry.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def variants(robot: str | Path | Robot) -> ModuleType:
     -------
     module
         Constants free_alpha1, free_d1, free_theta1, free_r1 ... (gamma and b where a frame has
-        them), free_gx, free_gy, free_gz, beside those of the
-        robot file; their defaults are its entries.
+        them), free_gx, free_gy, free_gz, beside those of the robot file; their defaults are its
+        entries.
     """
     robot = freed(robot if isinstance(robot, Robot) else load_robot(robot))
     regrouping = ungrouped(robot)

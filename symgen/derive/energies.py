@@ -16,9 +16,8 @@ rate of change in space is
     a_k + U_k r ,     U_k = skew(zd_k) + skew(z_k) skew(w_j) ,
 
 and C_ik is the torque at joint i that moves the links with these accelerations: C_ik = sum over
-mass points of dx/dq_i . d/dt(dx/dq_k), whose part per
-qd_l is the Christoffel symbol sum dx/dq_i . d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C',
-and Ad - 2C is skew symmetric.
+mass points of dx/dq_i . d/dt(dx/dq_k), whose part per qd_l is the Christoffel symbol sum dx/dq_i .
+d2x/dq_k dq_l of the inertia matrix. Hence Ad = C + C', and Ad - 2C is skew symmetric.
 
 Columns of other dynamics, all linear in the parameters:
 

@@ -4,10 +4,9 @@
             P_ij = b e3 + d A_j e1 + r A_j e3
 
 Consecutive parallel axes (alpha = 0) are one rotation by the sum of their angles: the *carrier* of
-frame j is the last frame m on
-its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum of angles). Whatever only
-rotates (angular velocities,
-joint axes) is taken from the carrier in one step, which is where C23 and S23 come from.
+frame j is the last frame m on its path whose z axis is not parallel to z_j, and mRj = A Rot(z, sum
+of angles). Whatever only rotates (angular velocities, joint axes) is taken from the carrier in one
+step, which is where C23 and S23 come from.
 """
 
 from __future__ import annotations

@@ -22,9 +22,8 @@ along s), add
     (coulomb)
 
 with `when: positive` where sd > 0 only, negative where sd < 0. Coordinates are all joints that
-move, the cut and passive ones included (the
-open tree). A mechanism with loops is the tree restricted to q = f(qa), where phi(q) = 0 closes the
-loops:
+move, the cut and passive ones included (the open tree). A mechanism with loops is the tree
+restricted to q = f(qa), where phi(q) = 0 closes the loops:
 
     Gamma_a = G' Gamma_tree,   G = dq/dqa,   qd = G qad,   qdd = G qadd + Gdot qad .
 
@@ -145,8 +144,7 @@ class Lagrange:
     geometry in floats.
 
     Every method takes q, qd, qdd of shape (..., n), rad or m and their rates, and returns the same
-    leading axes. chi is (p,) in the order
-    of `robot.parameters`, or (..., p).
+    leading axes. chi is (p,) in the order of `robot.parameters`, or (..., p).
     """
 
     def __init__(self, robot: Robot, constants: Mapping[str, float] | None = None) -> None:
@@ -300,8 +298,7 @@ class Lagrange:
         (..., n_a).
 
         Loops are closed by Newton's method from the constraints, or followed from a `start` of all
-        joints; a state that it cannot close, or reach
-        without passing near a dead point, is NaN.
+        joints; a state that it cannot close, or reach without passing near a dead point, is NaN.
         """
         actuated = [self.robot.moving.index(j) for j in self.robot.joints]
         passive = [self.robot.moving.index(j) for j in self.robot.passive]
@@ -516,9 +513,9 @@ def sampled(
     within 0.5 of their start.
 
     Velocities and accelerations are standard normal; in every other state each velocity is divided
-    by its leverage, so that the sign of
-    q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels are drawn at every state. Raises
-    DescriptionError where the loops close in too few of the states.
+    by its leverage, so that the sign of q4 + 101.25 q5 is not that of q5 alone. `in_time`: channels
+    are drawn at every state. Raises DescriptionError where the loops close in too few of the
+    states.
     """
     model, rng = Lagrange(robot, constants), np.random.default_rng(seed)
     free = not robot.loops or set(robot.passive) <= set(robot.constraints)
@@ -557,8 +554,7 @@ def sampled(
     raise DescriptionError(
         (
             f"{robot.name}: the loops close in {len(D)} of {DRAWS * states} random states near "
-            "their "
-            "start; give each loop a `start` that closes it"
+            "their start; give each loop a `start` that closes it"
         ),
         path=("loops",),
     )

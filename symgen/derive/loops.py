@@ -157,8 +157,7 @@ def _angle_sum(
     direction, forwards or backwards, slides and twists between them or not.
 
     The directions are looked at in two configurations of the open tree; `regroup.closed_draw`
-    proves
-    the sum over F_p.
+    proves the sum over F_p.
     """
     robot = assembly.robot
     if robot.frame(loop.cut).sigma != REVOLUTE:

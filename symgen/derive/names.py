@@ -1,9 +1,8 @@
 """Families of named quantities, and how their indices are written.
 
 Order of indices: component digits, link, then the joint it belongs to: W12 is component 1 of link
-2, U312 row 3 column 1 of
-link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than nine frames indices are
-separated: W1_12.
+2, U312 row 3 column 1 of link 2, Z132 component 1 in frame 3 of the axis of joint 2. With more than
+nine frames indices are separated: W1_12.
 """
 
 from __future__ import annotations

@@ -68,8 +68,7 @@ def degrees_advice(angle: Expression, constants: dict[str, float]) -> str:
     return (
         (
             f"{value:g} rad are {abs(value) / FULL_TURN:.3g} turns; angles are in rad: 90 degrees "
-            "are "
-            "pi/2"
+            "are pi/2"
         )
         if abs(value) > FULL_TURN
         else ""

@@ -85,8 +85,7 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
             raise DescriptionError(
                 (
                     f"joint {f.j}: mu = {f.mu}; expected 1 actuated or 0 passive, and 0 for a "
-                    "fixed "
-                    "frame"
+                    "fixed frame"
                 ),
                 path=(*where, "mu"),
             )
@@ -101,8 +100,7 @@ def _check_tree(frames: Sequence[Frame], massless: Collection[int]) -> None:
                 raise DescriptionError(
                     (
                         f"frames {sorted(chain)} are each other's antecedents (a cycle); every "
-                        "chain "
-                        "of `ant` must end at 0"
+                        "chain of `ant` must end at 0"
                     ),
                     path=(*where, "ant"),
                 )
@@ -145,8 +143,7 @@ def _check_geometry(robot: Any) -> None:
                 raise DescriptionError(
                     (
                         f"frame {f.j}: {name} = {e}; a joint position stands in theta if sigma is "
-                        "0, "
-                        "in r if sigma is 1, nowhere else"
+                        "0, in r if sigma is 1, nowhere else"
                     ),
                     path=where,
                 )

@@ -9,11 +9,10 @@ antecedent,
 where textbooks call d_j a_j and r_j d_j.
 
 Grouped anew, [Rot(x, alpha_i) Trans(x, d_i)] Rot(z, theta_j) Trans(z, r_j) is Khalil's
-transformation: theta_j and r_j stay, alpha_j and d_j
-are those of the antecedent, 0 for joints on the base. What is left at the end of a branch becomes a
-fixed frame without link, the textbook's
-last frame. Link frames, hence standard parameters, are Khalil's; `values` of such a file are
-those of the textbook's frames and are moved.
+transformation: theta_j and r_j stay, alpha_j and d_j are those of the antecedent, 0 for joints on
+the base. What is left at the end of a branch becomes a fixed frame without link, the textbook's
+last frame. Link frames, hence standard parameters, are Khalil's; `values` of such a file are those
+of the textbook's frames and are moved.
 """
 
 from __future__ import annotations

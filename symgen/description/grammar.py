@@ -63,9 +63,7 @@ class _Parser:
                 raise self.error(
                     (
                         f"unexpected {text[at]!r}; expected numbers, declared symbols, + - * / ** "
-                        "( "
-                        "), "
-                        f"{', '.join(functions)}"
+                        f"( ), {', '.join(functions)}"
                     ),
                     at + 1,
                     unit_advice(text[at]),

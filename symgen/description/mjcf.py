@@ -8,8 +8,8 @@ all but the last without mass,
     Trans(axis (q - ref))
 
 Along each joint Gamma = ... + armature qdd + damping qd + frictionloss sign(qd) + stiffness (q -
-springref). Relations of joints and of fixed tendons
-that are linear are solved, exactly, for joints that no actuator drives.
+springref). Relations of joints and of fixed tendons that are linear are solved, exactly, for joints
+that no actuator drives.
 """
 
 from __future__ import annotations

@@ -8,11 +8,9 @@
     frame 0, as here
 
 Links are 1 .. NL, cut joints NL+1 .. NJ; frame NJ+k, fixed, coincides with cut joint NL+k, so that
-NF = 2 NJ - NL. Comments may stand
-anywhere, lists may break over lines, keys are read in any case, Pi and ^ as in Mathematica. The
-format has no place for the value of a
-symbol; comments that SYMORO skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise
-`values` and `start 1`.
+NF = 2 NJ - NL. Comments may stand anywhere, lists may break over lines, keys are read in any case,
+Pi and ^ as in Mathematica. The format has no place for the value of a symbol; comments that SYMORO
+skips carry them: `(* constants: D3 = 0.45, g = 9.81 *)`, likewise `values` and `start 1`.
 
 W. Khalil, D. Creusot, SYMORO+: a system for the symbolic modelling of robots, Robotica 15, 1997.
 """
@@ -166,8 +164,7 @@ def _scan(text: str, par: _Par) -> None:
             raise DescriptionError(
                 (
                     f"found {text[start : start + 30].splitlines()[0]!r}; expected `name = value` "
-                    "or "
-                    f"`name = {{a,b}}`"
+                    "or `name = {a,b}`"
                 ),
                 line=line,
             )
@@ -272,9 +269,7 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
         raise DescriptionError(
             (
                 f"Type = {kind} with NL = {NL}, NJ = {NJ}; expected 0 serial or 1 tree with NJ = "
-                "NL, "
-                "2 "
-                "closed loops with NJ > NL"
+                "NL, 2 closed loops with NJ > NL"
             ),
             line=par.lists["NL"][0][1],
         )
@@ -294,8 +289,7 @@ def _robot(par: _Par, constants: dict[str, float], file: str, sha256: str) -> Ro
         raise DescriptionError(
             (
                 f"no value of {', '.join(missing)}; add a line (* constants: {example} *), or "
-                "convert "
-                f"with --constant {missing[0]}=..."
+                f"convert with --constant {missing[0]}=..."
             ),
             line=1,
         )
@@ -364,8 +358,7 @@ def _frames(par: _Par, NF: int, *, loops: bool) -> tuple[Frame, ...]:
                 raise DescriptionError(
                     (
                         f"{key}{f.j}: {', '.join(sorted(shared))} is the variable of a joint; "
-                        "expected "
-                        "constants"
+                        "expected constants"
                     ),
                     line=rows[key][f.j - 1][1],
                 )

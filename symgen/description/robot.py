@@ -7,10 +7,9 @@ prismatic, 2 fixed,
     iTj = Rot(z, gamma) Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r) .
 
 Signs, stated once. `gravity` is the acceleration of gravity in frame 0 (m/s^2); a body at rest with
-z0 up has
-gravity (0, 0, -g). Joint torque Gamma is what the actuator delivers, so friction enters with a
-plus:
-Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET. Inertia XX..ZZ are the tensor elements (XY =
+z0 up has gravity (0, 0, -g). Joint torque Gamma is what the actuator delivers, so friction enters
+with a plus: Gamma = A qdd + H + FV qd + FS sign(qd) + OFFSET. Inertia XX..ZZ are the tensor
+elements (XY =
 -integral x y dm) about the origin
 of the link frame, MX MY MZ = M (centre of mass). SI and rad.
 

@@ -1,15 +1,13 @@
 """A tree of joints with any axes becomes a table of Khalil and Kleinfinger.
 
 Links joined by fixed joints are one body. Body j moves about or along z_j, the axis of its joint;
-x_i lies on the common normal of z_i and of the
-axis of the first joint that body i carries, so that this joint has gamma = b = 0; further branches
-have them. Parallel axes: the
-normal through the origin. Axes that are nearly parallel have no usable normal: a fixed frame
-without link turns in between. A joint position
-is that of the file, sign and zero included; frame 0 is the root link's. Where fixed joints are
-kept, each link that one holds is a fixed frame too, its
-link frame that of the file, after all that move; its inertia stays with the body, so that formulas
-and numbers of joints are the same either way.
+x_i lies on the common normal of z_i and of the axis of the first joint that body i carries, so that
+this joint has gamma = b = 0; further branches have them. Parallel axes: the normal through the
+origin. Axes that are nearly parallel have no usable normal: a fixed frame without link turns in
+between. A joint position is that of the file, sign and zero included; frame 0 is the root link's.
+Where fixed joints are kept, each link that one holds is a fixed frame too, its link frame that of
+the file, after all that move; its inertia stays with the body, so that formulas and numbers of
+joints are the same either way.
 
 Lengths become constants, equal ones (but for the sign) the same constant, so that the formulas know
 what is special about the robot.

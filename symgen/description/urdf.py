@@ -2,8 +2,8 @@
 (`tree_frames`) with values (`tree_robot`).
 
 Numbers are read as they stand; meshes, textures and packages are never opened. A URDF library would
-load them, and its XML parser expands
-entities (`xml_text` reads neither). Every error names its line.
+load them, and its XML parser expands entities (`xml_text` reads neither). Every error names its
+line.
 """
 
 from __future__ import annotations

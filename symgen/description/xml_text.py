@@ -1,9 +1,8 @@
 """XML text to plain elements with their lines, refusing what a table of numbers does not need.
 
 The file is read by expat alone: a document type (hence entities, internal or external) ends the
-reading where it stands, nesting and the
-number of elements are bounded while reading, and nothing a file names is opened. Every error names
-its line.
+reading where it stands, nesting and the number of elements are bounded while reading, and nothing a
+file names is opened. Every error names its line.
 """
 
 from __future__ import annotations

@@ -2,10 +2,9 @@
 back to a text that reads as the same Robot.
 
 Only what a table of numbers needs is read: mappings, lists and scalars of the core schema. Tags,
-anchors and aliases, merge
-keys, repeated keys, second documents and non-finite numbers are refused, so that a file means what
-it shows. Whatever the
-bytes are, the only exception that leaves this module is DescriptionError, with file and line.
+anchors and aliases, merge keys, repeated keys, second documents and non-finite numbers are refused,
+so that a file means what it shows. Whatever the bytes are, the only exception that leaves this
+module is DescriptionError, with file and line.
 """
 
 from __future__ import annotations

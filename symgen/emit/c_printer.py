@@ -2,9 +2,8 @@
 declarations.
 
 A kernel treats a tile of samples in two loops over plain doubles: sines and cosines first, which
-compilers turn into calls of vector
-functions, then straight-line arithmetic, which they turn into vectors of any width. What depends on
-no sample stands before the loops.
+compilers turn into calls of vector functions, then straight-line arithmetic, which they turn into
+vectors of any width. What depends on no sample stands before the loops.
 """
 
 from __future__ import annotations

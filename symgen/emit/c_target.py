@@ -5,8 +5,7 @@ The body of a function stands once, over `lanes` samples side by side: its compi
 one state and for a tile.
 
 Everything is computed here; the template only lays it out. Joints that only the closure equations
-tie have no C kernels: their Newton
-iteration stays in the NumPy module.
+tie have no C kernels: their Newton iteration stays in the NumPy module.
 """
 
 from __future__ import annotations

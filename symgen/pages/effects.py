@@ -8,9 +8,8 @@ T-RA 6(3), 1990):
     MX w3 v2 - w2 v3 - g1   MY w1 v3 - w3 v1 - g2   MZ w2 v1 - w1 v2 - g3   M v.v/2 - g.P
 
 w, v: angular velocity and velocity of the origin, g: acceleration of gravity, all in the link
-frame, P: position of the origin. A
-parameter whose energy never changes has no effect; the reason names the factors that are zero in
-every motion.
+frame, P: position of the origin. A parameter whose energy never changes has no effect; the reason
+names the factors that are zero in every motion.
 """
 
 from __future__ import annotations

@@ -15,9 +15,8 @@ every geometry and in every assembly mode. Rates and accelerations of the tied j
 J qd = 0, J qdd + Jd qd = 0, by linear equations.
 
 Where lengths are equal the roots may always lie in F_p and the closure splits into branches; the
-file's is told by a relation
-q_u = sum n_i q_i + k pi/2 that one branch has and the other has not (the parallelogram, and the
-antiparallelogram beside it).
+file's is told by a relation q_u = sum n_i q_i + k pi/2 that one branch has and the other has not
+(the parallelogram, and the antiparallelogram beside it).
 """
 
 from __future__ import annotations

@@ -14,9 +14,8 @@ def rref(M: Array, p: int, *, reduced: bool = True) -> tuple[list[int], Array]:
     """Pivot columns (leftmost first) and the reduced rows, shape (rank, columns), of M over F_p.
 
     The row with the fewest entries at the start is taken first and touches its own columns alone,
-    which is quick where the branches of a tree
-    share few columns. Without `reduced` the rows of earlier pivots stay as they are: the rank
-    alone.
+    which is quick where the branches of a tree share few columns. Without `reduced` the rows of
+    earlier pivots stay as they are: the rank alone.
     """
     M = M[np.argsort(np.count_nonzero(M, axis=1), kind="stable")] % p
     left = np.ones(len(M), dtype=bool)

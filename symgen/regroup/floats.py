@@ -1,9 +1,8 @@
 """Base columns and coefficients in floats, for the constants of the robot file.
 
 For coefficients that are not recognised over F_p, and for general loops of which F_p gives no
-points
-of one geometry: columns depend on those before them at random states, which Newton closes near the
-start of the loops.
+points of one geometry: columns depend on those before them at random states, which Newton closes
+near the start of the loops.
 """
 
 from __future__ import annotations

@@ -1,20 +1,16 @@
 """Coefficients of the particular relations in Q(geometry): D_dependent = sum_k beta_k D_base,k.
 
 Over F_p each beta is a residue, and a function of the geometry: lengths, gravity, (cos, sin) of
-fixed
-angles. Changing one of them at a time shows which ones matter. The rest is linear algebra: beta =
-P/Q
-with P, Q polynomials of rising degree in what matters,
+fixed angles. Changing one of them at a time shows which ones matter. The rest is linear algebra:
+beta = P/Q with P, Q polynomials of rising degree in what matters,
 
     sum_m P_m m(g) - beta(g) sum_m Q_m m(g) = 0
 
 at more random geometries g than there are unknowns, a nullspace over F_p whose entries are then
-read
-as rationals, over as many primes as they need. What may vary is tried from much to little: the
+read as rationals, over as many primes as they need. What may vary is tried from much to little: the
 numbers of the file, square roots and all fixed angles as indeterminates; fractions of pi at their
 values; everything at its value, for a relation that holds for these numbers alone. Nothing is
-assumed
-of the result: the certificate checks it.
+assumed of the result: the certificate checks it.
 """
 
 from __future__ import annotations

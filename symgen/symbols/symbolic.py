@@ -42,8 +42,8 @@ def symbolic(
         in robot files ("pi/2"). Zeros leave the recursion.
     passive : str, optional
         Of closed loops. "functions": passive joints in terms of the actuated ones, where the
-        relation is linear. "symbols": all of them stay
-        symbols, with `closure` zero. Left out: functions where there are any, symbols for the rest.
+        relation is linear. "symbols": all of them stay symbols, with `closure` zero. Left out:
+        functions where there are any, symbols for the rest.
     limit : int
         Terms that a closed form may have, multiplied out; a longer one is refused, its recursion
         never.

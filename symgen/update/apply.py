@@ -6,9 +6,8 @@ byte stays.
     applied.write("arm_identified.urdf")
 
 The estimate knows base parameters, sums of the parameters of several links. Of all physical robots
-that have these sums, the one nearest to the file is
-written (`symgen.update.nearest`). Before anything is returned the new text is read again: it must
-say what was to be written.
+that have these sums, the one nearest to the file is written (`symgen.update.nearest`). Before
+anything is returned the new text is read again: it must say what was to be written.
 """
 
 from __future__ import annotations
@@ -175,8 +174,7 @@ def _require_same_joints(result: Estimate, robot: Robot, of: str) -> None:
         raise DescriptionError(
             f"{q} of the estimate is {theirs.get(q, 'no joint with a name')!s:.60}, of {of} "
             f"{ours or 'no joint with a name'}: say --chain and --lock as when the robot was "
-            "converted, "
-            "or name the robot file that was identified (--robot)"
+            "converted, or name the robot file that was identified (--robot)"
         )
 
 

@@ -1,9 +1,9 @@
 """Numbers of an XML text replaced where they stand: every other byte stays.
 
 `symgen.description.xml_text` reads the text, refuses what is no plain XML, and tells where each
-element starts. Here the start tag is read again, as
-bytes: an edit is a span of bytes and what stands there instead. What has no place yet (an
-attribute, an element) is inserted and counted as such.
+element starts. Here the start tag is read again, as bytes: an edit is a span of bytes and what
+stands there instead. What has no place yet (an attribute, an element) is inserted and counted as
+such.
 """
 
 from __future__ import annotations

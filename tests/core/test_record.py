@@ -125,8 +125,7 @@ def late(t):
             None,
             (
                 "59 samples in 0.29 s, pauses aside, are 200 Hz, 1/median step is 200 Hz. Remedy: "
-                "one "
-                "Record for each piece"
+                "one Record for each piece"
             ),
         ),
         (
@@ -514,8 +513,7 @@ NAMES = "t;q1;q2;tau1;tau2\n"
             NAMES + "10:00:00;0;0;0;0\n",
             (
                 "line 2: '10:00:00'; expected a number; no date or time of day is read: write "
-                "seconds, "
-                "or give record.rate"
+                "seconds, or give record.rate"
             ),
         ),
         (

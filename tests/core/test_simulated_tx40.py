@@ -2,8 +2,7 @@
 module, decimation and least squares.
 
 The states are exact, so least squares is unbiased: noise-free torques give the parameters back, and
-over many records with torque
-noise the stated deviations are those of the scatter.
+over many records with torque noise the stated deviations are those of the scatter.
 """
 
 from __future__ import annotations
@@ -80,8 +79,8 @@ def test_stated_sigma_is_the_scatter_over_records(clean, truth, method: str, run
     sigma; WLS: that of eq. (10) too.
 
     The decimation filter passes 0.8 of the new band, so neighbouring rows are correlated by some
-    per cent: bounds of 15 % on the
-    mean over the parameters and of 35 % on each (200 runs: 10 % at two deviations; 40 runs: 22 %).
+    per cent: bounds of 15 % on the mean over the parameters and of 35 % on each (200 runs: 10 % at
+    two deviations; 40 runs: 22 %).
     """
     tau, selection, seen = clean
     settings = EstimateSettings(method=method, weights="joint" if method == "wls" else "none")

@@ -1,6 +1,6 @@
 """Positions that a record does not hold: read from every kind of file, filled by the reader of
-counts, left out where nothing tells the state, refused
-where counts are not read."""
+counts, left out where nothing tells the state, refused where counts are not read.
+"""
 
 import json
 from dataclasses import replace
@@ -171,8 +171,7 @@ def test_short_gaps_are_filled_and_long_ones_left_out():
     lost = 0.6 * observation.rate
     assert all(lost < k < 1.1 * lost for k in observation.dropped["missing"])
     assert (
-        f"encoder 1: {MISSING[:, 0].sum()} samples are missing, at most 15 in a row (0.015 s); "
-        "the "
+        f"encoder 1: {MISSING[:, 0].sum()} samples are missing, at most 15 in a row (0.015 s); the "
         "counts around them tell"
     ) in " ".join(observation.findings)
     assert "at most 600 in a row (0.6 s); where the counts around a gap" in observation.findings[-1]

@@ -5,21 +5,19 @@ Run `python tests/description/make_haptic_values.py` (pip install cvxpy) and pas
 `symgen/description/robots/haptic.yaml`.
 
 Table 6 fixes fourteen base parameters; infinitely many branches have them. This one is nearest to a
-prior of six homogeneous boxes, in the
-coordinate-free distance of their pseudo-inertias P_j (4x4, about the link frame origin):
+prior of six homogeneous boxes, in the coordinate-free distance of their pseudo-inertias P_j (4x4,
+about the link frame origin):
 
     min  sum_j ||P0_j^-1/2 (P_j - P0_j) P0_j^-1/2||^2 + sum_k (Ia_k/Ia0_k - 1)^2
     s.t. P_j - P0_j/4 psd,  the nine inertial base parameters of Table 6 as printed,  those it
     leaves out at most LEFT_OUT .
 
 Lengths, sizes and masses are guesses: an arm of 0.2 m, balanced by a mass behind the shoulder (MX2R
-< 0), a forearm of 0.22 m, balanced by a
-mass on the crank (MX5R > MX3R), no handle. Friction of the pivots is split by guess. The chapter
-says that what it left out perturbs nothing when it
-is removed: LEFT_OUT, FV and OFFSET1 are so small that this holds in the simulated record of the
-demonstration (1e-5 kg m weighs 1e-4 N m).
-After rounding, the parameter that gives each base parameter its name is set so that the equalities
-hold in exact arithmetic.
+< 0), a forearm of 0.22 m, balanced by a mass on the crank (MX5R > MX3R), no handle. Friction of the
+pivots is split by guess. The chapter says that what it left out perturbs nothing when it is
+removed: LEFT_OUT, FV and OFFSET1 are so small that this holds in the simulated record of the
+demonstration (1e-5 kg m weighs 1e-4 N m). After rounding, the parameter that gives each base
+parameter its name is set so that the equalities hold in exact arithmetic.
 """
 
 from __future__ import annotations

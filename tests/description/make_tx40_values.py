@@ -5,18 +5,16 @@ Run `python tests/description/make_tx40_values.py` (pip install cvxpy) and paste
 `symgen/description/robots/tx40.yaml`.
 
 Table 2 fixes 21 base parameters; infinitely many arms have them. This one is nearest to a prior of
-six homogeneous boxes, in the
-coordinate-free distance of their pseudo-inertias P_j (4x4, about the link frame origin):
+six homogeneous boxes, in the coordinate-free distance of their pseudo-inertias P_j (4x4, about the
+link frame origin):
 
     min  sum_j ||P0_j^-1/2 (P_j - P0_j) P0_j^-1/2||^2 + sum_k (Ia_k/Ia0_k - 1)^2
     s.t. P_j - P0_j/4 psd,  ZZ1R, MX2R, XX3R, MX3 of eq. (27) as in Table 2 .
 
 Sizes and masses of the boxes are guesses from the outline of the arm: 19 kg move, of an arm of 27
-kg. Friction, offsets and Ia that
-Table 2 gives are taken over; FS6, FSM6 are rounded from published simulations of this arm, FVM6 is
-below FV5 and FV6 so that motor 6
-and each joint dissipate by themselves; Ia1 and Ia2 are free, their prior is of the same origin; the
-other offsets are invented.
+kg. Friction, offsets and Ia that Table 2 gives are taken over; FS6, FSM6 are rounded from published
+simulations of this arm, FVM6 is below FV5 and FV6 so that motor 6 and each joint dissipate by
+themselves; Ia1 and Ia2 are free, their prior is of the same origin; the other offsets are invented.
 After rounding, MX2, XX3 and ZZ1 are set so that the equalities hold in exact arithmetic.
 """
 

@@ -2,9 +2,9 @@
 README; the campaign runs every block of every page.
 
 A page becomes one script in an empty folder: its Python blocks share a namespace, its commands run
-with `symgen` on PATH, a YAML block whose first
-line is `# NAME.yaml` is written to that file. `# exit code 1` at the end of a block of commands
-says what its last command ends with. ```text is not run.
+with `symgen` on PATH, a YAML block whose first line is `# NAME.yaml` is written to that file. `#
+exit code 1` at the end of a block of commands says what its last command ends with. ```text is not
+run.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 refused or stays text in each format.
 
 Emitted Python is compared by syntax tree with that of the same robot with plain texts (only string
-constants may differ), C by the tokens that are left
-without comments, pages by their elements, LaTeX by its commands; robot files, .par and URDF are
-read again.
+constants may differ), C by the tokens that are left without comments, pages by their elements,
+LaTeX by its commands; robot files, .par and URDF are read again.
 """
 
 import ast

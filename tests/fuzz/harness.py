@@ -2,8 +2,8 @@
 clear errors.
 
 Outcomes: "ok"; "refused", an error of this project's own that names the file in a short printable
-text; else a fault: any other exception, an
-unclear message, more than SECONDS of processor time, more than MEMORY, the death of the process.
+text; else a fault: any other exception, an unclear message, more than SECONDS of processor time,
+more than MEMORY, the death of the process.
 """
 
 from __future__ import annotations

@@ -9,9 +9,8 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 # An arm whose second body has two joints about points of their own, with positions of reference,
-# springs, motors' inertia, oblique gravity; its
-# masses come from geoms, defaults of classes and an <inertial>; a mount that never moves, a flange,
-# a site, a mesh that only is seen.
+# springs, motors' inertia, oblique gravity; its masses come from geoms, defaults of classes and an
+# <inertial>; a mount that never moves, a flange, a site, a mesh that only is seen.
 ARM = """\
 <mujoco model="bent arm">
   <compiler angle="degree" eulerseq="zyx"/>

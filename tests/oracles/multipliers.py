@@ -1,9 +1,8 @@
 """Dynamics of mechanisms with loops by Lagrange multipliers: an independent oracle.
 
 The open tree moves in all its joints q; phi(q) = 0 says that every twin coincides with its cut
-frame and that every declared relation
-holds. With the energies of the tree (symgen.derive.lagrange) and Jc = dphi/dq, S the columns of the
-actuated joints,
+frame and that every declared relation holds. With the energies of the tree (symgen.derive.lagrange)
+and Jc = dphi/dq, S the columns of the actuated joints,
 
     S tau + Jc' lambda = Gamma_tree(q, qd, qdd) ,     Jc qd = 0 ,     Jc qdd + Jcdot qd = 0 .
 

@@ -2,9 +2,8 @@
 roots, odd angles.
 
 A seed gives one robot: a random serial or tree robot or parallelogram of this folder, or a star of
-slides beside a chain (uneven depth), most of whose
-constants are replaced by numbers; gears on motor inertias, friction along random combinations of
-joints and mimic joints are added.
+slides beside a chain (uneven depth), most of whose constants are replaced by numbers; gears on
+motor inertias, friction along random combinations of joints and mimic joints are added.
 """
 
 from __future__ import annotations

@@ -2,11 +2,9 @@
 in plain numpy.
 
 Every frame becomes a pinocchio joint about or along its z axis whose frame is Khalil's frame j at
-q_j; a fixed frame is a revolute
-joint that stays at 0 and whose row is dropped. So every link has its own body and its own ten
-columns. Pinocchio orders them
-M MX MY MZ XX XY YY XZ YZ ZZ, tensor elements about the frame origin (products with our sign).
-Serial robots and trees.
+q_j; a fixed frame is a revolute joint that stays at 0 and whose row is dropped. So every link has
+its own body and its own ten columns. Pinocchio orders them M MX MY MZ XX XY YY XZ YZ ZZ, tensor
+elements about the frame origin (products with our sign). Serial robots and trees.
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 byte, others change numbers alone, torques are the estimate's.
 
 UR5e comes with airo-models and three MJCF models with gymnasium (test extra). Panda, Kinova and
-Talos are read where example-robot-data is installed, further
-arms wherever `SYMGEN_ROBOTS` names folders that hold such packages (pybullet_data for the iiwa,
-robosuite for MJCF arms).
+Talos are read where example-robot-data is installed, further arms wherever `SYMGEN_ROBOTS` names
+folders that hold such packages (pybullet_data for the iiwa, robosuite for MJCF arms).
 """
 
 import os

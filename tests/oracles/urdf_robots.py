@@ -2,9 +2,8 @@
 axes.
 
 Lengths, masses and centres of mass as published (sources beside each); where a maker publishes no
-inertia, that of a solid box of the size
-given takes its place. Joints stand as a URDF author would place them: z, y and x axes, fixed tools,
-oblique mounts.
+inertia, that of a solid box of the size given takes its place. Joints stand as a URDF author would
+place them: z, y and x axes, fixed tools, oblique mounts.
 """
 
 from __future__ import annotations

@@ -166,8 +166,7 @@ def test_a_finger_turns_the_drawing_and_opens_a_parameter(browser, files):
     assert "YY2, link 2" in browser.run("document.getElementById('detail').textContent")
     assert browser.run(place) == there  # else the tap's own mouse events meet a neighbour
     inside = (
-        "(() => { const b = document.getElementById('detail').getBoundingClientRect(); "
-        "return "
+        "(() => { const b = document.getElementById('detail').getBoundingClientRect(); return "
         "b.top > 0 && b.bottom <= innerHeight + 1; })()"
     )
     assert browser.run(inside)

@@ -76,9 +76,9 @@ def test_two_deviations_hold_95_percent(planar, robot: str, ms: float) -> None:
     bounds at one in a thousand.
 
     The deviation of a light wrist is above 0.3 ms, since its torque is mostly friction, which tells
-    instants by its jumps alone: there it is the
-    deviation of the common delay, and of the three joints of the arm in the median, that is
-    below."""
+    instants by its jumps alone: there it is the deviation of the common delay, and of the three
+    joints of the arm in the median, that is below.
+    """
     model, chi = planar if robot == "planar_2r" else (symgen.model(robot), None)
     chi = values_of(model) if chi is None else chi
     runs = 50 if FULL else 8

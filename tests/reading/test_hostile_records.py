@@ -152,12 +152,10 @@ def test_zstd_bomb_in_a_ros2_bag(tmp_path, kind):
     [
         (
             "ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS SELECT id, topic_id, "
-            "timestamp, "
-            "zeroblob(1000000000) AS data FROM m;"
+            "timestamp, zeroblob(1000000000) AS data FROM m;"
         ),
         "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, "
-        "timestamp INTEGER, "
-        "data BLOB GENERATED ALWAYS AS (zeroblob(1000000000)));",
+        "timestamp INTEGER, data BLOB GENERATED ALWAYS AS (zeroblob(1000000000)));",
         "DROP TABLE message_definitions; CREATE VIEW Message_Definitions AS SELECT 1 AS id;",
     ],
 )

@@ -274,8 +274,7 @@ def test_errors_tell_all_irregularities(tmp_path):
             {},
             (
                 "sample 101: time goes from 0.198 s to 0.198 s; expected increasing time. In all: "
-                "2000 "
-                "samples"
+                "2000 samples"
             ),
         ),
         ({"resample": {}}, "set record.resample.gaps: split"),

@@ -18,8 +18,7 @@ from runtime.reporting.page import Image, Matrix, Number, Page, Section, embedde
 from runtime.reporting.series import Series
 
 HOSTILE = (
-    "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 "
-    "}} "
+    "</style></script><script>alert('x')</script> & \"<img src=x onerror=alert(1)> {{ 7*7 }} "
     "<!-- ]]>"
 )
 

@@ -149,8 +149,7 @@ def test_axes_tell_a_scale_and_texts_stay_in_their_cells(shown):
     """
     labels = (
         "[...document.querySelectorAll('.plot svg')].map((s) => "
-        "[...s.querySelectorAll('text[text-anchor=end]')].map((n) => "
-        "Number(n.getAttribute('y'))))"
+        "[...s.querySelectorAll('text[text-anchor=end]')].map((n) => Number(n.getAttribute('y'))))"
     )
     for places in shown.run(labels):
         assert sum(y < 190 for y in places) >= 2 and sum(y > 190 for y in places) >= 2

@@ -2,10 +2,9 @@
 first 25 is that of the issue; 15 are our own.
 
 A Case holds what a user gives: the text of a robot file, positions and torques of a log, sides and
-rate. A slip changes one thing. `told` says what
-became of it: equivalent (no fit can tell it: computed), named (a finding names the cause, in a list
-of at most six), wrong (findings, none of them the
-cause), silent.
+rate. A slip changes one thing. `told` says what became of it: equivalent (no fit can tell it:
+computed), named (a finding names the cause, in a list of at most six), wrong (findings, none of
+them the cause), silent.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Closed forms against those of textbooks, by SymPy difference zero. The robots here have the
-frames of the books; point masses and centres of mass
-are put in the place of the parameters by substitution.
+frames of the books; point masses and centres of mass are put in the place of the parameters by
+substitution.
 
     [C]  J. J. Craig, Introduction to Robotics: Mechanics and Control, 3rd ed., Pearson 2005:
     section 3.7 (PUMA 560), section 6.7 (planar arm)

@@ -5,14 +5,12 @@ the exact inverse model.
     80 .. 214 s   sums of three sinusoids per joint
 
 Nothing here was measured: no record of the interface is public. What the chapter gives is used as
-given (4000 counts per motor revolution, both filters
-at 10 Hz, the two kinds of motion, 16000 rows, cond(W) near 150). What it does not give: sampling at
-1 kHz, the usual rate of haptic control, and the
-transmission ratio of the robot file, both fixed before any figure of Table 7 was computed and left
-alone since; the sinusoids, of the smallest
-cond(W) among 700 random draws within +-55 degrees, 60 rad/s^2 and 0.3 rad from the singular
-configurations of the parallelogram; torque noise,
-of an order at which the parameters that Table 6 leaves out are not seen.
+given (4000 counts per motor revolution, both filters at 10 Hz, the two kinds of motion, 16000 rows,
+cond(W) near 150). What it does not give: sampling at 1 kHz, the usual rate of haptic control, and
+the transmission ratio of the robot file, both fixed before any figure of Table 7 was computed and
+left alone since; the sinusoids, of the smallest cond(W) among 700 random draws within +-55 degrees,
+60 rad/s^2 and 0.3 rad from the singular configurations of the parallelogram; torque noise, of an
+order at which the parameters that Table 6 leaves out are not seen.
 """
 
 from __future__ import annotations

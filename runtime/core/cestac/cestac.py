@@ -8,12 +8,11 @@ done to the estimate?
     X_LS     = the estimate of the identification on these columns, with the median of the study
 
 N runs per Delta (`runtime.core.cestac.run`) give the mean (18), the deviation (19), %sigma (20), %e
-(21) and the residual (22); `runtime.core.cestac.result` holds them
-and their verdict. The rows used are those of the measured record in every run. Steps of the motor
-torque (`torque`, section 4.1.3) are studied alone and
-with the first Delta. Columns are the essential ones of the identification; parameters that the
-settings name are judged alone, in that fit. Rounding is by default two-point, on the joint side: those
-reproduce the chapter's figures.
+(21) and the residual (22); `runtime.core.cestac.result` holds them and their verdict. The rows used
+are those of the measured record in every run. Steps of the motor torque (`torque`, section 4.1.3)
+are studied alone and with the first Delta. Columns are the essential ones of the identification;
+parameters that the settings name are judged alone, in that fit. Rounding is by default two-point,
+on the joint side: those reproduce the chapter's figures.
 
 The bandwidth of the noise decides everything, so sampling rate, cut-off and median window stand in
 the settings of the result.
@@ -109,8 +108,7 @@ def cestac(
         raise SettingsError(
             (
                 f"motor, but {model.NAME} has no drives; use side: joint or give drives in the "
-                "robot "
-                "file"
+                "robot file"
             ),
             path=("cestac", "side"),
         )
@@ -209,10 +207,8 @@ def levels_of(settings: CestacSettings) -> tuple[Level, ...]:
 
 def key_blocks(keys: Sequence[Key], runs: int, levels: int, common: bool) -> list[tuple[Key, ...]]:
     """Keys (level, run) in tasks of at most LIMIT.TASK_RUNS runs with fixed borders: contiguous
-    runs of one
-    level or, where levels share their random
-    numbers, all levels of contiguous runs. A study of few runs has small tasks, so that there are
-    some for every worker.
+    runs of one level or, where levels share their random numbers, all levels of contiguous runs. A
+    study of few runs has small tasks, so that there are some for every worker.
     """
     size = max(1, min(LIMIT.TASK_RUNS, runs // 4) // (levels if common else 1))
 

@@ -6,8 +6,8 @@ make, eqs. (15), (16), (28).
     W_CESTAC = W(q_CESTAC, qd_CESTAC, qdd_CESTAC)   through the filters, on the measured rows
 
 Every record draws from streams of its own (`runtime.core.cestac.rounding.stream`), torques from
-others than positions, so that a draw is the same with
-and without torques and whatever records follow.
+others than positions, so that a draw is the same with and without torques and whatever records
+follow.
 """
 
 from __future__ import annotations

@@ -11,14 +11,12 @@
             variance Delta^2 / 12
 
 The first three add Delta xi to the measurement, with xi the same for every Delta; the last two
-replace it. `phase` is what a real encoder does: its
-error is a sawtooth along the motion, not white, and its edges say when the position passed a known
-value, which the other laws destroy. Its lines,
-at phi + (k + 1/2) Delta, may be uneven: each is displaced by its own normal number of deviation
-`uneven` Delta; where a whole number of steps makes
-one turn the pattern repeats with every turn. Every draw has its own stream, a Philox generator
-keyed by (seed, level, run): its numbers do not depend
-on who draws, or when.
+replace it. `phase` is what a real encoder does: its error is a sawtooth along the motion, not
+white, and its edges say when the position passed a known value, which the other laws destroy. Its
+lines, at phi + (k + 1/2) Delta, may be uneven: each is displaced by its own normal number of
+deviation `uneven` Delta; where a whole number of steps makes one turn the pattern repeats with
+every turn. Every draw has its own stream, a Philox generator keyed by (seed, level, run): its
+numbers do not depend on who draws, or when.
 """
 
 from __future__ import annotations

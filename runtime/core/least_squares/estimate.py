@@ -8,9 +8,9 @@ minimal encoder resolution):
     %sigma   (11)    = 100 sigma / |X|
 
 Eq. (10) supposes independent residuals; filtered ones are not. `sigma_corrected` stands beside it:
-blocks of time are taken as
-independent instead of samples (`runtime.core.least_squares.block_covariance`). What a record does not
-determine is nan in memory and null in JSON.
+blocks of time are taken as independent instead of samples
+(`runtime.core.least_squares.block_covariance`). What a record does not determine is nan in memory
+and null in JSON.
 """
 
 from __future__ import annotations
@@ -269,8 +269,8 @@ class Estimate:
                 f"status {self.status}"
             ),
             f"cond {self.cond:.4g} (unit columns {self.cond_unit:.4g}), sigma_rho "
-            f"{self.sigma_rho:.4g}, "
-            f"residual norm {self.residual_norm:.6g}, relative error {self.relative_error:.3f} %",
+            f"{self.sigma_rho:.4g}, residual norm {self.residual_norm:.6g}, relative error "
+            f"{self.relative_error:.3f} %",
         )
 
     def to_latex(self, names: Sequence[str] | None = None, *, blocks: int = 1) -> str:

@@ -2,9 +2,8 @@
 from triangular factors.
 
 A System is the rows as a method weighs them. Ordinary least squares leaves them as they are;
-weighted least squares divides the rows of joint
-j by s_j. Removing columns from a System is cheap, which is what `runtime.core.essential`
-lives on; weights stay as they are while columns go.
+weighted least squares divides the rows of joint j by s_j. Removing columns from a System is cheap,
+which is what `runtime.core.essential` lives on; weights stay as they are while columns go.
 """
 
 from __future__ import annotations

@@ -2,12 +2,11 @@
 tell apart.
 
 With D the norms of the columns of W, R_11 D^-1 = U diag(s) V' is the singular value decomposition
-of a (b, b) matrix. Judged on unit columns,
-rank is the number of s_i above tolerance * s_1. Full rank: eq. (7) by back substitution, (W'W)^-1 =
-T T' with T = R_11^-1. Otherwise the
-solution of least norm in the units of D is taken, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2', the
-projector on the directions that leave
-W X unchanged, names the parameters: i and k are in one group when P_ik is not zero.
+of a (b, b) matrix. Judged on unit columns, rank is the number of s_i above tolerance * s_1. Full
+rank: eq. (7) by back substitution, (W'W)^-1 = T T' with T = R_11^-1. Otherwise the solution of
+least norm in the units of D is taken, T = D^-1 V_1 diag(1/s_1), and P = V_2 V_2', the projector on
+the directions that leave W X unchanged, names the parameters: i and k are in one group when P_ik is
+not zero.
 
 Reference: Gautier (1991) for rank and groups by orthogonal factorisation; Golub and Van Loan,
 section 5.5.

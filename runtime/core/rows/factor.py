@@ -6,15 +6,14 @@
     (W'W)^-1 = R_11^-1 R_11^-T                 cond(W) = cond(R_11)
 
 Q is never formed. Rows are joint-major and the torque of joint j depends on few parameters, so each
-joint is factored on its own nonzero
-columns C_j and the small factors are stacked and factored once more (structured TSQR):
+joint is factored on its own nonzero columns C_j and the small factors are stacked and factored once
+more (structured TSQR):
 
     R_j = R factor of [W_j[:, C_j] Y_j],    R = R factor of the stacked R_j,
                                             ||Y_j - W_j X|| = ||R_j [X[C_j]; -1]||
 
 Weights of a joint multiply R_j, removing a parameter deletes a column of R and of the R_j, and
-parts of a record combine by stacking
-their R_j: none of them passes over W again.
+parts of a record combine by stacking their R_j: none of them passes over W again.
 
 References: Golub and Van Loan, Matrix Computations, sections 5.2 and 6.5; Demmel, Grigori, Hoemmen
 and Langou (2012) for TSQR.

@@ -2,9 +2,9 @@
 equal ones once.
 
 Most entries of W are structurally zero or repeat each other up to the sign, and decimation is
-linear: filter
-the signals, then place them. They are evaluated in pieces of samples, by the operations of the module that
-they need (`runtime.core.rows.tape`), and decimated piece by piece: the signals are not stored.
+linear: filter the signals, then place them. They are evaluated in pieces of samples, by the
+operations of the module that they need (`runtime.core.rows.tape`), and decimated piece by piece:
+the signals are not stored.
 """
 
 from __future__ import annotations
@@ -155,8 +155,8 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
     at random states.
 
     The emitted text copies equal rows, so equal signals agree in every bit; different ones do not
-    agree at 64 random states. Where the random
-    states are out of reach (loops that do not close), every entry stands for itself.
+    agree at 64 random states. Where the random states are out of reach (loops that do not close),
+    every entry stands for itself.
     """
     columns = np.arange(len(model.BASE_PARAMETERS)) if columns is None else columns
     row, j = np.nonzero(np.asarray(model.STRUCTURE)[columns])

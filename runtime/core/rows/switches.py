@@ -73,8 +73,7 @@ def switches(
             raise ModelError(
                 (
                     f"{name} acts along {strange}, which are no actuated joints; no prediction is "
-                    "made "
-                    "for it"
+                    "made for it"
                 ),
                 file=model.NAME,
             )

@@ -2,9 +2,8 @@
 pieces.
 
 Reference: a Chebyshev I low-pass forward and backward in second-order sections with odd padding of
-p samples, then every n_d-th sample, which
-computes N outputs and throws all but N/n_d away. In modal form, lambda_i the poles of positive
-imaginary part and c_i their residues,
+p samples, then every n_d-th sample, which computes N outputs and throws all but N/n_d away. In
+modal form, lambda_i the poles of positive imaginary part and c_i their residues,
 
     H(z) = D + sum_i [c_i/(z - lambda_i) + conj],     h_0 = D,   h_j = 2 Re sum_i c_i lambda_i^(j-1)
     forward    x_(r+1) = lambda x_r + e_r,            f_r = D e_r + 2 Re c'x_r
@@ -12,18 +11,17 @@ imaginary part and c_i their residues,
                (' transposes, products componentwise)
 
 with e the padded signal; both start in the steady state of their first value. Cut into blocks u_b
-of L = G n_d samples from the first kept sample
-phi on, with x_b the forward state at the first sample of block b and v_b the backward state w at
-its last one, everything is linear in blocks:
+of L = G n_d samples from the first kept sample phi on, with x_b the forward state at the first
+sample of block b and v_b the backward state w at its last one, everything is linear in blocks:
 
     x_(b+1) = lambda^L x_b + P u_b          v_(b-1) = lambda^L v_b + Q u_b + Mx x_b
                                             y_b = Y u_b + Yx x_b + Yv v_b
 
 [P; Q; Y] u is one matrix product for all signals and blocks, 2 (16 + G) operations a sample; x and
-v are K/G short steps. The start, and the samples
-behind the last whole block with their reflection, are products of their own: x_0 = X0 u, [v; y] = A
-u + Ax x. The signals are never stored. Of a long record, PART kept samples are computed at a time,
-from the samples that decide them: the filter has forgotten all others but for TRUNCATION.
+v are K/G short steps. The start, and the samples behind the last whole block with their reflection,
+are products of their own: x_0 = X0 u, [v; y] = A u + Ax x. The signals are never stored. Of a long
+record, PART kept samples are computed at a time, from the samples that decide them: the filter has
+forgotten all others but for TRUNCATION.
 
 |lambda|^n_d is between 0.4 and 0.83 whatever n_d, so nothing grows; residues come from zeros and
 poles, polynomial coefficients would lose all

@@ -2,8 +2,7 @@
 their frequency responses.
 
 Raw errors of one encoder are independent from sample to sample, variance 1. All filters are linear,
-of zero phase and of magnitude known at
-every frequency w (rad per sample), fs the sampling rate:
+of zero phase and of magnitude known at every frequency w (rad per sample), fs the sampling rate:
 
     low-pass
         |H|^2, H the Butterworth filter run forward and backward, where `lowpass.on` asks for it
