@@ -249,7 +249,7 @@ class Record:
         return partial(Record, **{f.name: getattr(self, f.name) for f in fields(self)}), ()
 
 
-def _array(x: ArrayLike, label: str, file: str) -> Array:
+def _array(x: ArrayLike | None, label: str, file: str) -> Array:
     """The numbers of x: a copy, or x itself where it cannot be written."""
     array = real(x, label, file)
     return array.copy() if array.flags.writeable else array
