@@ -8,6 +8,7 @@ import gc
 import os
 import signal
 import sys
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -55,6 +56,8 @@ class Verbs(TyperGroup):
             typer.echo(f"error: {WENT[cmd_name]}", err=True)
             raise typer.Exit(2)
         if cmd_name not in VERBS:
+            if near := get_close_matches(cmd_name, VERBS, 1):
+                ctx.fail(f"No such command {cmd_name!r}; did you mean {near[0]}?")
             return None
         if self.listing:
             return TyperCommand(cmd_name, help=VERBS[cmd_name])

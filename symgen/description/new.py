@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-from urllib.parse import quote
 
 from symgen.description.naming import check_identifier
-from symgen.description.schema import SCHEMA, schema_file
+from symgen.description.schema import SCHEMA
 from symgen.errors import DescriptionError
+
+EDITORS = """\
+# yaml-language-server: $schema=robot.schema.json
+# Editors complete and check this file once you run: symgen schema > robot.schema.json
+"""
 
 _SKELETON = """\
 # {name}: a robot file. Replace the two joints below by yours; what follows `frames` may go.
@@ -49,34 +52,19 @@ elements:
 """
 
 
-def skeleton(name: str, schema: str | None = None) -> str:
+def skeleton(name: str) -> str:
     """Text of a commented two-joint robot file called `name`; raises DescriptionError if that is no
     identifier.
-
-    schema : address of the JSON Schema, for the first line, by which editors complete and check the
-    file; None: no such line.
     """
     check_identifier(name, ("name",))
-    first = "" if schema is None else f"# yaml-language-server: $schema={schema}\n"
-    return first + _SKELETON.format(name=name, schema=SCHEMA)
+    return _SKELETON.format(name=name, schema=SCHEMA)
 
 
 def skeleton_for(file: Path) -> str:
-    """Text of a skeleton for the robot file `file`, with the address of the installed JSON Schema
-    as seen from its folder.
+    """Text of a skeleton for the robot file `file`; its first lines lead editors to the JSON Schema.
 
     Raises DescriptionError where the name of the file is none of a robot file.
     """
     if file.suffix not in (".yaml", ".yml"):
         raise DescriptionError(f"{file}: a robot file ends in .yaml")
-    return skeleton(file.stem, schema_address(file))
-
-
-def schema_address(file: Path) -> str:
-    """The installed JSON Schema as seen from the folder of `file`, percent-encoded: editors resolve
-    it without network.
-    """
-    try:
-        return quote(Path(os.path.relpath(schema_file(), file.resolve().parent)).as_posix())
-    except ValueError:  # on another drive
-        return schema_file().as_uri()
+    return EDITORS + skeleton(file.stem)

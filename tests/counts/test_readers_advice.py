@@ -34,7 +34,8 @@ def test_quadrature_over_the_phase_is_the_mean_of_cestac():
     one encoder of two alike.
     """
     found = cestac(planar, RECORD, replace(STUDY, cestac=replace(STUDY.cestac, runs=60)))
-    real = CoarseEncoders(problem(planar, RECORD, STUDY), NAMES, None, "phase", "lowpass")
+    names = found.reference.names  # the essential ones and those of the study
+    real = CoarseEncoders(problem(planar, RECORD, STUDY), names, None, "phase", "lowpass")
     change = real.asked(STEP)
     level = found.levels[0]
     sampled = 100 * (level.mean / found.reference.X - 1)
@@ -101,8 +102,10 @@ def test_side_by_side_in_words():
 
 
 def test_no_step_is_advised_where_no_parameter_is_determined():
+    noise = np.random.default_rng(0).standard_normal(PART.tau.shape)
+    loud = replace(PART, tau=PART.tau + 20 * PART.tau.std() * noise)
     advice = advise(
-        planar, PART, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,)
+        planar, loud, replace(STUDY, rows=Rows(trim=5)), encoders=("all",), asked=(STEP,)
     )
     assert not advice.deciding and not advice.negative
     assert (
