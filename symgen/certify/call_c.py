@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 import sys
 from typing import Any
 
@@ -18,7 +19,7 @@ def main() -> None:
     library = ctypes.CDLL(job["library"])
     results: list[Any] = []
     for name, arguments, size in job["calls"]:
-        result = (ctypes.c_double * size)()
+        result = (ctypes.c_double * size)(*[math.nan] * size)  # an entry not written stays nan
         status = getattr(library, name)(*(_argument(a, result) for a in arguments))
         results.append([status, list(result)])
     for name, count in job["tables"]:

@@ -74,10 +74,19 @@ WAYS = (
         "gravity of a SCARA is constant: the room of the call before may hold the same numbers",
     ),
     (
-        r"_tile = q(d|dd)? - start;",
+        r"_tile = q(d|dd)?( - start)?;",
         "states are taken without a copy where there is one tile alone: start is 0",
     ),
-    (r"steps = -int", "the way of Newton: mode and closure are checked behind it"),
+    (
+        r"steps = -int|np\.abs\(volume\)|np\.interp\(",
+        "the way of Newton: mode and closure are checked behind it",
+    ),
+    (
+        r"^\S+\.c +real (\w+\[\d+\], )*\w+\[\d+\];",
+        "the room of an array: more is never read; less is what sanitizers of test_c_target.py see",
+    ),
+    (r"part = slice\(t, t \+ \d+\)", "samples at a time"),
+    (r"np\.zeros\(\(\*shape, len\(rows\[\d\]\)\)\)", "rows are of one length"),
     (
         r"^haptic_casadi\S* .*VSP24 = VP23$",
         "haptic: the term cancels, the regressor is the same to 3e-18",

@@ -197,7 +197,7 @@ def test_many_runs_stay_in_their_archives(tmp_path, emps_data):
     assert {p.name for p in tmp_path.iterdir()} == FILES | {"runs.npz"}
     assert json.loads((tmp_path / "cestac.json").read_text())["levels"][1]["runs"] is None
     with np.load(tmp_path / "runs.npz") as archive:
-        assert archive["X"].shape == (1002, 1)
+        assert archive["X"].shape == (1002, 4)  # the essential columns and M1R
 
 
 def test_scheduler_that_does_not_answer(emps_data):

@@ -178,7 +178,7 @@ def test_report_writes_what_the_verbs_write(model, tmp_path):
     assert "resolution.png" in {path.name for path in study} and "report.html" in {
         path.name for path in study
     }
-    with pytest.raises(TypeError, match="float is no result that is written"):
+    with pytest.raises(InputError, match="float is no result that is written"):
         runtime.report(1.0, tmp_path / "wrong")
     assert not (tmp_path / "wrong").exists()
 
