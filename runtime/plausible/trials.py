@@ -539,7 +539,9 @@ def decisive(
                 fit = alone.trial(trial.cause).fit
                 visible &= fit is not None and bool(takes_away(alone.given, fit).any())
                 nearer = False
-            nearer &= not takes_away(trial.fit, given).any()  # from the values a joint may lose little
+            nearer &= not takes_away(
+                trial.fit, given
+            ).any()  # from the values a joint may lose little
             lost = trial.fit.errors - given.errors > LIMIT.LOST
             if (visible or nearer) and not lost.any():
                 better.append(trial)

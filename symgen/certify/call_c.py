@@ -1,15 +1,14 @@
 """Functions of a compiled C file, called in a process of its own, which a wrong index may end.
 
-`python call_c.py` reads {"library": path, "calls": [[name, arguments, size]], "tables": [[name,
+`python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]], "tables": [[name,
 count]]} as JSON and prints the results: [status, numbers] of every call, where the argument null is
-the result, then the numbers of every table of int32.
+the result, every number `before` as it starts, then the numbers of every table of int32.
 """
 
 from __future__ import annotations
 
 import ctypes
 import json
-import math
 import sys
 from typing import Any
 
@@ -18,8 +17,8 @@ def main() -> None:
     job = json.load(sys.stdin)
     library = ctypes.CDLL(job["library"])
     results: list[Any] = []
-    for name, arguments, size in job["calls"]:
-        result = (ctypes.c_double * size)(*[math.nan] * size)  # an entry not written stays nan
+    for name, arguments, size, before in job["calls"]:
+        result = (ctypes.c_double * size)(*[before] * size)
         status = getattr(library, name)(*(_argument(a, result) for a in arguments))
         results.append([status, list(result)])
     for name, count in job["tables"]:

@@ -246,13 +246,13 @@ def outcome(
 
 
 def difference(value: Any, expected: Array, scale: Array | float) -> float:
-    """Largest difference, of `scale`; infinite for another shape, NaN for NaN."""
+    """Largest difference, of `scale`; infinite for another shape, and for NaN."""
     value = np.asarray(value, dtype=float)
     if value.shape != expected.shape:
         return float("inf")
     error = np.abs(value - expected)
     error = np.divide(error, scale, out=error, where=error != 0)  # 0/0 is 0
-    return float(np.max(error, initial=0.0))
+    return float(np.max(np.where(np.isnan(error), np.inf, error), initial=0.0))
 
 
 def _called(module: ModuleType, name: str, check: Check, constants: Mapping[str, float]) -> Array:
@@ -330,8 +330,13 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
         for c in witness.checks.get(f, ())[:1]
     }
     asked = [(f, check, flags) for f, check in checks.items() for flags in (0, 1)]
-    calls: list[tuple[str, list[Any], int]] = [
-        (f"{name}_{f}", [N, *map(_flat, c.arguments), constants, None, flags], c.expected.size)
+    calls: list[tuple[str, list[Any], int, float]] = [
+        (
+            f"{name}_{f}",
+            [N, *map(_flat, c.arguments), constants, None, flags],
+            c.expected.size,
+            0.0 if MODELS[f].by_columns else np.nan,  # the caller of columns fills what is constant
+        )
         for f, c, flags in asked
     ]
     single = list(_of_one_state(name, text, witness))
@@ -345,6 +350,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
                 None,
             ],
             check.expected[k].size,
+            np.nan,  # as what is not written stays
         )
         for f, check in single
         for k in range(len(check.expected))
@@ -355,7 +361,7 @@ def c_errors(path: Path, text: str, compiler: str, witness: Witness) -> dict[str
             int(re.findall(rf"{name}_{what}_count = (\d+)", text)[0])
             for what in ("entry", "signal", "varying")
         )
-        last = (f"{name}_signals", [N, *columns, N, constants, None, N], signals * N)
+        last = (f"{name}_signals", [N, *columns, N, constants, None, N], signals * N, np.nan)
         job = {
             "library": str(library),
             "calls": [*calls, last],
