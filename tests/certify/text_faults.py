@@ -85,10 +85,6 @@ WAYS = (
         r"^\S+\.c +real (\w+\[\d+\], )*\w+\[\d+\];",
         "the room of an array: more is never read; less is what sanitizers of test_c_target.py see",
     ),
-    (r"^tx40\.c .*\*s = S \+ row\[k\]\[1\]", "a table whose rows of store and tile are the same"),
-    (r"^scara\.c .*row\[\]\[2\]", "a SCARA's rows are few: what lies beside them may be the same"),
-    (r"_rows\[\d+\]\[4\] = ", "a table of other width, which the compiler warns of"),
-    (r"t < TILE; t \+= 7", "stores of whole cache lines: some are written twice"),
     (r"part = slice\(t, t \+ \d+\)", "samples at a time"),
     (r"np\.zeros\(\(\*shape, len\(rows\[\d\]\)\)\)", "rows are of one length"),
     (
@@ -97,7 +93,7 @@ WAYS = (
     ),
     (r"away = |\(given - s \* away\)", "the way of Newton: mode and closure are checked behind it"),
     (
-        r"pick|moved|start \+ TILE|kept\[",
+        r"pick|moved|start \+ TILE|kept\[|TILE; t \+= 7|row\[\]\[2\], int64_t N, real \*S, int64_t",
         "stores of whole cache lines, on machines without AVX-512",
     ),
 )
