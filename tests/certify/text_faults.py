@@ -78,13 +78,14 @@ WAYS = (
         "states are taken without a copy where there is one tile alone: start is 0",
     ),
     (
-        r"steps = -int|np\.abs\(volume\)|np\.interp\(|_newton\(q",
+        r"steps = -int|np\.abs\(volume\)|np\.interp\(|_newton\(q|= -_closure\(",
         "the way of Newton: mode and closure are checked behind it",
     ),
     (
         r"^\S+\.c +real (\w+\[\d+\], )*\w+\[\d+\];",
         "the room of an array: more is never read; less is what sanitizers of test_c_target.py see",
     ),
+    (r"tile\[\d+ \+ TILE\]", "a parameter that is a pointer"),
     (r"part = slice\(t, t \+ \d+\)", "samples at a time"),
     (r"np\.zeros\(\(\*shape, len\(rows\[\d\]\)\)\)", "rows are of one length"),
     (
@@ -93,7 +94,7 @@ WAYS = (
     ),
     (r"away = |\(given - s \* away\)", "the way of Newton: mode and closure are checked behind it"),
     (
-        r"pick|moved|start \+ TILE|kept\[|TILE; t \+= 7|row\[\]\[2\], int64_t N, real \*S, int64_t",
+        r"pick|moved|start \+ TILE|kept\[|TILE; t \+= 7|put\(\(size_t\)m|< signals; k\+\+\)|row\[\]\[2\], int64_t N, real \*S, int64_t",
         "stores of whole cache lines, on machines without AVX-512",
     ),
 )
