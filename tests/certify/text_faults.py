@@ -85,6 +85,7 @@ WAYS = (
         r"^\S+\.c +real (\w+\[\d+\], )*\w+\[\d+\];",
         "the room of an array: more is never read; less is what sanitizers of test_c_target.py see",
     ),
+    (r"_tile = -TILE,", "the size of a tile as the file says it: no function reads it"),
     (r"tile\[\d+ \+ TILE\]", "a parameter that is a pointer"),
     (r"part = slice\(t, t \+ \d+\)", "samples at a time"),
     (r"np\.zeros\(\(\*shape, len\(rows\[\d\]\)\)\)", "rows are of one length"),
