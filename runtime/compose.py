@@ -557,7 +557,8 @@ def excite(
 def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
-    """study.excitation.poses poses, default 20, within the limits of q that tell the parameters of gravity best, beside those that were recorded."""
+    """Poses at rest, within the limits of q, from which the gravity parameters are best
+    estimated together with the recorded poses; study.excitation.poses of them, default 20."""
     from runtime.excitation import poses
 
     return poses.static_poses(problem(model, records, study))

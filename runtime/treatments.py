@@ -75,7 +75,7 @@ class Ranking:
 
     @property
     def verdict(self) -> str:
-        """The order, in one sentence."""
+        """One sentence that ranks the treatments, best first."""
         first, *others = [
             f"{name} ({columns_text(*self.standing[name])}) {error:.1f} %"
             for name, error in self.mean_errors.items()

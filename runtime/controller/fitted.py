@@ -228,7 +228,7 @@ class TorquesOfLaw:
         return slopes
 
     def fit(self, gains: Sequence[str], late_too: bool, kd: Array, delay: float) -> Estimate:
-        """X beside the steps of kd and of the delay."""
+        """X, and how far kd and the delay are to move, from one linear fit."""
         torques = self.torques(kd, delay)
         Y = with_torques(self.rows, self.records, torques)
         columns: dict[str, Array] = {}
@@ -261,7 +261,7 @@ def torque_of(record: Record, kd: Array, delay: float, saturation: Array) -> Arr
 
 
 def _apart(fit: Estimate, name: str) -> bool:
-    """Whether a gain can be told from every parameter."""
+    """Whether a gain can be distinguished from every parameter."""
     k = fit.names.index(name)
     scale = np.sqrt(np.diag(fit.covariance))
     with np.errstate(divide="ignore", invalid="ignore"):

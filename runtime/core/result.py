@@ -234,7 +234,8 @@ class Identification:
 
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
-        """What time stamps of the records were like, those of one file once, the known torques that were subtracted, and what readers and steps say."""
+        """Remarks on the records: time stamps (once a file), known torques that were subtracted,
+        the low-pass filter, and findings of readers and steps."""
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
@@ -331,7 +332,8 @@ class Identification:
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Joints without rows, signs that no drive has, lost joints, then what the parts warn of."""
+        """Warnings: joints without rows, negative friction or motor inertia, joints that lost
+        their parameters, and those of the parts."""
         by_law = any(record.origin.by_law for record in self.records)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "

@@ -193,7 +193,7 @@ class Uncertainty(Result):
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables())])
 
     def to_text(self) -> str:
-        """Sentences, deviations and whiteness."""
+        """The verdict, the table of deviations and the table of residuals, as text."""
         return "\n\n".join(["\n".join(self.verdict), *(own.to_text() for own in self.tables()[:2])])
 
     def tables(self) -> tuple[Table, ...]:

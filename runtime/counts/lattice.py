@@ -178,7 +178,7 @@ def to_and_fro(counts: Array) -> Array:
 
 
 def shaken_share(counts: Array) -> float:
-    """Changes that end such a passage over all changes."""
+    """Passages to and fro over one line, as a share of all changes of the counts."""
     return len(to_and_fro(counts)) / max(int(np.count_nonzero(np.diff(counts))), FEWEST)
 
 

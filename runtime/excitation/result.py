@@ -170,7 +170,7 @@ class Excitation(Result):
 
     @property
     def torques(self) -> str:
-        """What is not limited, a sentence; "" where every torque is."""
+        """A sentence that names joints without a torque limit; "" if there are none."""
         free = [
             j
             for j, limit in zip(joint_labels(self.model), self.limits.tau, strict=True)

@@ -180,7 +180,7 @@ def fitted_scalars(problem: Problem) -> Problem:
 
 
 def scalars_of_laws(result: Identification) -> FittedLaws | None:
-    """What the step found; None of a model without scalars."""
+    """Scalars of the friction laws from the nonlinear search; None if the model has none."""
     note = result.problem.noted(KIND)
     return None if note is None else note.result
 

@@ -44,7 +44,7 @@ class Mount:
 
     @property
     def place(self) -> str:
-        """In words."""
+        """The link or frame that carries the load, in words."""
         return (
             f"link {self.link}"
             if self.frame == self.link

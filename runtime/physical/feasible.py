@@ -382,7 +382,7 @@ def prior_text(physical: PhysicalModel, options: FeasibleOptions, weight: float)
 
 
 def part_factor(part: Observation, system: System) -> Factor:
-    """Factor of some rows with the weights of the joints in the whole."""
+    """Triangular factor of some rows, each joint weighted as in the fit of all rows."""
     chosen = part.columns(system.names)
     return factor(chosen.W, chosen.Y, chosen.rows, chosen.names).weighted(
         1 / np.array(system.scales)

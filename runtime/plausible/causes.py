@@ -261,7 +261,7 @@ def several_joints(robot: Robot) -> Iterator[Item]:
 
 
 def joints(robot: Robot) -> Iterator[Item]:
-    """Every joint."""
+    """Each joint by its label."""
     for j, label in enumerate(robot.labels):
         yield {"j": j, "joint": label}
 

@@ -65,8 +65,10 @@ def physics(case: Case) -> Answer | None:
     "tells of that model, not of the robot",
 )
 def measured(case: Case) -> Answer | None:
-    """Friction in the torque of the joint that has most of it, and noise of the torques at the rate
-    of the record, by fifth differences, both relative; None where a law gives the torques.
+    """Whether the torques are measured ones: some joint shows friction, and they are noisy.
+
+    Friction is a share of a joint's torque, noise comes from fifth differences of the samples.
+    None if a law of the controller gives the torques.
     """
     if case.alone is None or any(record.origin.by_law for record in case.records):
         return None

@@ -263,7 +263,7 @@ class Baseline:
         return W, explained, e, A + self.bodies.stiffness(self.given.X)
 
     def effect(self, change: Callable[[float], Cause]) -> Array:
-        """J of a number, shape (K, n): what the torques of the study become, by xi."""
+        """J = d tau/d xi: derivative of the study's torques by the number xi, shape (K, n)."""
         explained = self.normal[1]
         cause = change(LIMIT.DIFFERENCE_STEP)
         rows = self.rows(cause)

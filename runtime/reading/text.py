@@ -170,7 +170,7 @@ def _width_hint(delimiter: str | None, wider: bool) -> str:
 def _no_number(
     file: str, name: str, row: str, field: str, decimal: str, *, first: bool
 ) -> InputError:
-    """What is wrong with a field that holds something else; first : of the first sample."""
+    """The error for a field that is no number; first : whether it is of the first sample."""
     what = f"{field!r}; expected a number"
     hint = ""
     remedy = None

@@ -16,15 +16,14 @@ def apply(
         Path, typer.Argument(help="Folder of `symgen identify -o`, or its estimate.json.")
     ],
     model: Annotated[
-        Path, typer.Argument(help="The file that the values go into: .urdf, or .xml, .mjcf (MJCF).")
+        Path, typer.Argument(help="File to take the values: .urdf, or MJCF as .xml or .mjcf.")
     ],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write.")] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="Write MODEL itself.")] = False,
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Robot file that was identified, where it is not MODEL but was converted from it. "
-            "--exact, --lock and --chain: as then."
+            help="Robot file that was identified, if it was converted from MODEL. Give --exact, --lock and --chain as for that conversion."
         ),
     ] = None,
     exact: options.Exact = False,
@@ -36,11 +35,11 @@ def apply(
     json: options.Json = False,
     force: options.Force = False,
 ) -> None:
-    """Write masses, centres, inertias, friction and motor inertia of RESULTS into MODEL: numbers
-    change, every other byte stays. Without -o and --in-place it prints what would change.
+    """Write masses, centres, inertias, friction and motor inertia of RESULTS into MODEL. Only
+    numbers change; every other byte stays. Without -o or --in-place, print what would change.
 
-    The file is written whole or not at all, and only with values that a physical robot can have;
-    else exit code 2, with the reason.
+    The file is written whole or not at all, and only with values that a physical robot can have.
+    Otherwise the command ends with exit code 2 and the reason.
     """
     with reported_errors():
         from symgen.description.values import assignment

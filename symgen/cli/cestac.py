@@ -42,14 +42,14 @@ def cestac(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Study the encoder resolution. Exit code 1 where the estimate is biased at one of the steps.
+    """Study the encoder resolution. Exit code 1 if the estimate is biased at one of the steps.
 
-    With --advise, exit code 1 where it would be at one of the steps of --delta, or where the runs
-    contradict the prediction. Encoders are read as positions and as counts; with --reader by that
-    one alone, lowpass in a sixth of the time.
+    With --advise, exit code 1 if the estimate would be biased at one of the steps of --delta, or if
+    the runs contradict the prediction. Encoders are read both as positions and as counts; --reader
+    chooses one, and lowpass takes a sixth of the time.
 
-    A long study with -o keeps its runs in DIR/runs.npz as it goes: interrupted or killed, the same
-    command goes on.
+    A long study with -o saves its runs in DIR/runs.npz as it goes. If it was interrupted or killed,
+    the same command continues it.
     """
     with session.results_in(output) as results:
         import runtime

@@ -19,11 +19,13 @@ def check(
     json: options.Json = False,
     claim: Annotated[
         Path | None,
-        typer.Option("--certificate", help="Write what is claimed as JSON, for others to verify."),
+        typer.Option(
+            "--certificate", help="Write the claims as JSON, so that others can verify them."
+        ),
     ] = None,
 ) -> None:
-    """Verify ROBOT: exact rank, identities at fresh geometry, numeric rank, and every function of
-    the NumPy module by other dynamics.
+    """Verify the base parameters of ROBOT by exact rank, by identities at new geometry and by
+    numeric rank, and every function of the NumPy module by independent dynamics.
     """
     with reported_errors():
         from json import dumps

@@ -17,8 +17,7 @@ def compare(
     study: Annotated[
         list[str],
         typer.Argument(
-            help="Study files that name the same validate.record, one for each treatment; of one "
-            "alone the treatments that suggest themselves."
+            help="Study files to compare, all with the same validate.record. For a single file, symgen chooses the variants."
         ),
     ],
     output: Annotated[
@@ -28,12 +27,12 @@ def compare(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Identify ROBOT with each treatment, and order them by what they predict of the validation
-    record.
+    """Identify ROBOT with each treatment of the records, and rank them by how well they predict the
+    validation record.
 
-    Of one study: as stated, without the rows of joints that stand, with known torques left out. In
-    each, the set of parameters that predicts best is taken. Exit code 1 where the best cannot be
-    used.
+    A single study is compared as stated, without the rows of standing joints, and without its known
+    torques. Each treatment uses the set of parameters that predicts best. Exit code 1 if the best
+    one cannot be used.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime

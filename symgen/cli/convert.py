@@ -40,8 +40,7 @@ def convert(
         typer.Option(
             "--keep-fixed",
             help=(
-                "Of a URDF or MJCF: links that fixed joints hold (tool0, flange) are frames of "
-                "their own."
+                "URDF or MJCF only: keep links on fixed joints (tool0, flange) as frames of their own."
             ),
         ),
     ] = False,
@@ -58,18 +57,17 @@ def convert(
         Path | None,
         typer.Option(
             help=(
-                "The same from estimate.json of an identification with physical parameters, as "
-                "`symgen identify -o` writes it."
+                "Standard parameters for OUT from the estimate.json of an identification with physical parameters, as `symgen identify -o` writes it."
             )
         ),
     ] = None,
     force: options.Force = False,
 ) -> None:
-    """Write the robot IN in the format of OUT, and say what was read otherwise than written and
-    what OUT does not carry.
+    """Write the robot IN in the format of OUT. Report what was read differently from what the file
+    says, and what OUT cannot hold.
 
-    OUT is written whole or not at all; where the target would hold another mechanism nothing is
-    written, exit code 2.
+    OUT is written whole or not at all. If it would describe another mechanism, nothing is written
+    and the exit code is 2.
     """
     with reported_errors():
         from symgen.description.angles import SNAPPED

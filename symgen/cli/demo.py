@@ -13,11 +13,11 @@ from symgen.cli import options, session
 def demo(
     output: Annotated[Path, options.folder("the results")] = Path("symgen-demo"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Two runs per step and no further studies.")
+        bool, typer.Option("--quick", help="Make two runs per step and no further studies.")
     ] = False,
 ) -> None:
-    """Identify the Stäubli TX40 from its public record, or from a simulated one where that cannot
-    be had, and judge its encoder resolution, beside the published tables.
+    """Identify the Stäubli TX40 from its public record, or from a simulated one if that cannot be
+    fetched, judge its encoder resolution, and print the published tables beside it.
     """
     with session.results_in(output) as results:
         from symgen.demo import demonstrate, prepare

@@ -30,7 +30,10 @@ def excite(
     ] = None,
     poses: Annotated[
         int | None,
-        typer.Option(min=1, help="So many poses at rest, which tell gravity, not a motion."),
+        typer.Option(
+            min=1,
+            help="Choose this number of poses at rest, which identify gravity, instead of a motion.",
+        ),
     ] = None,
     criterion: Annotated[
         str | None,
@@ -45,12 +48,12 @@ def excite(
     exact: options.Exact = False,
     json: options.Json = False,
 ) -> None:
-    """Search an exciting motion. Families, limits and distances: section `excitation` of a study
-    file.
+    """Search an exciting motion. Families, limits and distances are settings of the section
+    `excitation` of a study file.
 
-    With --poses: poses at rest, which tell the parameters of gravity.
+    With --poses, search poses at rest, which identify the parameters of gravity.
 
-    Without RECORD, or with a study file that names none, parameters are the values of the robot
+    Without RECORD, or with a study file that names none, the parameters are the values of the robot
     file.
     """
     with session.results_in(output) as results:

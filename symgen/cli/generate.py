@@ -55,12 +55,12 @@ def generate(
     exact: options.Exact = False,
     check: Annotated[
         bool,
-        typer.Option(
-            "--check", help="Write nothing; fail with a diff where a module is not current."
-        ),
+        typer.Option("--check", help="Write nothing; fail with a diff if a module is not current."),
     ] = False,
 ) -> None:
-    """Derive the models of each ROBOT and write them as files of OUTPUT. All are written, or none."""
+    """Derive the models of each ROBOT and write them to OUTPUT. Either all files are written or
+    none.
+    """
     with reported_errors():
         targets = _among(TARGETS, "target", target)
         requested = _among(OPTIONS, "--with", with_) if with_ else ()

@@ -23,19 +23,22 @@ def identify(
     ] = None,
     physical: Annotated[
         bool,
-        typer.Option("--physical", help="Tell whether a physical robot can have these parameters."),
+        typer.Option(
+            "--physical", help="Check whether a physical robot can have these parameters."
+        ),
     ] = False,
     friction: Annotated[
         bool,
         typer.Option(
-            "--friction", help="Friction against velocity, joint by joint, and the law it follows."
+            "--friction",
+            help="Plot the friction of each joint against its velocity, and fit a friction law.",
         ),
     ] = False,
     plausible: Annotated[
         bool,
         typer.Option(
             "--plausible/--no-plausible",
-            help="Tell whether record, study and robot file suit each other, and what would.",
+            help="Check whether record, study and robot file are consistent; if not, suggest what to change.",
         ),
     ] = True,
     trust: options.Trust = False,
@@ -44,14 +47,13 @@ def identify(
         bool,
         typer.Option(
             "--verbose",
-            help="Print also how parameters were removed, the validation, deviations, residuals.",
+            help="Also print how parameters were removed, the validation, standard deviations and residuals.",
         ),
     ] = False,
     suggest: Annotated[
         Path | None,
         typer.Option(
-            help="Write a study file in which the records can be read, with what is likely to cure "
-            "each refusal (columns by their names, resampling, units), and go on with it."
+            help="Write a study file that can read the records (columns guessed by name, resampling, units) and go on with it."
         ),
     ] = None,
     json: options.Json = False,

@@ -23,16 +23,16 @@ VERBS = {
     "identify": "Estimate the base parameters from a measured record.",
     "cestac": "Judge whether the encoder resolves enough for an identification.",
     "compare": "Find which treatment of the records predicts best.",
-    "report": "Everything one record says about a robot, judged, on one page.",
+    "report": "Identify a robot from a record and judge the result on one page.",
     "excite": "Search a motion that excites the parameters within the limits.",
     "simulate": "Simulate the closed loop of a study file and write its record.",
-    "datasets": "List the measured records this program knows.",
+    "datasets": "List the measured records that symgen can fetch.",
     "convert": "Write a robot in another format: .yaml, .urdf.",
     "apply": "Write identified values into your own URDF or MJCF.",
     "new": "Write a skeleton robot file.",
     "schema": "Print the JSON Schema of robot files or of results.",
     "studio": "Serve a local page where one works: robot, record, check, solve, results.",
-    "demo": "The main job end to end, with a report.",
+    "demo": "Run the main job from end to end, with a report.",
 }
 
 WENT = {

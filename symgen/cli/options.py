@@ -34,8 +34,7 @@ AtValues = Annotated[
     bool,
     typer.Option(
         "--at-values",
-        help="Every constant as its number: base parameters and formulas that hold for these "
-        "values, where the generic ones do not.",
+        help="Replace every constant by its number. The base parameters and formulas then hold for these values only.",
     ),
 ]
 Exact = Annotated[
@@ -48,19 +47,25 @@ Exact = Annotated[
 ]
 Trust = Annotated[
     bool,
-    typer.Option("--trust", help="Run a module (.py) that was not emitted here: it is code."),
+    typer.Option(
+        "--trust",
+        help="Run a generated module (.py) that was not emitted on this machine. It is code: use only what you trust.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Columns = Annotated[
     Text,
     typer.Option(
-        help="essential, all, or names separated by commas: of cestac these are judged, in the fit of the essential ones."
+        help="essential, all, or names separated by commas. cestac judges the named ones within the fit of the essential ones."
     ),
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of what is drawn at random.")]
+Seed = Annotated[int | None, typer.Option(help="Seed of the random numbers.")]
 Workers = Annotated[
     int,
-    typer.Option(min=0, help="Processes; 0 and 1: this one. The results do not depend on it."),
+    typer.Option(
+        min=0,
+        help="Number of worker processes; 0 or 1 runs in this process. The results do not depend on it.",
+    ),
 ]
 Scheduler = Annotated[
     Text,
@@ -108,13 +113,15 @@ Advise = Annotated[
 ]
 Lock = Annotated[
     list[str] | None,
-    typer.Option(help="Of a URDF or MJCF: hold a joint, elbow=pi/2 (rad or m); repeat."),
+    typer.Option(
+        help="URDF or MJCF only: lock a joint at a position, e.g. elbow=pi/2 (rad or m); may be repeated."
+    ),
 ]
 Chain = Annotated[
     tuple[str, str] | None,
     typer.Option(
         metavar="BASE TIP",
-        help="Of a URDF or MJCF: --lock of all joints but those between two links, at zero.",
+        help="URDF or MJCF only: keep the joints between two links and lock all others at zero.",
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")]

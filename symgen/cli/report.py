@@ -21,8 +21,7 @@ def report(
     encoder: Annotated[
         str | None,
         typer.Option(
-            help="Step of the encoders in use, rad or m, such as 2*pi/65536: judged like every "
-            "other check."
+            help="Step of the encoders in use, rad or m, such as 2*pi/65536. It is judged as one of the checks."
         ),
     ] = None,
     side: options.Side = None,
@@ -33,7 +32,7 @@ def report(
     """Identify ROBOT from RECORD, with friction, physical consistency and encoder resolution, and
     judge the result.
 
-    A part that cannot be done is named on the page with its reason. Exit code 1 where the values
+    A part that cannot be done is named on the page with its reason. Exit code 1 if the values
     cannot be used.
     """
     with session.results_in(output) as results:

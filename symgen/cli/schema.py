@@ -18,14 +18,13 @@ def schema(
         str,
         typer.Option(
             help=(
-                "robot (robot files), study (study files), estimate (estimate.json) or cestac "
-                "(cestac.json)."
+                "Kind of file whose schema is printed: robot, study, estimate (estimate.json) or cestac (cestac.json)."
             )
         ),
     ] = "robot",
 ) -> None:
-    """Print a JSON Schema; `symgen new` refers to the installed copy of that of robot files in its
-    first line.
+    """Print a JSON Schema. The first line of a file of `symgen new` names the installed copy of the
+    schema of robot files.
     """
     if of not in KINDS:
         fail(f"--of {of}; expected one of {', '.join(KINDS)}")

@@ -94,8 +94,10 @@ def results_in(output: Path | None) -> Iterator[Any]:
 
 
 def fail(message: str, *, lines: bool = False, code: int = BAD_INPUT) -> NoReturn:
-    """End with `message` and an exit code; on one line unless it is meant to have several: names in
-    it may have any characters.
+    """End the command with `message` on the error stream and an exit code.
+
+    lines : whether line ends of the message are kept; else they are printed as backslash n, since a
+        name in it may hold any character.
     """
     from symgen.errors import printable
 

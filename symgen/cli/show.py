@@ -38,7 +38,7 @@ def show(
         int | None, typer.Option(help="Frame of the model. Default: the last frame.")
     ] = None,
     rows: Annotated[
-        str | None, typer.Option(help="Of a determinant: rows of the Jacobian, e.g. 1,2.")
+        str | None, typer.Option(help="For a determinant: rows of the Jacobian, e.g. 1,2.")
     ] = None,
     form: Annotated[
         str | None,
@@ -69,7 +69,8 @@ def show(
     recursive: Annotated[
         bool,
         typer.Option(
-            "--recursive", help="Link by link, as SYMORO prints, instead of flat as eq. (27)."
+            "--recursive",
+            help="Print the formulas link by link, as SYMORO does, instead of in full as in eq. (27).",
         ),
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Same as --format json.")] = False,
@@ -77,7 +78,7 @@ def show(
         bool,
         typer.Option(
             "--html",
-            help="One page to look at: the robot in 3D, its frames and formulas; no network.",
+            help="Write one HTML page with the robot in 3D, its frames and formulas; it needs no network.",
         ),
     ] = False,
     output: Annotated[
@@ -85,8 +86,8 @@ def show(
         typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
     ] = None,
 ) -> None:
-    """Print the base parameters of ROBOT, what they are made of, what has no effect, and what the
-    models cost; or, with --model, a model in symbols.
+    """Print the base parameters of ROBOT with their regrouping formulas, the parameters without
+    effect, and the operations of every model. With --model, print a model in symbols.
     """
     kind = "json" if json else format
     of_model = {

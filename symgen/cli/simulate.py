@@ -20,7 +20,10 @@ def simulate(
         Path | None, options.folder("simulated.csv, study.yaml, simulation.json and the figure")
     ] = None,
     ideal: Annotated[
-        bool, typer.Option("--ideal", help="No noise, no steps of encoder and converter.")
+        bool,
+        typer.Option(
+            "--ideal", help="Simulate without noise and without the steps of encoder and converter."
+        ),
     ] = False,
     trust: options.Trust = False,
     exact: options.Exact = False,

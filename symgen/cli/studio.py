@@ -26,7 +26,10 @@ def studio(
         str | None, typer.Argument(help="Dataset, study file or measured file to begin with.")
     ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Work folder: ordinary files; opens again.")
+        Path,
+        typer.Option(
+            "-o", "--output", help="Work folder. It holds ordinary files and can be opened again."
+        ),
     ] = Path("symgen-studio"),
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of this machine. Default: a free one.")
@@ -35,9 +38,10 @@ def studio(
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
 ) -> None:
-    """Serve a page for robot, record, check, solve and results, on this machine alone.
+    """Serve a local page to edit a robot, read a record, check it, identify and see the results.
+    Other machines cannot reach it.
 
-    It ends with Ctrl-C, with the terminal, or ten minutes after its last page was closed.
+    The server ends with Ctrl-C, with its terminal, or ten minutes after its last page was closed.
     """
     with reported_errors():
         try:

@@ -166,7 +166,7 @@ class Geometry:
 
 
 def summed(turn: Turn) -> Turn:
-    """Equal joints of a turn added up; what cancels is left out."""
+    """The turn with one term per joint, sorted; terms that cancel are left out."""
     total: dict[int, int | Fraction] = {}
     for j, n in turn:
         total[j] = total.get(j, 0) + n

@@ -122,7 +122,7 @@ class Frame:
 
 
 def rows(texts: Mapping[int, str] | str, declared: Declared) -> Mapping[int, Row]:
-    """{j: text}, or all, to {j: row}."""
+    """Rows of joints from their texts {j: text}; the text "all" gives every actuated joint its own."""
     if texts == "all":
         return {f.j: {f.j: ONE} for f in declared.frames if f.mu}
     return reduced(row_of, texts, declared)

@@ -344,7 +344,7 @@ def tuple_of(names: Sequence[object]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names behind other arguments."""
+    """Names as text that follows other arguments: ", D3, RL4"."""
     return "".join(f", {name}" for name in names)
 
 

@@ -194,8 +194,8 @@ class ClosedDraw(Draw):
         return np.asarray(square)
 
     def _branch(self, j: int, first: Point, second: Point, around: set[int]) -> Array:
-        """Of two branches of a closure that splits, whether hinge j is on that of the file at
-        `first`, (samples,).
+        """Whether hinge j is on the branch of the robot file at `first`, shape (samples,); for a
+        closure whose solutions split into two branches.
         """
         hinges = [
             i for i in self.robot.joints if i in around and self.robot.frame(i).sigma == REVOLUTE

@@ -360,8 +360,8 @@ def _held(part: Numbers, chi: Array) -> Array:
 
 
 def strange(link: FileLink, closest: Nearest) -> str:
-    """What of a link is no longer that of the file, a sentence; "" where its mass is within STRANGE
-    times that and its centre has moved by less than the link extends.
+    """How far mass and centre of a link have left those of the file, as text; "" if the mass is
+    within a factor STRANGE and the centre has moved by less than the size of the link.
     """
     before, after = (u[closest.links[link.name]] for u in (closest.u0, closest.u))
     m0, m, far = before[0], after[0], float(np.linalg.norm((after - before)[1:4]))

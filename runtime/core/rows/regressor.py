@@ -175,8 +175,8 @@ def distinct_entries(model: GeneratedModel, columns: Array | None = None) -> Ent
 
 
 def _probed(model: GeneratedModel) -> Array:
-    """The store at random states, shape (b, n, PROBES); nan where a loop does not close at one of
-    them.
+    """The regressor at PROBES random states, shape (b, n, PROBES); nan if a loop does not close at
+    one of them.
     """
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-np.pi, np.pi, (3, PROBES, len(model.JOINTS)))

@@ -51,10 +51,10 @@ def switches(
     names: Sequence[str],
     passive: Literal["refused", "left out"] = "refused",
 ) -> tuple[Switch, ...]:
-    """Columns among `names` that switch, from the elements of the model; ModelError where it has
-    none.
+    """Columns of `names` that jump with the sign of a velocity; ModelError if the model describes no
+    elements.
 
-    passive : what is done about one that acts along a passive joint.
+    passive : whether such a column along a passive joint is refused or left out.
     """
     elements = elements_of(model)
     switching = []

@@ -253,8 +253,9 @@ def _forward(op: Operator, length: int) -> tuple[Array, Array]:
 
 
 def _backward(op: Operator, length: int, kept: int) -> tuple[Array, Array]:
-    """From f of `length` samples: f_0 + lambda w_0, complex, shape (m, length), and y of the first
-    `kept` instants, shape (kept, length).
+    """The backward pass as two matrices that are applied to f, `length` samples: one gives
+    f_0 + lambda w_0, complex, shape (m, length), the other y at the first `kept` instants, shape
+    (kept, length).
     """
     h = op.impulse(length)
     later = np.arange(length) - op.factor * np.arange(kept)[:, None]
