@@ -94,10 +94,9 @@ def own_encoder(record: Record, study: Study, drives: Drives | None) -> OwnEncod
     finest, coarsest = min(settings.delta, default=np.inf), int(np.argmax(step))
     if finest <= 1.001 * step[coarsest]:
         raise SettingsError(
-            f"{finest:.4g}, while encoder {coarsest + 1} of {record.name} has steps of "
-            f"{step[coarsest]:.4g} itself: counts rounded at their own step or "
-            "finer are only shifted, which would look like certainty; ask for more than "
-            f"{step[coarsest]:.4g}",
+            f"a step of {finest:.4g} is not coarser than that of encoder {coarsest + 1} of "
+            f"{record.name}, {step[coarsest]:.4g}: it would only shift the counts, and the result "
+            f"would look too certain; ask for steps above {step[coarsest]:.4g}",
             path=("cestac", "delta"),
         )
     if finest >= (1 - 1e-9) * LIMIT.EXACT_FROM * step[coarsest]:

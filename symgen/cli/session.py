@@ -248,7 +248,9 @@ def suggested_study(study: Study, model: GeneratedModel, path: Path) -> Study:
     from runtime.study import draft, study_text, suggested
 
     if path.exists():
-        raise InputError("the study to suggest exists; choose another name", file=str(path))
+        raise InputError(
+            "the file for --suggest exists already; choose another name", file=str(path)
+        )
     folder = path.resolve().parent
     try:
         study, told = suggested(study, model)

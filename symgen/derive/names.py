@@ -67,7 +67,9 @@ class Names:
 
     def __call__(self, family: str, *indices: int) -> str:
         if family not in FAMILIES:
-            raise KeyError(f"{family!r} is not a family of symgen/derive/names.py")
+            raise KeyError(
+                f"unknown family of symbols {family!r}; expected one of {', '.join(FAMILIES)}"
+            )
         return family + self.separator.join(str(i) for i in indices)
 
 

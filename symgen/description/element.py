@@ -298,7 +298,7 @@ def check_channels(robot: Any) -> None:
     for name in robot.channels:
         if name in laws or any(name in x.symbols for x in every):
             raise DescriptionError(
-                f"{CHANNEL}{name} is a function of time, and {name} is read as a constant beside "
-                f"it; write {CHANNEL}{name} in every law, and another constant elsewhere",
+                f"{name} is used as a constant, but {CHANNEL}{name} is a function of time; write "
+                f"{CHANNEL}{name} in every law, and give the constant another name",
                 path=("constants", name),
             )

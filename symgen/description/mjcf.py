@@ -91,7 +91,9 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
         model.dof_armature,
     ):
         if not np.all(np.abs(values) <= LARGEST):
-            raise DescriptionError(f"a number is not finite or larger than {LARGEST:g}")
+            raise DescriptionError(
+                f"a number of the bodies or joints is infinite, nan or larger than {LARGEST:g} in magnitude; correct it"
+            )
     growing = _Growing(mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
         _body(growing, b)
@@ -216,7 +218,7 @@ def _joint(growing: _Growing, k: int, parent: str, child: str, pose: Array) -> t
     dof, axis = int(model.jnt_dofadr[k]), np.array(model.jnt_axis[k])
     if not 0 < np.linalg.norm(axis) < np.inf:
         raise DescriptionError(
-            f"joint {name!r}: its axis has no direction; expected three numbers of like size",
+            f"joint {name!r}: its axis is zero, or its components differ too much in size; expected a direction such as 0 0 1",
             line=line,
         )
     axis /= np.linalg.norm(axis)
