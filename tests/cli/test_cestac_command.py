@@ -97,7 +97,10 @@ def test_torque_steps_and_named_columns(emps_data):
         (["--reader", "edges"], ["signals.reader", "counts"]),
         (["--place", "loop"], ["cestac.rounding", "phase alone"]),
         (["--method", "best"], ["estimate.method", "didim"]),
-        (["--rounding", "phase", "--delta", "5e-8"], ["cestac.delta", "steps of 5e-08 itself"]),
+        (
+            ["--rounding", "phase", "--delta", "5e-8"],
+            ["cestac.delta", "not coarser than that of encoder"],
+        ),
     ],
 )
 def test_bad_options(emps_data, options, words):

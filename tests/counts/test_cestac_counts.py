@@ -86,7 +86,8 @@ def test_steps_near_those_of_the_record_are_put_into_draws():
     found = cestac(planar, coarse, study(delta=(2 * d,)))
     assert found.levels[0].sigma.min() > 0 and found.notes == ()
     with pytest.raises(
-        SettingsError, match=r"cestac.delta: 0\.001, while encoder \d .* steps of 0\.001 itself"
+        SettingsError,
+        match=r"cestac.delta: a step of 0\.001 is not coarser than that of encoder \d .*, 0\.001",
     ):
         cestac(planar, coarse, study(delta=(d,)))
     filtered = replace(
