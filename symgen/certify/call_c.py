@@ -1,8 +1,8 @@
 """Functions of a compiled C file, called in a process of its own, which a wrong index may end.
 
-`python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]], "tables": [[name,
-count]]} as JSON and prints the results: [status, numbers] of every call, where the argument null is
-the result, every number `before` as it starts, then the numbers of every table of int32.
+`python call_c.py` reads {"library": path, "calls": [[name, arguments, size, before]], "tables":
+[[name, count]]} as JSON. The argument null is the result, whose `size` numbers are all `before` when
+the call begins. It prints [status, numbers] of every call, then the numbers of every table of int32.
 """
 
 from __future__ import annotations

@@ -184,7 +184,7 @@ def module_errors(
             if how == CASADI and name == "observation_matrix":
                 continue  # a column of matrices is none of one state
             found, text = largest(used, name, checks, call, witness)
-            errors[name] = max(errors.get(name, 0.0), found, key=_worse)
+            errors[name] = max(errors.get(name, 0.0), found)
             if text:
                 raised[name] = f"{text} ({how})"
     if not witness.tied:
@@ -205,11 +205,6 @@ def module_errors(
         if not name.startswith("_"):
             errors[name] = float("inf")
     return errors, raised, tuple(uses)
-
-
-def _worse(error: float) -> float:
-    """An order of errors in which NaN is the largest."""
-    return float("inf") if error != error else error
 
 
 def largest(
