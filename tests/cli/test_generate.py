@@ -48,9 +48,8 @@ def test_same_bytes_whatever_the_hash_seed():
         ).stdout
         for seed in ("1", "77")
     }
-    assert (
-        len(seen) == 1 and seen.pop().count(b"\n") == 6
-    )  # a module, C and its header, each of two robots
+    # a module, C and its header, each of two robots
+    assert len(seen) == 1 and seen.pop().count(b"\n") == 6
 
 
 def test_own_robot_from_any_folder(tmp_path, monkeypatch):

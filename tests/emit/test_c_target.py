@@ -5,6 +5,7 @@ deterministic, closed to hostile texts.
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -219,6 +220,59 @@ int main(void)
 """
 
 
+OF_ONE_STATE = """
+#include <stdlib.h>
+#include "robot.h"
+int main(void)
+{{
+    const int32_t frame = {n};
+    double *q = calloc({n}, sizeof *q), *X = calloc({b}, sizeof *X), *constants = calloc({k}, sizeof *X);
+    double *S = calloc({n}*{b} + 16*{n}, sizeof *S);
+{calls}
+    free(q), free(X), free(constants), free(S);
+    return 0;
+}}
+"""
+
+
+def calls_of_one_state(name: str, header: str) -> str:
+    """A call of every function of one state that the header declares."""
+    given = {"qd": "q", "tau": "q", "J": "S"}
+    lines = []
+    for f, parameters in re.findall(r"(\w+1)\(([^()]*)\);", re.sub(r"\s+", " ", header)):
+        names = [p.split()[-1].lstrip("*") for p in parameters.split(",")]
+        stored = names[-1]  # qdd is given, but to forward dynamics
+        names = [given.get(x, "q" if x == "qdd" else x) for x in names[:-1]] + ["S"]
+        assert f.startswith(name) and stored in ("S", "J", "qdd")
+        lines.append(f"    {f}({', '.join(names)});")
+    assert len(lines) == 8
+    return "\n".join(lines)
+
+
+def sanitized(folder: Path, main: str, robot: dict[str, str], name: str, *flags: str) -> str:
+    """What a program prints on the error stream under the sanitizers of addresses and undefined
+    behaviour.
+    """
+    (folder / "main.c").write_text(main)
+    for ending in ("c", "h"):
+        (folder / f"robot.{ending}").write_text(robot[f"{name}.{ending}"], encoding="utf-8")
+    sanitize = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    command = [COMPILERS[0], *FLAGS, "-O1", *flags, *sanitize, "main.c", "robot.c", "-o", "main"]
+    done = subprocess.run(
+        [*command, "-lm"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run([folder / "main"], capture_output=True, text=True, check=False)
+    assert (done.returncode == 0) == (done.stderr == "")
+    return done.stderr
+
+
+def sizes(name: str) -> dict[str, int | str]:
+    module = numpy_module(name, files(name)[f"{name}.py"])
+    n, b, k = len(module.JOINTS), len(module.BASE_PARAMETERS), len(module.CONSTANTS) + 1
+    return {"name": name, "n": n, "b": b, "k": k}
+
+
 @campaign
 @needs_compiler
 @pytest.mark.parametrize(
@@ -226,18 +280,26 @@ int main(void)
 )
 def test_sanitizers(path: list[str], tmp_path: Path) -> None:
     module = numpy_module("scara", files("scara")["scara.py"])
-    sizes = {"name": "scara", "n": len(module.JOINTS), "b": len(module.BASE_PARAMETERS)}
-    main = MAIN.format(**sizes, constants=", ".join(map(repr, [*module.CONSTANTS.values(), 0.0])))
-    (tmp_path / "main.c").write_text(main)
-    (tmp_path / "robot.c").write_text(files("scara")["scara.c"], encoding="utf-8")
-    sanitize = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    flags = [*FLAGS, "-O1", *path, *sanitize, "main.c", "robot.c", "-o", "main", "-lm"]
-    done = subprocess.run(
-        [COMPILERS[0], *flags], cwd=tmp_path, capture_output=True, text=True, check=False
+    constants = ", ".join(map(repr, [*module.CONSTANTS.values(), 0.0]))
+    main = MAIN.format(**sizes("scara"), constants=constants)
+    assert sanitized(tmp_path, main, files("scara"), "scara", *path) == ""
+
+
+@campaign
+@needs_compiler
+@pytest.mark.parametrize("name", ["tx40", "scara"])
+def test_sanitizers_of_one_state(name: str, tmp_path: Path) -> None:
+    """Every function of one state is clean; a room that is one too small is seen."""
+    robot = files(name)
+    calls = calls_of_one_state(name, robot[f"{name}.h"])
+    main = OF_ONE_STATE.format(**sizes(name), calls=calls)
+    assert sanitized(tmp_path, main, robot, name) == ""
+    text, count = re.subn(
+        r"(real T\[\d+\], T_\[)(\d+)\]", lambda m: f"{m[1]}{int(m[2]) - 1}]", robot[f"{name}.c"]
     )
-    assert done.returncode == 0, done.stderr
-    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and done.stderr == "", done.stderr
+    assert count
+    seen = sanitized(tmp_path, main, {**robot, f"{name}.c": text}, name)
+    assert re.search("runtime error|AddressSanitizer", seen)
 
 
 def test_quantities_have_the_names_of_the_numpy_module() -> None:
