@@ -523,7 +523,8 @@ def decisive(
     not give their parameters: the best, and those like it.
 
     floor : error of a joint, %, that noise of the positions may make. A smaller error shows no cause,
-        nor does the distance from the values where this is more than LIMIT.NOISY.
+        nor does the distance from the values where this is more than LIMIT.NOISY, or where a joint
+        pays for it with a good part of its error.
     other : rows of validation records, which a cause has to explain better too.
     alone : the study without the values of the robot file. A cause whose bodies are not those of the
         file, such as a unit that makes torques small, has to gain there too.
@@ -534,14 +535,15 @@ def decisive(
             slower = trial.cause.kind == "rate"  # small accelerations undo what noise makes
             noise = floor if slower else min(floor, LIMIT.NOISE_MADE_MOST)
             visible = bool((takes_away(given, trial.fit) & (given.errors > noise)).any())
-            nearer = given.penalty - trial.fit.penalty > LIMIT.DECISIVE and floor < LIMIT.NOISY
+            nearer = (
+                given.penalty - trial.fit.penalty > LIMIT.DECISIVE
+                and floor < LIMIT.NOISY
+                and not takes_away(trial.fit, given).any()
+            )
             if alone is not None and leaves_values(trial.fit, baseline):
                 fit = alone.trial(trial.cause).fit
                 visible &= fit is not None and bool(takes_away(alone.given, fit).any())
                 nearer = False
-            nearer &= not takes_away(
-                trial.fit, given
-            ).any()  # from the values a joint may lose little
             lost = trial.fit.errors - given.errors > LIMIT.LOST
             if (visible or nearer) and not lost.any():
                 better.append(trial)
