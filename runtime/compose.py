@@ -558,7 +558,8 @@ def static_poses(
     model: GeneratedModel, records: Records = (), study: Study | None = None
 ) -> StaticPoses:
     """Poses at rest, within the limits of q, from which the gravity parameters are best
-    estimated together with the recorded poses; study.excitation.poses of them, default 20."""
+    estimated together with the recorded poses; study.excitation.poses of them, default 20.
+    """
     from runtime.excitation import poses
 
     return poses.static_poses(problem(model, records, study))

@@ -235,7 +235,8 @@ class Identification:
     @cached_property
     def time_stamps(self) -> tuple[str, ...]:
         """Remarks on the records: time stamps (once a file), known torques that were subtracted,
-        the low-pass filter, and findings of readers and steps."""
+        the low-pass filter, and findings of readers and steps.
+        """
         texts = {
             (record.origin.whole or record.name, record.origin.time): None
             for record in self.records
@@ -333,7 +334,8 @@ class Identification:
     @property
     def own_warnings(self) -> tuple[str, ...]:
         """Warnings: joints without rows, negative friction or motor inertia, joints that lost
-        their parameters, and those of the parts."""
+        their parameters, and those of the parts.
+        """
         by_law = any(record.origin.by_law for record in self.records)
         signs = (
             f"{', '.join(self.negative)} below zero, which no friction and no motor inertia is: "

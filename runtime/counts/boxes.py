@@ -129,7 +129,8 @@ class Boxes:
     @np.errstate(divide="ignore", invalid="ignore")  # sites that do not settle
     def posterior(self, errors: Errors, c: Array, density: Array, t: Array, u: Array) -> Posterior:
         """Expectation propagation: the sites, precisions t and pulls u, are updated until they
-        settle."""
+        settle.
+        """
         basis, gaps = self.basis, np.flatnonzero(self.rest)
         tau, pull = self.rest.copy(), np.zeros(len(self.rest))
         x, change, damping = basis.at_samples(c), np.inf, DAMPING

@@ -48,6 +48,8 @@ def cestac(
     the runs contradict the prediction. Encoders are read both as positions and as counts; --reader
     chooses one, and lowpass takes a sixth of the time.
 
+    Parameters named by --columns are judged within the fit of the essential ones.
+
     A long study with -o saves its runs in DIR/runs.npz as it goes. If it was interrupted or killed,
     the same command continues it.
     """

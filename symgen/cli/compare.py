@@ -30,9 +30,9 @@ def compare(
     """Identify ROBOT with each treatment of the records, and rank them by how well they predict the
     validation record.
 
-    A single study is compared as stated, without the rows of standing joints, and without its known
-    torques. Each treatment uses the set of parameters that predicts best. Exit code 1 if the best
-    one cannot be used.
+    A single study gives up to three treatments: as stated, without the rows of standing joints, and
+    without its known torques. Each treatment uses the set of parameters that predicts best. Exit
+    code 1 if the best one cannot be used.
     """
     with session.progress_lines(), session.results_in(output) as results:
         import runtime

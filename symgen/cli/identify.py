@@ -31,7 +31,7 @@ def identify(
         bool,
         typer.Option(
             "--friction",
-            help="Plot the friction of each joint against its velocity, and fit a friction law.",
+            help="Show the friction of each joint against its velocity, and the law that it follows.",
         ),
     ] = False,
     plausible: Annotated[

@@ -86,8 +86,8 @@ def show(
         typer.Option("-o", "--output", help="File of the page. Default: <name>.html."),
     ] = None,
 ) -> None:
-    """Print the base parameters of ROBOT with their regrouping formulas, the parameters without
-    effect, and the operations of every model. With --model, print a model in symbols.
+    """Print the base parameters of ROBOT with their regrouping formulas, and the parameters without
+    effect; --json adds the operations of every model. With --model, print a model in symbols.
     """
     kind = "json" if json else format
     of_model = {

@@ -81,18 +81,18 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     model = mjcf.model
     if model.njnt > MAX_JOINTS:
         raise DescriptionError(f"{model.njnt} joints; at most {MAX_JOINTS} are read")
-    for values in (
-        model.body_pos,
-        model.body_mass,
-        model.body_inertia,
-        model.jnt_pos,
-        model.qpos0,
-        model.dof_damping,
-        model.dof_armature,
+    for what, values in (
+        ("pos of a body", model.body_pos),
+        ("mass of a body", model.body_mass),
+        ("inertia of a body", model.body_inertia),
+        ("pos of a joint", model.jnt_pos),
+        ("ref of a joint", model.qpos0),
+        ("damping of a joint", model.dof_damping),
+        ("armature of a joint", model.dof_armature),
     ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(
-                f"a number of the bodies or joints is infinite, nan or larger than {LARGEST:g} in magnitude; correct it"
+                f"{what}: a number is infinite, nan or above {LARGEST:g} in magnitude; expected one in SI units"
             )
     growing = _Growing(mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
