@@ -92,7 +92,7 @@ def _tree(mjcf: Mjcf, angles: Angles, *, sites: bool) -> Tree:
     ):
         if not np.all(np.abs(values) <= LARGEST):
             raise DescriptionError(
-                f"{what}: a number is infinite, nan or above {LARGEST:g} in magnitude; expected one in SI units"
+                f"{what}: a number is infinite, nan or larger than {LARGEST:g} in magnitude; expected one in SI units"
             )
     growing = _Growing(mjcf, angles, _joint_names(model))
     for b in range(1, model.nbody):
