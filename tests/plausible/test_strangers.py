@@ -212,7 +212,7 @@ def test_a_wrap_is_a_wrap_with_resample_too(tmp_path, resample) -> None:
     (check,) = (
         c for c in runtime.plausibility(model, record).checks() if "those of a motion" in c.question
     )
-    assert check.state == "no" and check.remedy.startswith("it wraps"), check
+    assert check.state == "no" and check.remedy.startswith("it starts anew"), check
 
 
 def test_physical_parameters_that_did_not_converge_are_not_printed(tmp_path, monkeypatch) -> None:
