@@ -208,15 +208,25 @@ def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | N
     return None if value is None else _of_motors(value, declared)
 
 
+def _rows(value: list[list[float]] | list[float], _: Declared) -> tuple[tuple[float, ...], ...]:
+    """Rows of a matrix; a list of numbers is its diagonal."""
+    n = len(value)
+    return tuple(
+        tuple(x) if isinstance(x, list) else (*[0.0] * k, x, *[0.0] * (n - 1 - k))
+        for k, x in enumerate(value)
+    )
+
+
 @dataclass(frozen=True, config=CONFIG)
 class Drives:
     """qm = ratio (q - offset), tau = ratio' (torque_constant * u)."""
 
     ratio: Annotated[
         tuple[tuple[float, ...], ...],
-        Written(list[list[Numeric]], lambda rows, _: tuple(map(tuple, rows))),
+        Written(list[list[Numeric]] | list[Numeric], _rows),
         Field(
-            description="one row per motor: [[100, 0], [0, 80]]; rad per m for a prismatic joint"
+            description="one row per motor: [[100, 0], [0, 80]]; of uncoupled drives [100, 80]; "
+            "rad per m for a prismatic joint"
         ),
     ]
     offset: Annotated[
