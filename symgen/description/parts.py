@@ -208,12 +208,12 @@ def _of_motors_if_given(value: Any, declared: Declared) -> tuple[float, ...] | N
     return None if value is None else _of_motors(value, declared)
 
 
-def _rows(value: list[list[float]] | list[float], _: Declared) -> tuple[tuple[float, ...], ...]:
+def _rows(value: list[Any], _: Declared) -> tuple[tuple[float, ...], ...]:
     """Rows of a matrix; a list of numbers is its diagonal."""
-    n = len(value)
+    if any(isinstance(x, list) for x in value):
+        return tuple(map(tuple, value))
     return tuple(
-        tuple(x) if isinstance(x, list) else (*[0.0] * k, x, *[0.0] * (n - 1 - k))
-        for k, x in enumerate(value)
+        tuple(x if k == i else 0.0 for k in range(len(value))) for i, x in enumerate(value)
     )
 
 
