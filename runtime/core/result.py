@@ -382,17 +382,21 @@ class Identification:
         first = [f"{check.finding}." for check in self.checklist.checks if check.ahead]
         if not (self.determined and self.usable):
             return "\n\n".join([*first, text])
-        values = in_lines(with_intervals(fit.names, fit.X, fit.sigma_corrected))
+        known = np.abs(fit.X) > 1.96 * fit.sigma_corrected if first else np.full(len(fit.X), True)
+        names = [name for name, shown in zip(fit.names, known, strict=True) if shown]
+        values = in_lines(with_intervals(names, fit.X[known], fit.sigma_corrected[known]))
         room = max(
             LIMIT.LINES_PRINTED - above - len([*first, *text.splitlines()]) - 3,
             LIMIT.LINES_OF_VALUES,
         )
-        more = len(fit.names) - IN_LINE * room
+        more = len(names) - IN_LINE * room
         head = (
             f"{len(fit.names)} of {len(self.estimate.names)} parameters ({self.model_columns}) by "
             f"{fit.method}, SI units, +- 95 %"
         )
         head += f"; {more} more by --verbose" if more > 0 else ""
+        if unknown := len(fit.names) - len(names):
+            head += f"; {unknown} smaller than their intervals by --verbose"
         return "\n".join(
             [*first, head, *values[:room], f"Unexplained by joint: {by_joint}", "", text]
         )
