@@ -35,10 +35,10 @@ PAGE_PARTS = ("table", "certificate", "study", "findings", "jobs", "applied")
 SANDBOX = "sandbox allow-scripts allow-downloads allow-popups"
 SHOWN_FILES = {".html": "text/html", ".png": "image/png", ".svg": "image/svg+xml"}
 VIEWS = ("formulas", "model", "module", "preview", "series")
-RUN_COMMANDS = {
-    "identify": ("identify",),
-    "cestac": ("cestac",),
-    "advise": ("cestac", "--advise"),
+RUN_COMMANDS = {  # what each writes, its verb and options
+    "identify": ("estimate.json", "identify"),
+    "cestac": ("cestac.json", "cestac"),
+    "advise": ("advice.json", "cestac", "--advise"),
 }
 MOST_FIELDS = 100  # of a form
 Handler = Callable[[Any], Awaitable[Any]]
@@ -240,6 +240,7 @@ class Pages:
         self.jobs.add(
             "certificate",
             ("symgen", "check", self._source().name, "--certificate", "proof.json"),
+            "proof.json",
         )
         return "certificate"
 
@@ -257,7 +258,8 @@ class Pages:
         return self._source().name, "study.yaml"
 
     async def _check(self, form: dict[str, str]) -> str:
-        self.jobs.add("check of the record", ("check", *self._command(), "check.json"))
+        words = ("check", *self._command(), "check.json")
+        self.jobs.add("check of the record", words, "check.json")
         return "findings"
 
     async def _solve(self, form: dict[str, str]) -> str:
@@ -279,9 +281,9 @@ class Pages:
         taken = [job.run for job in self.jobs.all] + [p.name for p in self.folder.results()]
         number = max((int(run[:2]) for run in taken if run[:2].isdigit()), default=0) + 1
         run = f"{number:02d}-{safe(form.get('name', '') or kind)}"
-        verb, *own = RUN_COMMANDS[kind]
+        result, verb, *own = RUN_COMMANDS[kind]
         words = ("symgen", verb, robot, f"study-{run}.yaml", *own, *options, "-o", f"runs/{run}")
-        self.jobs.add(run, words, run=run)
+        self.jobs.add(run, words, f"runs/{run}/{result}", run=run)
         self.folder.write(f"study-{run}.yaml", f"# {shlex.join(words)}\n{text}")
         return "jobs"
 
@@ -296,9 +298,11 @@ class Pages:
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
             raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
-        target = ("-o", f"applied{own.suffix}", "--force", "--diff")
+        target = f"applied{own.suffix}"
+        options = ("-o", target, "--force", "--diff")
         edited = () if robot == own else ("--robot", robot.name)
-        self.jobs.add("apply", ("symgen", "apply", f"runs/{run.name}", own.name, *target, *edited))
+        words = ("symgen", "apply", f"runs/{run.name}", own.name, *options, *edited)
+        self.jobs.add("apply", words, target)
         return "applied"
 
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -17,7 +17,7 @@ from urllib.request import Request, urlopen
 import kr300
 import numpy as np
 import pytest
-from browser import WEAK_CONTRAST, Browser, started_browser
+from browser import WEAK_CONTRAST, Browser
 
 import symgen
 from runtime.documents.yaml_text import yaml_text
@@ -67,12 +67,6 @@ ADDED_AND_TYPED = """(() => {
   type("f-2-r", "0.3");
 })()"""  # the answer to the click comes while the next edit waits
 JOB = "[...document.querySelectorAll('.job')].map((node) => node.className)"
-
-
-@pytest.fixture(scope="module")
-def page() -> Iterator[Browser]:
-    with started_browser() as browser:
-        yield browser
 
 
 def go(page: Browser, address: str, width: int = 1280) -> None:

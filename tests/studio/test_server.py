@@ -217,7 +217,7 @@ def test_a_folder_of_ros_2_is_a_record_of_the_command_line(studio: Any, tmp_path
 
 def test_what_a_bar_draws_in_a_terminal_is_a_count_on_the_page() -> None:
     bar = "\x1b[?25lruns \x1b[38;5;237m━━━━\x1b[0m  \x1b[32m0/?\x1b[0m \x1b[36m-:--:--\x1b[0m"
-    job = Job(1, "01-cestac", ("symgen",), progress=bar)
+    job = Job(1, "01-cestac", ("symgen",), "", progress=bar)
     assert job.said == ["runs 0/? -:--:--"] and job.counted == []
     job.progress += (
         "\r\x1b[2Kruns \x1b[35m━━\x1b[0m\x1b[90m╺━\x1b[0m 12/40 \x1b[36m0:00:07\x1b[0m\r"
