@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from browser import Browser
-from test_browser import URDF, go, record, until
+from test_browser import URDF, go, record, type_in, until, wait_for
 
 pytestmark = pytest.mark.campaign
 
@@ -39,3 +39,36 @@ def test_a_check_that_fails_says_why(
     go(page, again.address + "check")
     page.click("#findings button.main")
     assert "check.json" in until(page, alert, 30)
+
+
+MESSAGE = "document.querySelector('#message').textContent"
+
+
+def test_errors_in_a_row_are_each_told_and_stay(page: Browser, running: Callable[..., Any]) -> None:
+    """Of the table after a conflict of two pages, until it is loaded again; of the study."""
+    studio = running("tx40", "tx40")
+    file = studio.work / "robot.yaml"
+    go(page, studio.address + "robot")
+    until(page, "!!document.querySelector('#cells')")
+    file.write_text(file.read_text().replace("D3: 0.225", "D3: 0.3"))  # another page, or an editor
+    for text in ("0.1", "0.2"):
+        page.run("document.querySelector('#message').replaceChildren()")
+        type_in(page, "f-2-alpha", text)
+        until(page, f"{MESSAGE}.includes('another page')", 10)
+    page.run("fetch('do/cancel', {method: 'POST', body: ''})")  # news: parts load again
+    until(page, "!document.getElementById('other').hidden", 10)
+    assert "another page" in page.run(MESSAGE)
+    page.click("#other a")
+    until(
+        page,
+        "document.getElementById('c-0-value')?.value === '0.3' && !!document.querySelector('#arm svg')",
+        10,
+    )
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "0.25")
+    wait_for(lambda: "alpha: 0.25" in file.read_text(), 10)
+    go(page, studio.address + "record")
+    for text, said in (("record: 5", "record"), ("signals: 7", "signals")):
+        page.run(f"document.querySelector('#study-text').value = {text!r}")
+        page.run("document.querySelector('#study-text').form.requestSubmit()")
+        until(page, f"{MESSAGE}.includes({said!r})", 10)

@@ -6,7 +6,6 @@ import asyncio
 import gzip
 import io
 import json
-import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -470,12 +469,3 @@ def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         views.check()
     assert ended.value.code == 2 and capsys.readouterr().err.startswith("error: ")
-
-
-def test_an_error_fills_the_box_of_messages_and_does_not_replace_it():
-    """With the swap of the button that asked, outerHTML, the first error took the box away."""
-    from importlib.resources import files
-
-    base = files("symgen.studio").joinpath("templates/base.html.jinja").read_text()
-    errors = re.search(r'\{"code":"\[45\]\.\."[^}]*\}', base)
-    assert errors and '"swapOverride":"innerHTML"' in errors[0]
