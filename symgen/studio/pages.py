@@ -27,7 +27,7 @@ from symgen.description.new import skeleton
 from symgen.emit.targets import TARGETS
 from symgen.errors import SymgenError
 from symgen.studio import table, views
-from symgen.studio.folder import DRAFT, json_of
+from symgen.studio.folder import DRAFT, json_of, remove, robot_file
 from symgen.studio.server import Server, page
 
 PAGE_STEPS = ("robot", "record", "check", "solve", "results")
@@ -70,7 +70,7 @@ class Pages:
             "/do/upload": self._upload,
         }
         acts: tuple[Handler, ...] = (
-            *(self._packaged, self._edit, self._prove, self._study, self._check),
+            *(self._packaged, self._edit, self._undo, self._prove, self._study, self._check),
             *(self._solve, self._cancel, self._apply),
         )
         posts = {f"/do/{act.__name__[1:]}": self._posted(act) for act in acts}
@@ -94,7 +94,7 @@ class Pages:
         self.server.changed()
         if name:
             return await self._part(name)
-        self.server.before = ""
+        self.server.before, self.server.left_out = "", []
         return PlainTextResponse("taken", headers={"hx-refresh": "true"})
 
     async def _show(self, request: Request) -> Response:
@@ -127,6 +127,8 @@ class Pages:
             units=table.UNITS_OF_CELLS,
             left_out=self.server.left_out,
             digest=folder.digest,
+            undo=bool(folder.kept("robot")),
+            redo=bool(folder.kept("undone")),
             file=folder.robot.name if folder.robot else "",
             packaged=packaged_robots(),
             models=sorted(SYMBOLIC),
@@ -198,21 +200,27 @@ class Pages:
         return FileResponse(path, media_type=kind or "application/octet-stream", headers=headers)
 
     async def _upload(self, request: Request) -> Response:
-        """A file as the body, its kind and the name that its owner gave it in the address."""
+        """A file as the body, its kind and the name that its owner gave it in the address; a robot is
+        read before it takes the place of the one that is there.
+        """
         kind, name = (request.query_params.get(key, "") for key in ("kind", "name"))
         if kind not in ("robot", "record", "validation"):
             raise InputError("expected a robot, a record or a validation record")
-        part = self.folder.path / f"{secrets.token_hex(8)}.part"
+        folder = self.folder.path / f"{secrets.token_hex(8)}.part"
+        part = folder / (robot_file(name) if kind == "robot" else kind)
+        folder.mkdir()
         try:
             with part.open("xb") as file:
                 async for piece in request.stream():
                     file.write(piece)
             if kind != "robot":
                 self.folder.take_measured(kind, name, part)
+            elif "error" in (shown := await self.server.view(views.robot, str(part), "")):
+                raise InputError(f"{name[:80]}: {shown['error']}")
             else:
                 self.folder.take_robot(name, content_of(part))
         finally:
-            part.unlink(missing_ok=True)
+            remove(folder)
         return await self._changed("")
 
     async def _packaged(self, form: dict[str, str]) -> str:
@@ -226,8 +234,7 @@ class Pages:
     async def _edit(self, form: dict[str, str]) -> str:
         """An edit of the table, cell by cell or as a text."""
         text = (await self.server.robot()).get("text", "")
-        if form.get("digest") != self.folder.digest:
-            raise InputError("another page has changed the robot; reload this one")
+        self._of_this_robot(form)
         if not self.folder.read(DRAFT):
             self.server.before = text
         text = form["text"].replace("\r\n", "\n") if "text" in form else text
@@ -235,6 +242,16 @@ class Pages:
         text, self.server.left_out = table.fitted(text) if "resized" in form else (text, [])
         self.folder.edit_robot(text, draft=table.wrong(text) is not None)
         return "table"
+
+    async def _undo(self, form: dict[str, str]) -> str:
+        """The robot before the last change; with `redo` the one before the last undo."""
+        self._of_this_robot(form)
+        self.folder.bring_back(*(("undone", "robot") if "redo" in form else ()))
+        return ""
+
+    def _of_this_robot(self, form: dict[str, str]) -> None:
+        if form.get("digest") != self.folder.digest:
+            raise InputError("another page has changed the robot; reload this one")
 
     async def _prove(self, form: dict[str, str]) -> str:
         self.jobs.add(

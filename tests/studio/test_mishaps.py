@@ -72,3 +72,79 @@ def test_errors_in_a_row_are_each_told_and_stay(page: Browser, running: Callable
         page.run(f"document.querySelector('#study-text').value = {text!r}")
         page.run("document.querySelector('#study-text').form.requestSubmit()")
         until(page, f"{MESSAGE}.includes({said!r})", 10)
+
+
+def give(page: Browser, selector: str, path: Path) -> None:
+    """A file for an input, as a person chooses it, without waiting for what comes of it."""
+    root = page.call("DOM.getDocument")["root"]["nodeId"]
+    node = page.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+    page.call("DOM.setFileInputFiles", files=[str(path)], nodeId=node)
+
+
+def answering(page: Browser, answer: str) -> None:
+    """Whoever is asked answers so; what was asked is in `asked`."""
+    page.run(
+        f"window.asked = []; window.confirm = (text) => {{ asked.push(text); return {answer}; }}"
+    )
+
+
+def test_no_robot_is_lost(page: Browser, running: Callable[..., Any], tmp_path: Path) -> None:
+    """A file that is none leaves the robot; one that is, or another robot, is asked for, and what was
+    there comes back, with its draft; so does a frame that was removed.
+    """
+    (tmp_path / "empty.urdf").write_bytes(b"")
+    (tmp_path / "lever.urdf").write_text(URDF)
+    studio = running("tx40")
+    file, draft = studio.work / "robot.yaml", studio.work / "robot.draft.yaml"
+    before = file.read_text()
+    place = studio.address + "robot"
+
+    def loaded() -> None:
+        until(
+            page,
+            "!window.asked && !!document.querySelector('#cells') && document.readyState === 'complete'",
+            20,
+        )
+
+    go(page, place)
+    answering(page, "true")
+    give(page, "#robot-file", tmp_path / "empty.urdf")
+    until(page, f"{MESSAGE} && !{MESSAGE}.includes('sending')", 20)
+    assert file.read_text() == before and not (studio.work / "robot.urdf").exists()
+    go(page, place)
+    page.click("#f-2-alpha")
+    type_in(page, "f-2-alpha", "pi/")
+    wait_for(draft.is_file, 10)
+    for ask in (
+        lambda: page.click("button[value='new']"),
+        lambda: page.run(
+            "document.querySelector('button[value=new]').previousElementSibling.click()"
+        ),
+        lambda: give(page, "#robot-file", tmp_path / "lever.urdf"),
+    ):
+        go(page, place)
+        page.run("document.querySelector('details.start').open = true")
+        answering(page, "false")
+        ask()
+        until(page, "asked.length === 1", 10)
+    assert file.read_text() == before and draft.is_file()
+
+    page.run("document.querySelector('details.start').open = true")
+    answering(page, "true")
+    page.click("button[value='new']")
+    loaded()
+    assert file.read_text() != before and not draft.exists()
+    answering(page, "true")
+    page.click("#undo")
+    loaded()
+    assert file.read_text() == before and "pi/" in draft.read_text()
+    page.click("#undo")  # to before the draft
+    wait_for(lambda: not draft.exists(), 10)
+    go(page, place)
+    page.click("[data-act='remove 6']")
+    until(page, "!document.getElementById('f-6-theta')", 10)
+    page.click("#undo")
+    until(page, "!!document.getElementById('f-6-theta')", 10)
+    assert file.read_text() == before
+    page.click("#redo")
+    until(page, "!document.getElementById('f-6-theta')", 10)

@@ -422,7 +422,13 @@ def test_what_is_no_table_is_refused(studio: Any, cells: str) -> None:
 def test_a_file_that_is_no_robot_is_told_on_the_page(
     studio: Any, name: str, content: bytes
 ) -> None:
-    assert studio.upload("robot", name, content).status_code == 200
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    answer = studio.upload("robot", name, content)
+    assert answer.status_code == 422 and name in answer.text
+    assert [p.name for p in studio.path.iterdir() if p.is_file()] == ["robot.yaml"]
+    assert (studio.path / "robot.yaml").read_text() == TEXT
+    (studio.path / "robot.yaml").unlink()
+    (studio.path / f"robot{Path(name).suffix}").write_bytes(content)  # by an editor
     for step in ("robot", "record", "check", "solve", "results"):
         assert studio.get(step).status_code == 200
     assert 'class="no"' in studio.get("robot").text

@@ -5,7 +5,7 @@
   const say = (text, kind = "no") => one("#message").replaceChildren(node("p", { textContent: text, className: kind }));
   // --- files that are dropped or chosen ---
   async function send(drop, file) {
-    if (!file) return;
+    if (!file || (drop.dataset.ask && !confirm(drop.dataset.ask))) return;
     say(`${file.name}: sending …`, "busy");
     try {
       const answer = await fetch(`${drop.dataset.upload}&name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
@@ -16,7 +16,7 @@
     }
   }
   for (const drop of all("[data-upload]")) {
-    one("input", drop).addEventListener("change", (event) => send(drop, event.target.files[0]));
+    one("input", drop).addEventListener("change", ({ target }) => { send(drop, target.files[0]); target.value = ""; }); // the same file may be chosen again
     for (const [name, over] of [["dragover", true], ["dragleave", false], ["drop", false]])
       drop.addEventListener(name, (event) => {
         event.preventDefault();
