@@ -110,7 +110,6 @@ class Pages:
         record, validation = folder.measured("record"), folder.measured("validation")
         findings = json_of(folder.path / "check.json")
         own = folder.first(TREES)
-        now = views.digest_of(folder.robot or Path(), folder.path / "study.yaml")
         cells, values, wrong = None, {}, ""
         try:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
@@ -140,7 +139,7 @@ class Pages:
             values=values,
             wrong=wrong,
             findings=findings,
-            stale=findings.get("of") != now,
+            stale=not self._is_checked(),
             checked=self.jobs.last("check of the record"),
             methods=ESTIMATORS,
             jobs=self.jobs.all,
@@ -167,6 +166,11 @@ class Pages:
             raise InputError("the table describes no robot yet")
         return self.folder.robot
 
+    def _is_checked(self) -> bool:
+        """Whether the findings are of this robot and this study."""
+        now = views.digest_of(self.folder.robot or Path(), self.folder.path / "study.yaml")
+        return bool(json_of(self.folder.path / "check.json").get("of") == now)
+
     async def _view(self, request: Request) -> Response:
         """What is derived from robot, record or run, as a part of a page or as JSON."""
         name, asked = request.path_params["name"], dict(request.query_params)
@@ -176,6 +180,9 @@ class Pages:
         if name not in VIEWS or path is None:
             raise InputError("no such view")
         given: Any = self.server.before if name == "formulas" else asked
+        if name == "preview":
+            shown = await self.server.robot()
+            given = asked | {"joints": tuple(filter(None, shown.get("labels", ())))}
         if name == "series":
             run = str(self.folder.run(asked.get("run", "")))
             given = {"run": run, "record": asked.get("record", "")}
@@ -284,6 +291,8 @@ class Pages:
         resolution. Its settings begin with its command.
         """
         robot, _ = self._command()
+        if "anyway" not in form and not self._is_checked():
+            raise InputError("check record, study and robot first, or solve anyway")
         kind = form.get("kind", "identify")
         if kind not in RUN_COMMANDS:
             raise InputError(f"expected one of {', '.join(RUN_COMMANDS)}")

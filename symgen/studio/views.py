@@ -131,12 +131,13 @@ def module(path: str, request: Mapping[str, str]) -> dict[str, Any]:
 
 
 @answered
-def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
-    """Names of the columns of a measured file, and of those asked for (`columns`, by commas) first
-    rows and thinned lines; rate and gaps by the column `t`.
+def preview(path: str, request: Mapping[str, Any]) -> dict[str, Any]:
+    """Names of the columns of a measured file, what they tell as `identify --suggest`, and of those
+    asked for (`columns`, by commas) first rows and thinned lines; rate and gaps by the column `t`.
     """
     from runtime.core.clock import time_stamps
     from runtime.reading.formats import read_table
+    from runtime.reading.likely_columns import known_columns
 
     opened = read_table(Path(path))
     if not opened.names:
@@ -151,6 +152,7 @@ def preview(path: str, request: Mapping[str, str]) -> dict[str, Any]:
     kept = np.unique(np.linspace(0, max(N - 1, 0), min(N, INSTANTS_DRAWN)).astype(int))
     return {
         "names": names,
+        "known": known_columns(opened.names, request["joints"]),
         "rows": N,
         "stamps": "" if t is None else time_stamps(t).to_text(),
         "first": [[f"{x[k]:.6g}" for x in values] for k in range(min(N, FIRST_ROWS))],
@@ -215,6 +217,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
     """
     from runtime.plausible.motion import unexcited_shares
 
+    of = digest_of(Path(robot_file), Path(study_file))
     loaded, study, records, _ = _read(robot_file, Path(study_file))
     variants = runtime.load_model(symgen.variants(robot_file))
     judged = runtime.plausibility(loaded, records, study, variants=variants)
@@ -224,7 +227,7 @@ def findings(robot_file: str, study_file: str) -> dict[str, Any]:
         rank = int(np.linalg.matrix_rank(rows.W))
         shares = unexcited_shares(rows, study.signals, records[0].rate)
     return {
-        "of": digest_of(Path(robot_file), Path(study_file)),
+        "of": of,
         "checks": [asdict(check) for check in judged.checks()],
         "named": judged.named_causes,
         "deviations": dict(sorted(shares.items(), key=lambda item: -item[1])),

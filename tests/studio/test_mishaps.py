@@ -7,9 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from browser import Browser
-from test_browser import URDF, go, record, type_in, until, wait_for
+from test_browser import URDF, choose, go, record, type_in, until, wait_for
 
 pytestmark = pytest.mark.campaign
 
@@ -148,3 +149,73 @@ def test_no_robot_is_lost(page: Browser, running: Callable[..., Any], tmp_path: 
     assert file.read_text() == before
     page.click("#redo")
     until(page, "!document.getElementById('f-6-theta')", 10)
+
+
+FIELD = "document.querySelector('#questions [name=\"{}\"]').value"
+
+
+def test_columns_of_a_log_are_one_family_each(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Target and actual side by side, as UR robots write them, as by `identify --suggest`; units with
+    other names stand in the form too.
+    """
+    lever(tmp_path)
+    columns = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+    families = ("target_q", "actual_q", "target_current", "actual_current")
+    names = [
+        f"{family}_{j} [{'°' if '_q' in family else 'A'}]" for j in (0, 1) for family in families
+    ]
+    table = columns[:, [0, 1, 1, 3, 3, 2, 2, 4, 4]]
+    np.savetxt(
+        tmp_path / "rtde.csv",
+        table,
+        delimiter=",",
+        comments="",
+        header=",".join(["timestamp", *names]),
+    )
+    studio = running(str(tmp_path / "lever.urdf"))
+    go(page, studio.address + "record")
+    choose(page, "#record-file", tmp_path / "rtde.csv")
+    until(page, "document.querySelectorAll('#preview svg').length === 2", 20)
+    assert page.run(FIELD.format("columns.t")) == "timestamp"
+    assert page.run(FIELD.format("columns.q")) == "actual_q_0 [°], actual_q_1 [°]"
+    assert page.run(FIELD.format("columns.tau")) == "actual_current_0 [A], actual_current_1 [A]"
+    assert [page.run(FIELD.format(f"units.{key}")) for key in ("q", "tau")] == ["°", "A"]
+    shown = page.run(
+        "[...document.querySelectorAll('#preview th')].map((node) => node.textContent)"
+    )
+    assert len(shown) == 5 and not [name for name in shown if "target" in name]
+
+
+def test_solve_waits_for_a_check(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Without one, and with one of another study, it asks for it first; `anyway` goes on."""
+    studio = running(*lever(tmp_path))
+    words = "[...document.querySelectorAll('#solve p .main, #solve p button')].map((n) => n.textContent)"
+    go(page, studio.address + "solve")
+    assert page.run(words) == ["Check first", "Solve anyway"]
+    assert "anyway" in page.run("document.querySelector('#resolution button').textContent")
+    page.run(  # a page that was loaded before the study changed
+        "fetch('do/solve', {method: 'POST', headers: {'content-type': "
+        "'application/x-www-form-urlencoded'}, body: 'kind=identify'}).then(async (answer) => "
+        "{ window.answer = await answer.text(); })"
+    )
+    assert "check" in until(page, "window.answer", 10)
+    page.click("#solve .main")
+    until(
+        page,
+        "document.querySelector('#findings button.main') && document.readyState === 'complete'",
+        10,
+    )
+    page.click("#findings button.main")
+    until(page, "document.querySelectorAll('.checks li').length > 10", 60)
+    go(page, studio.address + "solve")
+    assert page.run(words) == ["Solve"]
+    page.run(
+        "fetch('do/study', {method: 'POST', body: new URLSearchParams({text: 'symgen: 1\\n'})})"
+    )
+    wait_for(lambda: (studio.work / "study.yaml").read_text() == "symgen: 1\n", 10)
+    go(page, studio.address + "solve")
+    assert page.run(words) == ["Check first", "Solve anyway"]

@@ -232,7 +232,11 @@ def test_the_settings_of_a_run_begin_with_its_command(studio: Any) -> None:
     studio.upload("record", "run.csv", csv())
     values = {"symgen": 1, "record": [{"files": ["record.csv"]}]}
     studio.post("study", {"values": json.dumps(values)})
-    asked = {"kind": "advise", "delta": "2*pi/500,\n1\x85record: {files: /etc/passwd}\u2028x"}
+    asked = {
+        "kind": "advise",
+        "anyway": "1",
+        "delta": "2*pi/500,\n1\x85record: {files: /etc/passwd}\u2028x",
+    }
     assert studio.post("solve", asked).status_code == 200
     first, _, rest = (studio.path / "study-01-advise.yaml").read_text().partition("\n")
     assert first.startswith("# symgen cestac robot.yaml study-01-advise.yaml --advise ")
