@@ -178,11 +178,13 @@ class WorkFolder:
             self.take_measured("record", source, part)
 
     def study(self) -> dict[str, Any]:
-        """The plain values of study.yaml, {} where it holds none; InputError where it is no
-        YAML.
+        """The plain values of study.yaml with a list of records, {} where it holds none; InputError
+        where it is no YAML.
         """
         values = yaml_values(self.read("study.yaml"), file="study.yaml")[0]
-        return values if isinstance(values, dict) else {}
+        values = values if isinstance(values, dict) else {}
+        single = isinstance(values.get("record"), dict)
+        return values | {"record": [values["record"]]} if single else values
 
     def checked_study(self, given: Any) -> str:
         """Text of a study by its text or its values; InputError where it is none, or names a file

@@ -182,7 +182,9 @@ class Pages:
         given: Any = self.server.before if name == "formulas" else asked
         if name == "preview":
             shown = await self.server.robot()
-            given = asked | {"joints": tuple(filter(None, shown.get("labels", ())))}
+            (record, *_) = self.folder.study().get("record") or [{}]
+            joints = tuple(filter(None, shown.get("labels", ())))
+            given = asked | {"joints": joints, "topic": record.get("topic")}
         if name == "series":
             run = str(self.folder.run(asked.get("run", "")))
             given = {"run": run, "record": asked.get("record", "")}

@@ -12,6 +12,8 @@ import pytest
 from browser import Browser
 from test_browser import URDF, choose, go, record, type_in, until, wait_for
 
+from symgen.studio.folder import WorkFolder
+
 pytestmark = pytest.mark.campaign
 
 
@@ -219,3 +221,48 @@ def test_solve_waits_for_a_check(
     wait_for(lambda: (studio.work / "study.yaml").read_text() == "symgen: 1\n", 10)
     go(page, studio.address + "solve")
     assert page.run(words) == ["Check first", "Solve anyway"]
+
+
+def pick(page: Browser, name: str, value: str) -> None:
+    """A choice of the questions, as a person makes it."""
+    field = f"document.querySelector('#questions [name=\"{name}\"]')"
+    page.run(f"{field}.value = {json.dumps(value)}")
+    page.run(f"{field}.dispatchEvent(new Event('change', {{bubbles: true}}))")
+
+
+def test_decimal_commas(page: Browser, running: Callable[..., Any], tmp_path: Path) -> None:
+    """Read, asked and written; the first rows and the plots are those of what the form says."""
+    lever(tmp_path)
+    text = (tmp_path / "run.csv").read_text().replace(",", ";").replace(".", ",")
+    header, _, rows = text.partition("\n")
+    (tmp_path / "excel.csv").write_text(f"{header.replace('time_s', 'Zeit [s]')}\n{rows}")
+    studio = running(str(tmp_path / "lever.urdf"))
+    go(page, studio.address + "record")
+    choose(page, "#record-file", tmp_path / "excel.csv")
+    plots = "document.querySelectorAll('#preview svg').length === 2"
+    until(page, plots, 20)
+    assert page.run(FIELD.format("decimal")) == ","
+    assert "step 0.005 s" in page.run("document.querySelector('#preview').textContent")
+    pick(page, "decimal", ".")
+    until(
+        page,
+        "document.querySelector('#preview .no')?.textContent.includes('expected a number')",
+        10,
+    )
+    pick(page, "decimal", ",")
+    pick(page, "units.t", "ms")
+    until(page, "document.querySelector('#preview').textContent.includes('step 5e-06 s')", 10)
+    pick(page, "units.t", "s")
+    pick(page, "columns.q", "elbow_pos_deg")
+    until(page, "document.querySelectorAll('#preview th').length === 4", 10)
+    pick(page, "columns.q", "shoulder_pos_deg, elbow_pos_deg")
+    pick(page, "side", "joint")
+    page.click("#questions button.main")
+    until(page, "document.querySelector('#study-text')?.value.includes('side: joint')", 10)
+    until(page, "document.querySelectorAll('#preview th').length === 5", 10)  # it has settled
+    assert WorkFolder(studio.work).study()["record"][0]["decimal"] == ","
+    text = "record: {files: [record.csv], decimal: ',', columns: {q: [elbow_pos_deg]}}"
+    page.run(f"document.querySelector('#study-text').value = {json.dumps(text)}")
+    page.run("document.querySelector('#study-text').form.requestSubmit()")
+    until(page, "document.querySelectorAll('#preview th').length === 4", 10)
+    assert page.run(FIELD.format("columns.q")) == "elbow_pos_deg"

@@ -21,8 +21,8 @@
     const record = study().record?.[0] || {};
     for (const field of form.elements) {
       if (!field.name) continue;
-      const [key, inner] = field.name.split("."), own = inner ? record[key]?.[inner] : record[key];
-      choose(field, listed(own ?? (inner ? guess[key]?.[inner] : undefined)));
+      const [key, inner] = field.name.split("."), of = (part) => (inner ? part[key]?.[inner] : part[key]);
+      choose(field, listed(of(record) ?? of(guess)));
     }
     if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
     one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
@@ -36,7 +36,7 @@
     }
   };
   document.addEventListener("change", (event) => {
-    if (event.target.closest("#questions")) ask();
+    if (event.target.closest("#questions")) { ask(); drawn(); }
     else if (event.target.closest("#jobs")) compare();
   });
 
@@ -45,7 +45,7 @@
     for (const field of form.elements) {
       if (!field.name) continue;
       const [key, inner] = field.name.split("."), text = field.value.trim();
-      const value = LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
+      const value = field.name === "decimal" ? text || undefined : LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
         : field.name === "columns.t" ? text || null : text.includes(",") ? text.split(",").map(number) : text === "" ? undefined : number(text);
       if (inner) record[key] = { ...record[key], [inner]: value };
       else record[key] = value;
@@ -66,26 +66,40 @@
     (event.target.id === "solve" ? solve : round)(new FormData(event.target, event.submitter));
   });
 
+  // --- the file as the form says that it is read ---
+  let turn = 0;
+
+  async function previewed(query) {
+    const own = ++turn, answer = await fetch(`view/preview?${new URLSearchParams(query)}`), value = answer.ok ? await answer.json() : { error: await answer.text() };
+    if (own !== turn) return { late: true }; // another question has been asked since
+    if (value.error) one("#preview").replaceChildren(node("p", { className: "no", textContent: value.error }));
+    return value;
+  }
+
   async function preview() {
-    const place = one("#preview");
-    if (!place) return;
-    const asked = async (query) => { const answer = await fetch(`view/preview?${new URLSearchParams(query)}`); return answer.ok ? answer.json() : { error: await answer.text() }; };
-    const names = await asked({});
-    if (names.error) return place.replaceChildren(node("p", { className: "no", textContent: names.error }));
-    guess = names.known;
+    if (!one("#preview")) return;
+    const value = await previewed(study().record?.[0]?.decimal ? { decimal: study().record[0].decimal } : {});
+    if (value.late) return;
+    guess = value.known || {};
     fill();
-    const of = study().record?.[0]?.columns || {}, columns = ["t", "q", "tau"].map((key) => [of[key] ?? guess.columns?.[key]].flat().filter((name) => names.names.includes(name)));
-    const used = columns.flat().length ? columns.flat() : names.names.slice(0, 12);
-    const value = await asked({ columns: used.join(","), t: columns[0][0] || "" });
-    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    if (!value.error) drawn(value.names);
+  }
+
+  /** First rows and plots by the fields of the form; `names` where it says none. */
+  async function drawn(names = []) {
+    const place = one("#preview"), text = (name) => one(`#questions [name='${name}']`).value.trim();
+    const [t, q, tau] = ["t", "q", "tau"].map((key) => text(`columns.${key}`).split(",").map((name) => name.trim()).filter(Boolean));
+    const asked = [...t, ...q, ...tau], columns = (asked.length ? asked : names.slice(0, 12)).join(",");
+    const value = await previewed({ columns, t: t[0] || "", unit: text("units.t"), decimal: text("decimal") });
+    if (value.error || value.late) return;
     const cells = (kind, row) => node("tr", {}, ...row.map((x) => node(kind, { textContent: x })));
     const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
     const plots = node("div", { className: "plots" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${names.names.join(", ")}` }), first, plots);
-    const lines = (list) => Object.fromEntries(list.map((name) => [name, value.lines[name]]));
-    new Plots(plots, value.t, columns[1].length + columns[2].length ? [{ title: "q, as in the file", lines: lines(columns[1]) }, { title: "tau, as in the file", lines: lines(columns[2]) }] : [{ title: "as in the file", lines: value.lines }]);
+    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, plots);
+    const lines = (list) => Object.fromEntries(list.filter((name) => value.lines[name]).map((name) => [name, value.lines[name]]));
+    new Plots(plots, value.t, q.length + tau.length ? [{ title: "q, as in the file", lines: lines(q) }, { title: "tau, as in the file", lines: lines(tau) }] : [{ title: "as in the file", lines: value.lines }]);
   }
   // --- remedies as one change of the study ---
   const SET = /\bset ((?:record|signals|rows|estimate)\.[a-z_.]+): (\[[^\]]*\]|[^\s,;()]+)/;
@@ -171,7 +185,7 @@
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
-    if (event.target.id === "study") fill();
+    if (event.target.id === "study" && one("#preview")) { fill(); drawn(); }
     remedies();
     compare();
   });
