@@ -86,14 +86,15 @@ class Pages:
                 keep_blank_values=True,
                 max_num_fields=MOST_FIELDS,
             )
-            return await self._changed(await act(dict(fields)))
+            form = dict(fields)
+            return await self._changed(await act(form), form.get("run"))
 
         return posted
 
-    async def _changed(self, name: str) -> Response:
+    async def _changed(self, name: str, run: str | None = None) -> Response:
         self.server.changed()
         if name:
-            return await self._part(name)
+            return await self._part(name, run)
         self.server.before, self.server.left_out = "", []
         return PlainTextResponse("taken", headers={"hx-refresh": "true"})
 
@@ -110,6 +111,7 @@ class Pages:
         record, validation = folder.measured("record"), folder.measured("validation")
         findings = json_of(folder.path / "check.json")
         own = folder.first(TREES)
+        run = next((r for r in runs if r["name"] == asked), runs[-1] if runs else None)
         cells, values, wrong = None, {}, ""
         try:
             cells, values = table.cells_of(shown.get("text", "")), folder.study()
@@ -145,9 +147,9 @@ class Pages:
             jobs=self.jobs.all,
             now=time.monotonic(),
             runs=runs,
-            run=next((r for r in runs if r["name"] == asked), runs[-1] if runs else None),
+            run=run,
             own=own.name if own else "",
-            applied=self.jobs.last("apply"),
+            applied=self.jobs.last(f"apply {run['name']}") if run else None,
         )
 
     def _proof(self) -> dict[str, Any]:
@@ -197,7 +199,7 @@ class Pages:
         """A file of ours, or one of a run; its pages in a sandbox of their own."""
         name, run = request.path_params["name"], request.path_params.get("run")
         folder, robot = self.folder, self.folder.robot or Path()
-        own = [folder.path / "study.yaml", *folder.path.glob("applied.*"), robot]
+        own = [folder.path / "study.yaml", *folder.path.glob("applied-*.*"), robot]
         places = folder.run(run).iterdir() if run else own
         path = next((p for p in places if p.name == name and p.is_file()), None)
         if path is None:
@@ -326,11 +328,11 @@ class Pages:
         own, robot = self.folder.first(TREES), self._source()
         if own is None:
             raise InputError("the robot did not come from a URDF or MJCF; drop yours on Robot")
-        target = f"applied{own.suffix}"
+        target = f"applied-{run.name}{own.suffix}"
         options = ("-o", target, "--force", "--diff")
         edited = () if robot == own else ("--robot", robot.name)
         words = ("symgen", "apply", f"runs/{run.name}", own.name, *options, *edited)
-        self.jobs.add("apply", words, target)
+        self.jobs.add(f"apply {run.name}", words, target)
         return "applied"
 
 

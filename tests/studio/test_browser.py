@@ -236,7 +236,7 @@ def test_from_urdf_and_csv_to_verdict_report_and_applied_urdf(
     assert page.run("document.querySelector('.answer').textContent").startswith("Yes")
     page.click("form[hx-post='do/apply'] button")
     assert "mass value" in until(page, "document.querySelector('.diff')?.textContent")
-    applied = symgen.load_robot(studio.work / "applied.urdf").values
+    applied = symgen.load_robot(studio.work / "applied-02-feasible.urdf").values
     given = symgen.load_robot(tmp_path / "lever.urdf").values
     assert applied["MX2"] == pytest.approx(HEAVIER * given["MX2"], rel=0.01)
     assert page.run("fetch('runs/01-ols/report.html').then((answer) => answer.headers.get('content-security-policy'))").startswith("sandbox")  # fmt: skip
@@ -353,7 +353,7 @@ def test_resolution_replay_a_restart_and_a_table_beside_the_urdf(
     assert page.run("document.querySelector('h1').textContent") == "Results"
     page.click("form[hx-post='do/apply'] button")
     assert "+++ robot.urdf" in until(page, "document.querySelector('.diff')?.textContent")
-    applied = symgen.load_robot(studio.work / "applied.urdf").values
+    applied = symgen.load_robot(studio.work / "applied-02-feasible.urdf").values
     given = symgen.load_robot(tmp_path / "lever.urdf").values
     assert applied["MX2"] == pytest.approx(HEAVIER * given["MX2"], rel=0.01)
     quiet(page)

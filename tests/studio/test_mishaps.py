@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Browser
-from test_browser import URDF, choose, go, record, type_in, until, wait_for
+from test_browser import URDF, asked, choose, go, record, type_in, until, wait_for
 
 from symgen.studio.folder import WorkFolder
 
@@ -266,3 +266,34 @@ def test_decimal_commas(page: Browser, running: Callable[..., Any], tmp_path: Pa
     page.run("document.querySelector('#study-text').form.requestSubmit()")
     until(page, "document.querySelectorAll('#preview th').length === 4", 10)
     assert page.run(FIELD.format("columns.q")) == "elbow_pos_deg"
+
+
+def solved(studio: Any, *methods: str) -> None:
+    """Runs 01-METHOD, 02-METHOD ... of a studio, without its page."""
+    work = WorkFolder(studio.work)  # it clears away what a killed run has left
+    for method in methods:
+        study = work.study() | {"estimate": {"method": method}}
+        form = {"values": json.dumps(study), "name": method, "anyway": "1"}
+        asked(studio, "do/solve", form)
+    wait_for(lambda: len(work.results()) == len(methods), 60)
+
+
+def test_each_run_has_its_own_changes_of_the_file(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Shown where they were asked for, and kept side by side."""
+    studio = running(*lever(tmp_path))
+    solved(studio, "feasible", "ols")
+    diff = "document.querySelector('.diff')?.textContent"
+    go(page, studio.address + "results?run=01-feasible")
+    page.click("form[hx-post='do/apply'] button")
+    until(page, diff, 20)
+    go(page, studio.address + "results?run=02-ols")
+    assert not page.run(diff)
+    page.run("fetch('do/cancel', {method: 'POST', body: ''})")  # news: parts load again
+    page.run("new Promise((done) => setTimeout(done, 800))")
+    assert not page.run(diff)
+    go(page, studio.address + "results?run=01-feasible")
+    assert page.run(diff)
+    link = page.run("document.querySelector('#applied a').getAttribute('href')")
+    assert link == "file/applied-01-feasible.urdf" and "mass" in asked(studio, link)
