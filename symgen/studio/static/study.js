@@ -1,43 +1,19 @@
-// The study: columns by their names, answers, remedies, estimators, values side by side.
+// The study: answers, remedies, estimators, values side by side.
 "use strict";
 (function () {
   const page = one("#values")?.dataset || {}, joints = Number(page.joints) || 99;
   const study = () => JSON.parse((one("#study[data-values], #findings[data-values]") || one("#values")).dataset.values);
   const number = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const listed = (x) => (x === null || x === undefined ? "" : Array.isArray(x) ? x.join(", ") : String(x));
-  // --- columns by their names ---
-  const WORDS = {
-    "columns.t": /^(.*_)?(t|time|timestamps?|stamp)$/,
-    "columns.q": /^(.*_)?(q|qm|pos|positions?|angles?|theta|joint)$/,
-    "columns.tau": /^(.*_)?(tau|torques?|cur|curr|currents?|i|effort|gam|gamma|force)$/,
-  };
-  const UNITS = {
-    "columns.t": { ms: "ms", us: "us", ns: "ns", s: "s", sec: "s" },
-    "columns.q": { deg: "deg", degrees: "deg", rad: "rad", counts: "counts", inc: "counts", ticks: "counts", rev: "rev", mm: "mm" },
-    "columns.tau": { a: "A", ma: "mA", nm: "N*m", mnm: "mN*m", v: "V" },
-  };
-
-  function guessed(names) {
-    const found = { "columns.t": [], "columns.q": [], "columns.tau": [] }, units = {};
-    for (const name of names) {
-      const words = name.toLowerCase().split(/[^a-z]+/).filter(Boolean);
-      for (const [key, pattern] of Object.entries(WORDS)) {
-        const unit = words.length > 1 ? UNITS[key][words.at(-1)] : undefined;
-        const stems = [words.join("_"), (unit ? words.slice(0, -1) : words).join("_"), words.filter((word) => word !== "joint").join("_")];
-        if (!stems.some((stem) => pattern.test(stem))) continue;
-        found[key].push(name);
-        if (unit) units[key.replace("columns", "units")] = unit;
-        break;
-      }
-    }
-    const order = (name) => Number(/(\d+)(?!.*\d)/.exec(name)?.[1] ?? 0);
-    for (const key of ["columns.q", "columns.tau"]) found[key] = found[key].map((name, k) => [order(name), k, name]).sort((a, b) => a[0] - b[0] || a[1] - b[1]).slice(0, joints).map((entry) => entry[2]);
-    found["columns.t"] = found["columns.t"].slice(0, 1);
-    return { ...found, ...units };
-  }
   // --- the questions ---
   const LISTS = ["columns.q", "columns.tau"];
-  let guess = {}, shown = null;
+  let guess = {}, shown = null; // what the names of the columns tell
+
+  /** A value of a field; a choice that it does not have is one of its choices then. */
+  function choose(field, value) {
+    if (field.options && ![...field.options].some((option) => option.value === value)) field.append(new Option(value));
+    field.value = value;
+  }
 
   function fill() {
     const form = one("#questions");
@@ -45,8 +21,8 @@
     const record = study().record?.[0] || {};
     for (const field of form.elements) {
       if (!field.name) continue;
-      const [key, inner] = field.name.split("."), own = inner ? record[key]?.[inner] : record[key];
-      field.value = listed(own ?? guess[field.name]);
+      const [key, inner] = field.name.split("."), of = (part) => (inner ? part[key]?.[inner] : part[key]);
+      choose(field, listed(of(record) ?? of(guess)));
     }
     if (!one("[name='units.t']", form).value) one("[name='units.t']", form).value = "s";
     one("#currents").hidden = !/cur|effort|(^|[_, ])i\d/i.test(one("[name='columns.tau']", form).value);
@@ -60,7 +36,7 @@
     }
   };
   document.addEventListener("change", (event) => {
-    if (event.target.closest("#questions")) ask();
+    if (event.target.closest("#questions")) { ask(); drawn(); }
     else if (event.target.closest("#jobs")) compare();
   });
 
@@ -69,7 +45,7 @@
     for (const field of form.elements) {
       if (!field.name) continue;
       const [key, inner] = field.name.split("."), text = field.value.trim();
-      const value = LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
+      const value = field.name === "decimal" ? text || undefined : LISTS.includes(field.name) ? text.split(",").map((part) => part.trim()).filter(Boolean)
         : field.name === "columns.t" ? text || null : text.includes(",") ? text.split(",").map(number) : text === "" ? undefined : number(text);
       if (inner) record[key] = { ...record[key], [inner]: value };
       else record[key] = value;
@@ -87,29 +63,43 @@
     }
     if (event.target.id !== "solve" && event.target.id !== "resolution") return;
     event.preventDefault();
-    (event.target.id === "solve" ? solve : round)(new FormData(event.target));
+    (event.target.id === "solve" ? solve : round)(new FormData(event.target, event.submitter));
   });
 
+  // --- the file as the form says that it is read ---
+  let turn = 0;
+
+  async function previewed(query) {
+    const own = ++turn, answer = await fetch(`view/preview?${new URLSearchParams(query)}`), value = answer.ok ? await answer.json() : { error: await answer.text() };
+    if (own !== turn) return { late: true }; // another question has been asked since
+    if (value.error) one("#preview").replaceChildren(node("p", { className: "no", textContent: value.error }));
+    return value;
+  }
+
   async function preview() {
-    const place = one("#preview");
-    if (!place) return;
-    const asked = async (query) => { const answer = await fetch(`view/preview?${new URLSearchParams(query)}`); return answer.ok ? answer.json() : { error: await answer.text() }; };
-    const names = await asked({});
-    if (names.error) return place.replaceChildren(node("p", { className: "no", textContent: names.error }));
-    guess = guessed(names.names);
+    if (!one("#preview")) return;
+    const value = await previewed(study().record?.[0]?.decimal ? { decimal: study().record[0].decimal } : {});
+    if (value.late) return;
+    guess = value.known || {};
     fill();
-    const of = study().record?.[0]?.columns || {}, columns = ["t", "q", "tau"].map((key) => [of[key] ?? guess[`columns.${key}`]].flat().filter((name) => names.names.includes(name)));
-    const used = columns.flat().length ? columns.flat() : names.names.slice(0, 12);
-    const value = await asked({ columns: used.join(","), t: columns[0][0] || "" });
-    if (value.error) return place.replaceChildren(node("p", { className: "no", textContent: value.error }));
+    if (!value.error) drawn(value.names);
+  }
+
+  /** First rows and plots by the fields of the form; `names` where it says none. */
+  async function drawn(names = []) {
+    const place = one("#preview"), text = (name) => one(`#questions [name='${name}']`).value.trim();
+    const [t, q, tau] = ["t", "q", "tau"].map((key) => text(`columns.${key}`).split(",").map((name) => name.trim()).filter(Boolean));
+    const asked = [...t, ...q, ...tau], columns = (asked.length ? asked : names.slice(0, 12)).join(",");
+    const value = await previewed({ columns, t: t[0] || "", unit: text("units.t"), decimal: text("decimal") });
+    if (value.error || value.late) return;
     const cells = (kind, row) => node("tr", {}, ...row.map((x) => node(kind, { textContent: x })));
     const first = node("div", { className: "scroll", tabIndex: 0 }, node("table", {}, node("caption", { textContent: "First rows" }), cells("th", Object.keys(value.lines)), ...value.first.map((row) => cells("td", row))));
     first.setAttribute("role", "region");
     first.setAttribute("aria-label", "First rows");
     const plots = node("div", { className: "plots" });
-    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${names.names.join(", ")}` }), first, plots);
-    const lines = (list) => Object.fromEntries(list.map((name) => [name, value.lines[name]]));
-    new Plots(plots, value.t, columns[1].length + columns[2].length ? [{ title: "q, as in the file", lines: lines(columns[1]) }, { title: "tau, as in the file", lines: lines(columns[2]) }] : [{ title: "as in the file", lines: value.lines }]);
+    place.replaceChildren(node("p", { textContent: value.stamps || `${value.rows} samples` }), node("p", { className: "note", textContent: `Columns: ${value.names.join(", ")}` }), first, plots);
+    const lines = (list) => Object.fromEntries(list.filter((name) => value.lines[name]).map((name) => [name, value.lines[name]]));
+    new Plots(plots, value.t, q.length + tau.length ? [{ title: "q, as in the file", lines: lines(q) }, { title: "tau, as in the file", lines: lines(tau) }] : [{ title: "as in the file", lines: value.lines }]);
   }
   // --- remedies as one change of the study ---
   const SET = /\bset ((?:record|signals|rows|estimate)\.[a-z_.]+): (\[[^\]]*\]|[^\s,;()]+)/;
@@ -147,12 +137,13 @@
     }
   }
   // --- estimators and settings, each a run ---
+  const chosen = (data, ...names) => Object.fromEntries(names.filter((name) => data.get(name)).map((name) => [name, "1"]));
   const run = (values, more) => htmx.ajax("POST", "do/solve", { target: "#jobs", swap: "outerHTML", values: { values: JSON.stringify(values), ...more } });
 
   function round(data) {
     const kind = data.get("kind"), delta = data.get("delta").split(",").map((text) => text.trim()).filter(Boolean), values = study();
     values.cestac = { ...values.cestac, ...(delta.length ? { delta } : {}), ...(data.get("runs") ? { runs: number(data.get("runs")) } : {}) };
-    return run(values, { kind, ...(kind === "advise" ? { delta: delta.join(",") } : {}) });
+    return run(values, { kind, ...chosen(data, "anyway"), ...(kind === "advise" ? { delta: delta.join(",") } : {}) });
   }
 
   async function solve(data) {
@@ -162,8 +153,7 @@
         const values = study();
         values.estimate = { ...values.estimate, method };
         if (cutoff) values.signals = { ...values.signals, lowpass: { ...values.signals?.lowpass, cutoff: number(cutoff) } };
-        const options = Object.fromEntries(["physical", "friction"].filter((name) => data.get(name)).map((name) => [name, "1"]));
-        await run(values, { name: cutoff ? `${method}-${cutoff}` : method, ...options });
+        await run(values, { name: cutoff ? `${method}-${cutoff}` : method, ...chosen(data, "physical", "friction", "anyway") });
       }
   }
   // --- values side by side ---
@@ -195,7 +185,7 @@
   }
 
   document.addEventListener("htmx:afterSettle", (event) => {
-    if (event.target.id === "study") fill();
+    if (event.target.id === "study" && one("#preview")) { fill(); drawn(); }
     remedies();
     compare();
   });
