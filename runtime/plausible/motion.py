@@ -64,7 +64,9 @@ def rest(case: Case) -> Answer:
         for rows in (case.observation, without)
     )
     text += f"; without these rows the fit leaves {after:.1f} % in place of {before:.1f} %"
-    state: State = "no" if after < 0.5 * before else "doubtful" if after < 0.8 * before else "good"
+    state: State = "doubtful" if after < 0.8 * before else "good"
+    if after < 0.5 * before and before > LIMIT.TOTAL_ERROR[0]:  # else friction of that joint alone
+        state = "no"
     return Answer(state, text, remedy)
 
 
