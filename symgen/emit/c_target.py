@@ -255,7 +255,7 @@ def _header(spec: ModuleSpec, kernels: Sequence[Mapping[str, Any]]) -> list[str]
             "Arguments",
             (
                 "q, qd, qdd (N, n) in C order, rad or m and seconds; S (rows, N), samples last, comes "
-                "zeroed, as by calloc: rows that are always zero are not written"
+                "zeroed: rows that are always zero are not written"
             ),
         ),
         *line_of("constants", ", ".join(spec.regrouping.constants) or "none"),

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from generated import planar_2r
+import symgen
 from runtime.core.record import Record
 from runtime.reading.settings import RecordSettings
 from runtime.study import Study, read_record, study_from_mapping, suggested
 
+planar_2r = symgen.model("planar_2r")
 t = np.arange(2000) / 200
 q = np.column_stack([9 * np.sin(0.7 * t), 4 * t - 3 * np.cos(t)])
 tau = np.column_stack([np.cos(t), np.sin(t)])
