@@ -330,3 +330,34 @@ def test_play_runs_in_time_however_far_apart_the_instants_are(
     stopped = page.run(cursor)
     page.run("new Promise((done) => setTimeout(done, 200))")
     assert page.run(cursor) == stopped > before + 2
+
+
+def test_a_flipped_sign_is_turned_by_one_click(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Of a robot whose joints have names; the remedy is the one of that joint, and helps."""
+    settings = lever(tmp_path)
+    header, *rows = (tmp_path / "run.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    turned = [",".join([*row[:4], str(-float(row[4]))]) for row in cells]
+    (tmp_path / "run.csv").write_text("\n".join([header, *turned]))
+    studio = running(*settings)
+    go(page, studio.address + "check")
+    page.click("#findings button.main")
+    until(page, "document.querySelectorAll('.checks li').length > 10", 60)
+    remedies = (
+        "[...document.querySelectorAll('[data-change] button')].map((node) => node.textContent)"
+    )
+    assert "Multiply record.scale.tau by 1, -1" in until(
+        page, f"{remedies}.length && {remedies}", 5
+    )
+    page.click("[data-change] button")
+    wait_for(
+        lambda: WorkFolder(studio.work).study()["record"][0].get("scale", {}).get("tau") == [1, -1],
+        10,
+    )
+    until(
+        page,
+        "!document.querySelector('#findings .busy') && !document.querySelector('[data-change] button')",
+        60,
+    )
