@@ -142,7 +142,9 @@ class Jobs:
     def cancel(self, job: Job) -> None:
         """Take it out of the queue, or end its process."""
         if job.open:
-            job.state = CANCELLED
+            waited, job.state = job.state == WAITING, CANCELLED
+            if waited:
+                self._tidy(job)
             job.signal(signal.SIGINT)
             asyncio.get_running_loop().call_later(GRACE, job.signal, signal.SIGKILL)
             self.changed()
@@ -207,7 +209,8 @@ class Jobs:
 
     def _tidy(self, job: Job) -> None:
         """Nothing is left of a command but its result."""
-        shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
+        if job.process is None and not any(j.state == RUNNING for j in self.all):
+            shutil.rmtree(self.folder / ".tmp", ignore_errors=True)
         if job.run and job.state != DONE:
             shutil.rmtree(self.folder / "runs" / job.run, ignore_errors=True)
             (self.folder / f"study-{job.run}.yaml").unlink(missing_ok=True)

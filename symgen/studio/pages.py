@@ -342,6 +342,8 @@ def answering(handler: Handler) -> Handler:
     async def answer(request: Request) -> Response:
         try:
             return await handler(request)  # type: ignore[no-any-return]
+        except RecursionError:
+            return page("message", 422, text="nested too deeply; expected a plain table or study")
         except (InputError, SymgenError, ValueError, OSError) as e:
             return page("message", 422, text=str(e) or type(e).__name__)
 

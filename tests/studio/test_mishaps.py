@@ -298,3 +298,67 @@ def test_each_run_has_its_own_changes_of_the_file(
     assert page.run(diff)
     link = page.run("document.querySelector('#applied a').getAttribute('href')")
     assert link == "file/applied-01-feasible.urdf" and "mass" in asked(studio, link)
+
+
+THINNED = """
+const whole = window.fetch;
+window.fetch = async (address, ...more) => {
+  const answer = await whole(address, ...more);
+  if (!String(address).includes("view/series")) return answer;
+  const value = await answer.json(), kept = (row) => row.filter((_, k) => k % 30 === 0);
+  for (const key of ["q", "measured", "predicted"]) value[key] = value[key].map(kept);
+  return new Response(JSON.stringify({ ...value, t: kept(value.t) }));
+};
+document.querySelector("#part").dispatchEvent(new Event("change"))"""
+
+
+def test_play_runs_in_time_however_far_apart_the_instants_are(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Here 0.45 s, as of a record of six minutes; it stays where it is stopped."""
+    studio = running(*lever(tmp_path))
+    solved(studio, "ols")
+    go(page, studio.address + "results")
+    until(page, "document.querySelectorAll('.plots svg').length === 4", 20)
+    page.run(THINNED)
+    page.run("new Promise((done) => setTimeout(done, 1000))")
+    cursor = "Number(document.querySelector('#cursor').value)"
+    before = page.run(cursor)
+    page.click("#play")
+    ran = page.run(f"new Promise((done) => setTimeout(() => done({cursor} - {before}), 3000))")
+    page.click("#play")
+    assert 2 < ran < 4
+    stopped = page.run(cursor)
+    page.run("new Promise((done) => setTimeout(done, 200))")
+    assert page.run(cursor) == stopped > before + 2
+
+
+def test_a_flipped_sign_is_turned_by_one_click(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Of a robot whose joints have names; the remedy is the one of that joint, and helps."""
+    settings = lever(tmp_path)
+    header, *rows = (tmp_path / "run.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    turned = [",".join([*row[:4], str(-float(row[4]))]) for row in cells]
+    (tmp_path / "run.csv").write_text("\n".join([header, *turned]))
+    studio = running(*settings)
+    go(page, studio.address + "check")
+    page.click("#findings button.main")
+    until(page, "document.querySelectorAll('.checks li').length > 10", 60)
+    remedies = (
+        "[...document.querySelectorAll('[data-change] button')].map((node) => node.textContent)"
+    )
+    assert "Multiply record.scale.tau by 1, -1" in until(
+        page, f"{remedies}.length && {remedies}", 5
+    )
+    page.click("[data-change] button")
+    wait_for(
+        lambda: WorkFolder(studio.work).study()["record"][0].get("scale", {}).get("tau") == [1, -1],
+        10,
+    )
+    until(
+        page,
+        "!document.querySelector('#findings .busy') && !document.querySelector('[data-change] button')",
+        60,
+    )

@@ -479,3 +479,34 @@ def test_a_check_that_is_refused_ends_with_2(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         views.check()
     assert ended.value.code == 2 and capsys.readouterr().err.startswith("error: ")
+
+
+def test_what_is_nested_without_end_is_refused(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    deep = "[" * 100_000
+    digest = studio.server.folder.digest
+    for name, form in (
+        ("study", {"values": deep}),
+        ("study", {"text": deep}),
+        ("solve", {"values": deep}),
+        ("edit", {"digest": digest, "cells": deep}),
+        ("edit", {"digest": digest, "text": deep}),
+    ):
+        answer = studio.post(name, form)
+        assert answer.status_code < 500, (name, [*form])
+        assert studio.get("robot").status_code == 200
+        digest = studio.server.folder.digest
+
+
+def test_a_run_that_was_cancelled_while_it_waited_leaves_nothing(studio: Any) -> None:
+    studio.upload("robot", "arm.yaml", TEXT.encode())
+    studio.upload("record", "run.csv", csv())
+    values = json.dumps({"symgen": 1, "record": [{"files": ["record.csv"]}]})
+    studio.post("study", {"values": values})
+    asked = {"values": values, "kind": "advise", "anyway": "1"}
+    for _ in range(2):
+        assert studio.post("solve", asked).status_code == 200
+    waiting = studio.server.jobs.all[-1]
+    assert waiting.state == "waiting" and (studio.path / f"study-{waiting.run}.yaml").exists()
+    studio.post("cancel", {"number": str(waiting.number)})
+    assert waiting.state == "cancelled" and not (studio.path / f"study-{waiting.run}.yaml").exists()

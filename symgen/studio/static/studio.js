@@ -104,7 +104,7 @@
     const options = (select, names, k) => select.replaceChildren(...names.map((name, i) => new Option(name, name, i === k, i === k)));
     const at = (t) => {
       const k = nearest(data.t, t);
-      cursor.value = data.t[k];
+      cursor.value = t;
       one("#now").textContent = `${plain(data.t[k], 2)} s`;
       plots.at(data.t[k]);
       if (!arm.robot) return;
@@ -138,8 +138,10 @@
     play.addEventListener("click", () => {
       if (timer || !data) { clearInterval(timer); timer = null; play.textContent = "Play"; return; }
       play.textContent = "Stop";
+      let last = performance.now();
       timer = setInterval(() => {
-        const t = Number(cursor.value) + 0.05;
+        const now = performance.now(), t = Number(cursor.value) + (now - last) / 1000;
+        last = now;
         at(t > data.t.at(-1) ? data.t[0] : t);
       }, 50);
     });

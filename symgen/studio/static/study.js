@@ -101,36 +101,29 @@
     const lines = (list) => Object.fromEntries(list.filter((name) => value.lines[name]).map((name) => [name, value.lines[name]]));
     new Plots(plots, value.t, q.length + tau.length ? [{ title: "q, as in the file", lines: lines(q) }, { title: "tau, as in the file", lines: lines(tau) }] : [{ title: "as in the file", lines: value.lines }]);
   }
-  // --- remedies as one change of the study ---
-  const SET = /\bset ((?:record|signals|rows|estimate)\.[a-z_.]+): (\[[^\]]*\]|[^\s,;()]+)/;
-  const SIGN = /turn the sign of the (torque|position)s?(?: of joint (\d+))?(?=[:,]|$)/;
+  // --- remedies as one change of the study: {"record.units.q": "deg"}; what is of record.scale multiplies ---
+  const multiplies = (key) => key.startsWith("record.scale.");
 
-  function change(remedy) {
-    const set = SET.exec(remedy), sign = SIGN.exec(remedy);
-    if (!set && !sign) return null;
-    const key = set ? set[1] : `record.scale.${sign[1] === "torque" ? "tau" : "q"}`;
-    const [section, ...keys] = key.split(".");
-    return {
-      text: set ? `Set ${key}: ${set[2]}` : `Turn the sign: ${key}, joint ${sign[2] || "all"}`,
-      of(values) {
-        const new_ = structuredClone(values), several = section === "record";
-        for (const part of several ? new_.record : [(new_[section] ??= {})]) {
-          const place = keys.slice(0, -1).reduce((at, name) => (at[name] ??= {}), part), last = keys.at(-1);
-          if (set) place[last] = set[2].startsWith("[") ? set[2].slice(1, -1).split(",").map(number) : number(set[2]);
-          else place[last] = Array.from({ length: joints }, (_, k) => [place[last] ?? 1].flat().at(Array.isArray(place[last]) ? k : 0) * (!sign[2] || Number(sign[2]) === k + 1 ? -1 : 1));
-        }
-        return new_;
-      },
-    };
+  function changed(values, change) {
+    const made = structuredClone(values);
+    for (const [path, value] of Object.entries(change)) {
+      const [section, ...keys] = path.split("."), last = keys.pop();
+      for (const part of section === "record" ? [made.record, made.validate?.record ?? []].flat() : [(made[section] ??= {})]) {
+        const place = keys.reduce((at, name) => (at[name] ??= {}), part), before = [place[last] ?? 1].flat();
+        place[last] = multiplies(path) ? value.map((factor, k) => factor * (before.length > 1 ? before[k] : before[0])) : value;
+      }
+    }
+    return made;
   }
 
   function remedies() {
-    for (const place of all("[data-remedy]")) {
-      const found = change(place.dataset.remedy);
-      if (!found || one("button", place)) continue;
-      const button = node("button", { type: "button", textContent: found.text });
+    for (const place of all("[data-change]")) {
+      const change = JSON.parse(place.dataset.change), steps = Object.entries(change);
+      if (!steps.length || one("button", place)) continue;
+      const text = steps.map(([key, value]) => (multiplies(key) ? `multiply ${key} by ${listed(value)}` : `set ${key}: ${listed(value) || "null"}`)).join(", ");
+      const button = node("button", { type: "button", textContent: text[0].toUpperCase() + text.slice(1) });
       button.addEventListener("click", async () => {
-        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: { values: JSON.stringify(found.of(study())) } });
+        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: { values: JSON.stringify(changed(study(), change)) } });
         htmx.ajax("POST", "do/check", { target: "#findings", swap: "outerHTML" });
       });
       place.append(button);
