@@ -32,10 +32,6 @@ class Table:
         Numbers, from 0, of columns of words, which stand to the left.
     sortable : bool
         By any column, where scripts run.
-    kinds : sequence of str
-        One word per row; a button `only` then leaves the rows of the first kind.
-    only : str
-        Label of that button.
     stacked : bool
         On a narrow screen every row is a block of lines.
     symbols : bool
@@ -48,8 +44,6 @@ class Table:
     note: str = ""
     wide: Sequence[int] = ()
     sortable: bool = False
-    kinds: Sequence[str] = ()
-    only: str = ""
     stacked: bool = False
     symbols: bool = False
 
@@ -59,11 +53,6 @@ class Table:
             raise ValueError(
                 f"table {self.caption!r}: {len(wrong[0])} cells in {tuple(wrong[0])}; expected "
                 f"{len(self.header)}, {self.header}"
-            )
-        if self.kinds and len(self.kinds) != len(self.rows):
-            raise ValueError(
-                f"table {self.caption!r}: {len(self.kinds)} kinds; expected {len(self.rows)}, one "
-                "per row"
             )
 
     def to_text(self) -> str:
