@@ -177,6 +177,12 @@ class WorkFolder:
             shutil.copyfile(path, part)
             self.take_measured("record", source, part)
 
+    @property
+    def study_digest(self) -> str:
+        """SHA-256 of study.yaml; "" where there is none."""
+        text = self.read("study.yaml")
+        return sha256(text.encode()).hexdigest() if text else ""
+
     def study(self) -> dict[str, Any]:
         """The plain values of study.yaml with a list of records, {} where it holds none; InputError
         where it is no YAML.

@@ -138,6 +138,7 @@ class Pages:
             record=record.name if record else "",
             validation=validation.name if validation else "",
             study=folder.read("study.yaml"),
+            study_digest=folder.study_digest,
             values=values,
             wrong=wrong,
             findings=findings,
@@ -274,6 +275,8 @@ class Pages:
 
     async def _study(self, form: dict[str, str]) -> str:
         """The study as text, or as values in JSON."""
+        if form.get("digest", "") != self.folder.study_digest:
+            raise InputError("another page has changed the study; reload this one")
         text = form.get("text", "").replace("\r\n", "\n")
         values = json.loads(form["values"]) if "values" in form else text
         self.folder.write("study.yaml", self.folder.checked_study(values))

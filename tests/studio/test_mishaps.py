@@ -215,9 +215,8 @@ def test_solve_waits_for_a_check(
     until(page, "document.querySelectorAll('.checks li').length > 10", 60)
     go(page, studio.address + "solve")
     assert page.run(words) == ["Solve"]
-    page.run(
-        "fetch('do/study', {method: 'POST', body: new URLSearchParams({text: 'symgen: 1\\n'})})"
-    )
+    digest = WorkFolder(studio.work).study_digest
+    asked(studio, "do/study", {"text": "symgen: 1\n", "digest": digest})
     wait_for(lambda: (studio.work / "study.yaml").read_text() == "symgen: 1\n", 10)
     go(page, studio.address + "solve")
     assert page.run(words) == ["Check first", "Solve anyway"]
@@ -362,3 +361,23 @@ def test_a_flipped_sign_is_turned_by_one_click(
         "!document.querySelector('#findings .busy') && !document.querySelector('[data-change] button')",
         60,
     )
+
+
+def test_two_pages_do_not_overwrite_their_studies(
+    page: Browser, running: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The older page is told, and its text stays to be copied."""
+    studio = running(*lever(tmp_path))
+    file = studio.work / "study.yaml"
+    go(page, studio.address + "record")
+    other = file.read_text() + "# of another page\n"
+    asked(studio, "do/study", {"text": other, "digest": WorkFolder(studio.work).study_digest})
+    page.run("document.querySelector('#study-text').value += '# mine'")
+    page.run("document.querySelector('#study-text').form.requestSubmit()")
+    until(page, f"{MESSAGE}.includes('another page has changed the study')", 10)
+    assert file.read_text() == other
+    assert page.run("document.querySelector('#study-text').value").endswith("# mine")
+    go(page, studio.address + "record")
+    page.run("document.querySelector('#study-text').value += '# mine'")
+    page.run("document.querySelector('#study-text').form.requestSubmit()")
+    wait_for(lambda: file.read_text().endswith("# mine"), 10)

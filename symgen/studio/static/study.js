@@ -2,7 +2,8 @@
 "use strict";
 (function () {
   const page = one("#values")?.dataset || {}, joints = Number(page.joints) || 99;
-  const study = () => JSON.parse((one("#study[data-values], #findings[data-values]") || one("#values")).dataset.values);
+  const holder = () => (one("#study[data-values], #findings[data-values]") || one("#values")).dataset;
+  const study = () => JSON.parse(holder().values), written = (values) => ({ values: JSON.stringify(values), digest: holder().digest });
   const number = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const listed = (x) => (x === null || x === undefined ? "" : Array.isArray(x) ? x.join(", ") : String(x));
   // --- the questions ---
@@ -59,7 +60,7 @@
       event.preventDefault();
       const open = all("strong.ask:not([hidden])", event.target);
       if (open.length) return document.getElementById(open[0].parentElement.htmlFor).focus();
-      htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: { values: JSON.stringify(answered(event.target)) } });
+      htmx.ajax("POST", "do/study", { target: "#study", swap: "outerHTML", values: written(answered(event.target)) });
     }
     if (event.target.id !== "solve" && event.target.id !== "resolution") return;
     event.preventDefault();
@@ -123,7 +124,7 @@
       const text = steps.map(([key, value]) => (multiplies(key) ? `multiply ${key} by ${listed(value)}` : `set ${key}: ${listed(value) || "null"}`)).join(", ");
       const button = node("button", { type: "button", textContent: text[0].toUpperCase() + text.slice(1) });
       button.addEventListener("click", async () => {
-        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: { values: JSON.stringify(changed(study(), change)) } });
+        await htmx.ajax("POST", "do/study", { target: "#values", swap: "none", values: written(changed(study(), change)) });
         htmx.ajax("POST", "do/check", { target: "#findings", swap: "outerHTML" });
       });
       place.append(button);
