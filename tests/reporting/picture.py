@@ -18,7 +18,7 @@ from runtime.reading.records import read_records  # noqa: E402
 from runtime.study import study_of  # noqa: E402
 
 TARGET = Path(__file__).parents[2] / "docs" / "report_desktop.png"
-WIDTH, HEIGHT = 1280, 1600
+WIDTH, HEIGHT = 1280, 1290
 
 
 def main() -> None:
