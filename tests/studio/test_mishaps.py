@@ -258,8 +258,7 @@ def test_decimal_commas(page: Browser, running: Callable[..., Any], tmp_path: Pa
     pick(page, "side", "joint")
     page.click("#questions button.main")
     until(page, "document.querySelector('#study-text')?.value.includes('side: joint')", 10)
-    until(page, "document.querySelectorAll('#preview th').length === 5", 10)
-    until(page, "!document.querySelector('[class*=htmx-]')", 10)  # the new form is in use
+    until(page, "!!document.querySelector('#study-text').form['htmx-internal-data']", 10)  # settled
     assert WorkFolder(studio.work).study()["record"][0]["decimal"] == ","
     text = "record: {files: [record.csv], decimal: ',', columns: {q: [elbow_pos_deg]}}"
     page.run(f"document.querySelector('#study-text').value = {json.dumps(text)}")
