@@ -242,6 +242,7 @@ def test_keyboard_reaches_and_zooms_a_figure(shown):
     assert shown.run("document.activeElement.getAttribute('aria-label')").startswith(
         "Torque of joint 1"
     )
+    shown.run(FRAME)
     seen = [shown.run(DRAWN)]
     for key in ("+", "+", "ArrowRight", "-", "0"):
         shown.press(key)
