@@ -26,6 +26,7 @@ from symgen.regroup.formula import Formula
 from symgen.regroup.regrouping import Regrouping
 from symgen.symbols import expressions
 from symgen.symbols.derivation import source_of
+from symgen.symbols.expressions import Tree
 from symgen.symbols.printers import MathML, latex, latex_symbol, math, math_terms
 from symgen.symbols.printers import text as plain
 from symgen.symbols.symbolic_model import SymbolicModel
@@ -265,20 +266,31 @@ def latex_lines(model: SymbolicModel, form: str) -> dict[str, list[str]]:
         sections = {"Angles": angles} if angles else {}
     else:
         listing = model.listing
-        objects = Objects(partial(expressions.product, factors=()))
-        steps, outputs = listing.steps(objects, expressions.symbol)
-        values = dict(zip(listing.places, outputs, strict=True))
-        sections = {}
-        for equation in listing.lines:
-            if value := steps.get(equation.name):
-                line = f"{latex_symbol(equation.name)} &= {latex(value)}"
-                sections.setdefault(equation.section, []).append(line)
+        steps, values = recursion(model)
+        sections = {
+            title: [f"{latex_symbol(name)} &= {latex(value)}" for name, value in own]
+            for title, own in steps.items()
+        }
     results = [
         f"{latex_label(model, p)} &= {latex(values[p])}" for p in model.places if values.get(p)
     ]
     if listing is None and model.closed.denominator is not None:
         results.append(rf"\det \mathbf{{A}} &= {latex(model.closed.denominator)}")
     return sections | ({"Model" if listing is None else "Result": results} if results else {})
+
+
+def recursion(
+    model: SymbolicModel,
+) -> tuple[dict[str, list[tuple[str, Tree]]], dict[tuple[int, ...], Tree]]:
+    """Equations (name, value) under their headings, and the entries of the model by place."""
+    listing = model.listing
+    objects = Objects(partial(expressions.product, factors=()))
+    steps, outputs = listing.steps(objects, expressions.symbol)
+    sections: dict[str, list[tuple[str, Tree]]] = {}
+    for equation in listing.lines:
+        if value := steps.get(equation.name):
+            sections.setdefault(equation.section, []).append((equation.name, value))
+    return sections, dict(zip(listing.places, outputs, strict=True))
 
 
 def latex_label(model: SymbolicModel, place: Sequence[int]) -> str:
@@ -446,8 +458,8 @@ def json_text(model: SymbolicModel, form: str) -> str:
 
 @dataclass(frozen=True)
 class ShownModel:
-    """A model on a page: in closed form `entries` (label, terms), else the text of its recursion in
-    `lines`.
+    """A model on a page: in closed form `entries` (label, terms), else the equations of its
+    recursion under their headings in `steps`.
     """
 
     title: str
@@ -455,7 +467,7 @@ class ShownModel:
     size: str
     entries: list[tuple[MathML, list[MathML]]]
     angles: list[MathML]
-    lines: str
+    steps: list[tuple[str, list[tuple[MathML, list[MathML]]]]]
 
 
 def shown_models(regrouping: Regrouping) -> tuple[list[ShownModel], list[str]]:
@@ -482,17 +494,20 @@ def _shown(model: SymbolicModel) -> ShownModel | None:
         closed = None
     if closed is None or closed.size > READABLE:
         try:
-            listing = model.listing
+            sections, values = recursion(model)
         except SymgenError:
             return None
-        return ShownModel(
-            title,
-            model.summary,
-            f"{len(listing.lines)} equations",
-            [],
-            [],
-            "\n".join(text_lines(model, "recursive")),
-        )
+        steps = [
+            (heading, [(math(expressions.symbol(name)), math_terms(value)) for name, value in own])
+            for heading, own in sections.items()
+        ]
+        results = [
+            (math(expressions.symbol(model.label(p))), math_terms(values[p]))
+            for p in model.places
+            if values.get(p)
+        ]
+        size = f"{len(model.listing.lines)} equations"
+        return ShownModel(title, model.summary, size, [], [], [*steps, ("result", results)])
     entries = [
         (math(expressions.symbol(model.label(place))), math_terms(closed.entries[place]))
         for place in model.places
@@ -503,4 +518,4 @@ def _shown(model: SymbolicModel) -> ShownModel | None:
         for name, e in closed.angles.items()
     ]
     size = f"{closed.size} term{'s' * (closed.size != 1)}"
-    return ShownModel(title, model.summary, size, entries, angles, "")
+    return ShownModel(title, model.summary, size, entries, angles, [])

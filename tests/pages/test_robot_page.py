@@ -95,8 +95,12 @@ def test_formulas_are_complete(pages, name):
     regrouping, html = pages(name)
     assert len(maths(html)) > len(regrouping)
     items = re.findall(r'<li data-p="(\w+)">(.*?)</li>', html, re.DOTALL)
-    assert [n for n, _ in items] == list(regrouping.names)
-    for (_, item), b in zip(items, regrouping.base, strict=True):
+    assert sorted(n for n, _ in items) == sorted(regrouping.names)
+    folded = html.partition("identified as they are</summary>")[2].partition("</details>")[0]
+    by_name = dict(items)
+    for b in regrouping.base:
+        item = by_name[b.name]
+        assert (f'<li data-p="{b.name}">' in folded) == (b.name == b.own)
         pointed = [
             node.get("data-p")
             for m in maths(item.partition("<span")[2])

@@ -14,12 +14,14 @@ from symgen.symbols.symbolic import symbolic
 
 def test_closed_or_recursive() -> None:
     models = {m.title: m for m in shown_models(symgen.regrouping(symgen.load_robot("tx40")))[0]}
-    assert models["gravity"].entries and not models["gravity"].lines
-    assert (
-        models["bias"].lines.count("\n") > 100
-        and not models["bias"].entries
-        and "W13 = " in models["bias"].lines
-    )
+    assert models["gravity"].entries and not models["gravity"].steps
+    bias = models["bias"]
+    equations = [pair for _, own in bias.steps for pair in own]
+    names = ["".join(ElementTree.fromstring(x).itertext()) for x, _ in equations]
+    assert len(equations) > 100 and not bias.entries and "W13" in names
+    assert bias.steps[-1][0] == "result" and len(bias.steps[-1][1]) == 6
+    for label, terms in equations:
+        assert all(ElementTree.fromstring(x).tag == "math" for x in (label, *terms))
     told = symbolic("tx40").model("gravity").closed
     assert (
         len(models["gravity"].entries) == len(told.entries)
@@ -47,7 +49,7 @@ def test_text_of_the_entries() -> None:
 def test_page_has_the_section() -> None:
     base = symgen.regrouping(symgen.load_robot("emps"))
     html = robot_page(base)
-    assert '<h2 id="models">' in html and html.count("<details") == 8
+    assert '<h2 id="models">' in html and html.count("<details") == 9
 
 
 def test_loops_say_which_joints_are_symbols() -> None:
